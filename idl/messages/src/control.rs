@@ -338,6 +338,9 @@ pub struct Status {
     /// What lies in the watched directories and cannot be looked at now; the first hundred.
     #[serde(default)]
     pub unseen: Vec<Unseen>,
+    /// What is being written to, and is not judged before it has settled; the first hundred.
+    #[serde(default)]
+    pub unfinished: Vec<Unfinished>,
     /// What keeps the broker from its work at this moment, for a person.
     #[serde(default)]
     pub troubles: Vec<String>,
@@ -394,6 +397,23 @@ impl std::fmt::Display for Unseen {
             path_text::to_text(&self.path),
             self.why
         )
+    }
+}
+
+/// A file that is being written to.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Unfinished {
+    /// Absolute path.
+    #[serde(with = "path_text::one")]
+    pub path: PathBuf,
+    /// Why it is not judged yet, for a person.
+    pub why: String,
+}
+
+impl std::fmt::Display for Unfinished {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let path = path_text::to_text(&self.path);
+        write!(f, "not judged yet: {path}: {}", self.why)
     }
 }
 

@@ -27,6 +27,8 @@ pub struct Options {
     pub poll: Option<Duration>,
     /// Look around this often even when events arrive.
     pub rescan: Duration,
+    /// How long files must be quiet that are written in place, also once they are closed.
+    pub settle: Option<Duration>,
     /// Directory of the results.
     pub out: PathBuf,
     /// The directory of a single run, see [`crate::ResultPaths`].

@@ -413,6 +413,10 @@ pub struct ServeArgs {
     /// Look around at intervals instead of relying on file events (network file systems)
     #[arg(long, value_name = "TIME", num_args = 0..=1, default_missing_value = "2s", value_parser = duration)]
     pub poll: Option<Duration>,
+    /// Judge a file that is written in place when it has rested this long, also once it is closed (uploads that
+    /// close and open files again; default: when it is closed, else after 250ms)
+    #[arg(long, value_name = "TIME", value_parser = rest)]
+    pub settle: Option<Duration>,
     /// How long the history of jobs is kept
     #[arg(long, value_name = "TIME", default_value = "90d", value_parser = duration)]
     pub retention: Duration,
@@ -641,6 +645,14 @@ pub fn duration(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(seconds).map_err(|_| wrong())
 }
 
+/// The time that files must rest.
+fn rest(text: &str) -> Result<Duration, String> {
+    let time = duration(text)?;
+    let allowed = Duration::from_millis(10)..=Duration::from_secs(3600);
+    let wrong = || format!("`{text}` is no time for files to rest; write one from 10ms to 1h");
+    allowed.contains(&time).then_some(time).ok_or_else(wrong)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -654,6 +666,10 @@ mod tests {
     #[test]
     fn times_are_read_as_people_write_them() {
         assert_eq!(duration("250ms"), Ok(Duration::from_millis(250)));
+        assert_eq!(rest("30s"), Ok(Duration::from_secs(30)));
+        for text in ["0s", "9ms", "61m", "soon"] {
+            assert!(rest(text).is_err(), "{text}");
+        }
         assert_eq!(duration("30s"), Ok(Duration::from_secs(30)));
         assert_eq!(duration("30"), Ok(Duration::from_secs(30)));
         assert_eq!(duration("1.5m"), Ok(Duration::from_secs(90)));

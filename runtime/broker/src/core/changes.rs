@@ -38,6 +38,39 @@ impl State {
         }
     }
 
+    /// A file is being written to. It is judged when it has settled, and what was accepted of it, or rests on it, goes
+    /// from behind the gate until then.
+    pub(super) fn unfinished(
+        &mut self,
+        path: &Arc<Path>,
+        stamp: Option<Stamp>,
+        actions: &mut Actions,
+    ) {
+        for dependent in self.files.dependents(path) {
+            let read = self.reading_of(dependent, path);
+            if matches!(read, Some(Dependence::Read { stamp: read, .. }) if read != stamp) {
+                self.shut(dependent, actions);
+            }
+        }
+        let Some(id) = self.files.id(path) else {
+            return;
+        };
+        let judged = self.files.get(id).and_then(|it| it.judged.as_ref());
+        let read = judged.and_then(|it| it.inputs.first()?.content.stamp());
+        if read != stamp {
+            self.shut(id, actions);
+            if let Some(entry) = self.files.get_mut(id) {
+                entry.doubted = true;
+            }
+        }
+    }
+
+    /// Whether it was told of a file that it is there, quiet, and what it is now.
+    pub fn is_settled(&self, path: &Path, stamp: Stamp) -> bool {
+        let entry = self.files.id(path).and_then(|id| self.files.get(id));
+        entry.is_some_and(|it| it.present && it.stamp == stamp)
+    }
+
     /// A file is there and quiet: whose verdict depends on it?
     pub(super) fn touched(&mut self, path: &Arc<Path>, stamp: Stamp, actions: &mut Actions) {
         for dependent in self.files.dependents(path) {
@@ -184,8 +217,10 @@ impl State {
         for dependent in self.files.dependents(path) {
             self.doubt(dependent, actions);
         }
-        if let Some(id) = self.files.id(path) {
-            self.vanished_file(id, actions);
+        match self.files.id(path) {
+            Some(id) => self.vanished_file(id, actions),
+            // It has gone before it was finished.
+            None => self.answer_gone(path, actions),
         }
     }
 

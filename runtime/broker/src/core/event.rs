@@ -120,13 +120,20 @@ pub enum Event {
         /// All of them.
         specs: Vec<ChildSpec>,
     },
+    /// A file is being written to.
+    Unfinished {
+        /// The file.
+        path: Arc<Path>,
+        /// What it is at this moment.
+        stamp: Option<Stamp>,
+    },
     /// A client waits for a verdict.
     Wait {
         /// The client.
         ticket: Ticket,
         /// The file.
         path: Arc<Path>,
-        /// What `stat` says of it now.
+        /// What `stat` says of it now, if it is there and at rest. Otherwise an event will tell.
         stamp: Option<Stamp>,
         /// Why nobody will ever check it, if so.
         unwatched: Option<String>,

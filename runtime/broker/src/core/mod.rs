@@ -224,6 +224,7 @@ impl State {
         match event {
             Event::Settled { path, stamp } => self.written(&path, stamp, &mut actions),
             Event::Present { path } => self.present(&path),
+            Event::Unfinished { path, stamp } => self.unfinished(&path, stamp, &mut actions),
             Event::Touched { path, stamp } => self.touched(&path, stamp, &mut actions),
             Event::Vanished { path } => self.vanished(&path, &mut actions),
             Event::OutputsLost { lost } => self.outputs_lost(&lost, &mut actions),

@@ -30,6 +30,7 @@ mod reporting;
 mod restless;
 mod things;
 mod trials;
+mod unfinished;
 mod words;
 mod world;
 

@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use qcbus_messages::control::{BundleStanding, Request, Response, Status, Terms, Unseen};
+use qcbus_document::FileKind;
+use qcbus_messages::control::{
+    BundleStanding, Request, Response, Status, Terms, Unfinished, Unseen,
+};
 use qcbus_messages::path_text::to_text;
 use tokio::sync::oneshot;
 
@@ -17,8 +20,9 @@ use crate::gate::Gate;
 use crate::own_program::OwnProgram;
 use crate::reload::{Fingerprint, LoadError, command_of, differences};
 use crate::terms::{differs, terms};
+use crate::watch::Why;
 
-/// Most that is told of what could not be looked at.
+/// Most that is told of what could not be looked at, or is not finished.
 const UNSEEN_SHOWN: usize = 100;
 
 impl Broker {
@@ -173,19 +177,30 @@ impl Broker {
             return true;
         }
         let (file, until) = (&*file, look.until);
+        let mut at_rest = stamp;
         let ticket = self.ticket(look.answer);
         if let (None, Some(watcher)) = (&unwatched, &self.watcher) {
             match stamp {
                 // The watcher may not have come to it, and must tell when it goes.
-                Some(stamp) => watcher.learn(file.into(), stamp),
-                // Should it be back before the watcher has missed it, nothing else would tell.
-                None => watcher.look(file.into()),
+                Some(stamp) if self.state.is_settled(file, stamp) || self.is_nobody_watching() => {
+                    watcher.learn(file.into(), stamp);
+                }
+                // It may still be written to. Should it be back before the watcher has missed it, nothing else
+                // would tell.
+                Some(_) | None => {
+                    at_rest = None;
+                    watcher.look(file.into());
+                }
             }
+        }
+        if stamp.is_some() && at_rest.is_none() {
+            // It is there, whatever the first look of the watcher has come to.
+            self.handle(Event::Present { path: file.into() });
         }
         self.handle(Event::Wait {
             ticket,
             path: file.into(),
-            stamp,
+            stamp: at_rest,
             unwatched,
             until,
         })
@@ -194,6 +209,13 @@ impl Broker {
     /// A client that asks must not be told what was true a moment ago: changes of dependencies
     /// that the watcher has not come to yet are seen here.
     pub(super) fn take_in(&mut self, moved: Vec<(Arc<Path>, Option<Stamp>)>) {
+        // The verdict on what is being written comes when it has settled; nothing rests on the last one meanwhile.
+        let is_settling =
+            |path: &Path| FileKind::of_path(path).is_some() && self.unfinished.contains_key(path);
+        let moved: Vec<_> = moved
+            .into_iter()
+            .filter(|(path, stamp)| stamp.is_none() || !is_settling(path))
+            .collect();
         for (path, stamp) in moved {
             let event = match stamp {
                 Some(stamp) => Event::Touched { path, stamp },
@@ -328,6 +350,7 @@ impl Broker {
             watch_mode: self.watch_mode.clone(),
             out: self.options.out.clone(),
             unseen: self.all_unseen(),
+            unfinished: self.first_unfinished(),
             state: self.options.state.clone(),
             bundles_d: self.options.bundles_d.clone(),
             troubles: self.troubles(),
@@ -341,13 +364,22 @@ impl Broker {
     /// What keeps the broker from its work at this moment.
     fn troubles(&self) -> Vec<String> {
         let mut troubles: Vec<String> = self.writers.troubles().into_iter().collect();
-        if self.watching.as_ref().is_some_and(|it| it.is_alone()) {
+        if self.is_nobody_watching() {
             troubles.push("nobody watches for changes".to_owned());
         }
         if let Some(text) = self.said_of_state() {
             troubles.push(text);
         }
         troubles
+    }
+
+    fn first_unfinished(&self) -> Vec<Unfinished> {
+        let unfinished = |(path, why): (&Arc<Path>, &Why)| Unfinished {
+            path: path.to_path_buf(),
+            why: why.to_string(),
+        };
+        let all = self.unfinished.iter().map(unfinished);
+        all.take(UNSEEN_SHOWN).collect()
     }
 
     fn all_unseen(&self) -> Vec<Unseen> {

@@ -175,10 +175,9 @@ impl Broker {
     fn missed(&mut self, path: Arc<Path>, stamp: Option<Stamp>) -> bool {
         let go_on = stamp.is_some() || self.handle(Event::Vanished { path: path.clone() });
         if let Some(watcher) = &self.watcher {
-            match stamp {
-                Some(stamp) => watcher.learn(path.clone(), stamp),
-                // It may have told meanwhile that the file is back.
-                None => watcher.forget(path.clone()),
+            // It may have told meanwhile that the file is back.
+            if stamp.is_none() {
+                watcher.forget(path.clone());
             }
             watcher.look(path);
         }

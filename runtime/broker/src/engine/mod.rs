@@ -41,7 +41,7 @@ use crate::reload::{Fingerprint, LoadError, Loaded, Sources};
 use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::stages::reached;
 use crate::store::Store;
-use crate::watch::{Seen, Watcher};
+use crate::watch::{Seen, Watcher, Why};
 use crate::writers::Writers;
 
 /// Why a broker cannot start.
@@ -131,6 +131,8 @@ pub struct Broker {
     watch_mode: String,
     /// What could not be looked at, and why.
     unseen: BTreeMap<PathBuf, String>,
+    /// What is being written to, and is not judged until it has settled.
+    unfinished: BTreeMap<Arc<Path>, Why>,
     looks: Looks,
     sessions: Sessions,
     tickets: HashMap<Ticket, oneshot::Sender<Response>>,
@@ -443,7 +445,14 @@ impl Broker {
     }
 
     fn seen(&mut self, seen: Seen) -> bool {
+        if let Seen::Settled(path, _) | Seen::Touched(path, _) | Seen::Vanished(path) = &seen {
+            self.unfinished.remove(path);
+        }
         match seen {
+            Seen::Unfinished(path, stamp, why) => {
+                self.unfinished.insert(path.clone(), why);
+                self.handle(Event::Unfinished { path, stamp })
+            }
             Seen::Settled(path, stamp) => {
                 reached("settled", &path);
                 self.handle(Event::Settled { path, stamp })

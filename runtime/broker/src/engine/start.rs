@@ -81,6 +81,7 @@ impl Broker {
             output_watch: None,
             watch_mode: "once".to_owned(),
             unseen: BTreeMap::new(),
+            unfinished: BTreeMap::new(),
             looks,
             sessions: Sessions::default(),
             tickets: HashMap::new(),

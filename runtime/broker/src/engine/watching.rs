@@ -35,7 +35,7 @@ impl Watching {
     }
 
     /// Whether nobody watches for changes now.
-    pub(super) fn is_alone(&self) -> bool {
+    fn is_alone(&self) -> bool {
         self.is_alone
     }
 
@@ -55,6 +55,7 @@ impl Broker {
             roots: self.options.roots.clone(),
             poll: self.options.poll,
             rescan: self.options.rescan,
+            settle: self.options.settle,
         };
         let own = watching.number() + 1;
         let (current, seen) = (watching.current.clone(), watching.seen.clone());
@@ -82,6 +83,10 @@ impl Broker {
         number >= FIRST
     }
 
+    pub(super) fn is_nobody_watching(&self) -> bool {
+        self.watching.as_ref().is_some_and(Watching::is_alone)
+    }
+
     /// Tries again what could not be done for want of a thread.
     pub(super) fn watch_again(&mut self) {
         if let Some(mut watching) = self.watching.take_if(|it| it.is_alone) {
@@ -98,6 +103,7 @@ impl Broker {
             Ok(watcher) => {
                 // What still cannot be looked at is named again.
                 self.unseen.retain(|path, _| self.looks.is_hanging(path));
+                self.unfinished.clear();
                 watcher.depend(self.state.dependencies());
                 self.watcher = Some(watcher);
                 watching.is_alone = false;

@@ -103,6 +103,7 @@ fn options(dir: &Path) -> Options {
         watch: true,
         poll: None,
         rescan: Duration::from_secs(5),
+        settle: None,
         out: dir.join("out"),
         here: None,
         single_result: None,

@@ -190,6 +190,7 @@ impl Looker {
             ));
         }
         self.dependencies.poll_all();
+        self.settling.events_were_lost(now());
         self.due.pass_at(now());
     }
 
@@ -205,15 +206,15 @@ impl Looker {
             self.check_roots();
         } else if told.what.contains(ReadFlags::ISDIR) {
             self.directory_event(&path, told.what);
-        } else if told.what.intersects(
-            ReadFlags::CLOSE_WRITE
-                | ReadFlags::MOVED_TO
-                | ReadFlags::MOVED_FROM
-                | ReadFlags::DELETE,
-        ) {
+        } else if told
+            .what
+            .intersects(ReadFlags::MOVED_TO | ReadFlags::MOVED_FROM | ReadFlags::DELETE)
+        {
             self.finished(&path);
+        } else if told.what.contains(ReadFlags::CLOSE_WRITE) {
+            self.closed(&path);
         } else {
-            self.touched(&path);
+            self.touched(&path, told.what);
         }
     }
 
@@ -243,7 +244,7 @@ impl Looker {
         }
     }
 
-    /// Closed, renamed or removed: look at once.
+    /// Renamed or removed, or closed and at rest: look at once.
     fn finished(&mut self, path: &Path) {
         self.settling.done(path);
         if self.known.contains_key(path) || self.cares_about(path) {
@@ -252,10 +253,23 @@ impl Looker {
         self.look_for_a_link(path);
     }
 
-    fn touched(&mut self, path: &Path) {
+    fn closed(&mut self, path: &Path) {
+        let stamp = stamp_of(path).ok().flatten();
+        if !self.cares_about(path) || !self.settling.closed(path, stamp, now()) {
+            self.finished(path);
+        }
+    }
+
+    fn touched(&mut self, path: &Path, what: ReadFlags) {
         if self.cares_about(path) {
-            self.settling
-                .touched(path, stamp_of(path).ok().flatten(), now());
+            let stamp = stamp_of(path).ok().flatten();
+            // Another name for a file comes as one that was created, too. Only an empty one is sure to be filled.
+            let is_empty = stamp.is_some_and(|it| it.size == 0);
+            if what.contains(ReadFlags::MODIFY) || (what.contains(ReadFlags::CREATE) && is_empty) {
+                self.settling.written(path, stamp, now());
+            } else {
+                self.settling.touched(path, stamp, now());
+            }
         }
         self.look_for_a_link(path);
     }
@@ -279,7 +293,7 @@ impl Looker {
         }
     }
 
-    fn cares_about(&mut self, path: &Path) -> bool {
+    pub(super) fn cares_about(&mut self, path: &Path) -> bool {
         let checkable =
             FileKind::of_path(path).is_some() && !path.file_name().is_some_and(is_ignored_file);
         self.dependencies.contains(path) || (checkable && !self.ignored(path, false))

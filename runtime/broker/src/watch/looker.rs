@@ -14,6 +14,7 @@ use qcbus_messages::control::Unseen;
 use super::dependencies::{self, Changed, Dependencies, events_tell};
 use super::due::Due;
 use super::ignore::{IgnoreRules, ignores};
+use super::open_files::OpenFiles;
 use super::roots::Roots;
 use super::scan::{MORE_UNSEEN, MOST_UNSEEN};
 use super::settle::Settling;
@@ -22,7 +23,6 @@ use super::tree::{Tree, below};
 use super::{Known, Order, Seen, WatchOptions};
 use crate::core::Stamp;
 use crate::seams::{Bell, Receiver, now, step};
-use crate::stamp::stamp_of;
 
 /// How long directories are looked through before events and orders have their turn.
 const SLICE: Duration = Duration::from_millis(20);
@@ -45,6 +45,8 @@ pub(super) struct Looker {
     /// There is more of it than is said.
     is_more_unseen: bool,
     pub settling: Settling,
+    /// What was open for writing when the first look began to need that.
+    pub open_at_start: Option<OpenFiles>,
     pub dependencies: Dependencies,
     pub roots: Roots,
     pub tree: Tree,
@@ -62,7 +64,6 @@ impl Looker {
             .map(|root| IgnoreRules::new(root))
             .collect();
         Looker {
-            options,
             tell,
             rules,
             known: BTreeMap::new(),
@@ -70,13 +71,15 @@ impl Looker {
             last_link: None,
             unseen: BTreeMap::new(),
             is_more_unseen: false,
-            settling: Settling::default(),
+            settling: Settling::new(options.settle),
+            open_at_start: None,
             dependencies: Dependencies::default(),
             roots: Roots::default(),
             tree: Tree::default(),
             due: Due::new(now()),
             polling: super::events::Polling::default(),
             goes_on: false,
+            options,
         }
     }
 
@@ -94,10 +97,7 @@ impl Looker {
         let mut next_look = now() + dependencies::INTERVAL;
         while self.take_orders(inbox) {
             self.take_events();
-            let stamp = |path: &Path| stamp_of(path).ok().flatten();
-            for path in self.settling.settled(now(), stamp) {
-                self.look(&path);
-            }
+            self.look_at_what_may_have_settled(now());
             if now() >= next_look {
                 self.look_around();
                 next_look = now() + dependencies::INTERVAL;
@@ -194,12 +194,12 @@ impl Looker {
         }
     }
 
-    /// As [`Looker::look`]; a directory is looked through.
-    fn look_again(&mut self, path: &Path) {
+    /// Looks at a file for somebody who has heard of it elsewhere; a directory is looked through.
+    pub fn look_again(&mut self, path: &Path) {
         if self.tree.contains(path) {
             self.due.push(path);
         }
-        self.look(path);
+        self.look_if_at_rest(path);
     }
 
     /// It may have been one before somebody had it ignored, and others may depend on it.
@@ -223,6 +223,10 @@ impl Looker {
         if stamp.is_none() && self.roots.is_away(&path) {
             return;
         }
+        // It is told when it has settled.
+        if stamp.is_some() && self.settling.is_pending(&path) {
+            return;
+        }
         (self.tell)(match stamp {
             Some(stamp) => Seen::Touched(path, stamp),
             None => Seen::Vanished(path),
@@ -232,7 +236,7 @@ impl Looker {
     /// The broker found a file gone, of which no event told, and knows nothing of it any more.
     pub fn forget(&mut self, path: &Path) {
         if self.known.remove(path).is_some() {
-            self.look(path);
+            self.look_if_at_rest(path);
         }
     }
 

@@ -12,6 +12,8 @@ mod events;
 mod ignore;
 pub mod kernel;
 mod looker;
+mod open_files;
+mod rest;
 mod roots;
 mod scan;
 mod settle;
@@ -37,6 +39,7 @@ use crate::seams::{Bell, Sender, channel, thread};
 
 pub use self::ignore::{hidden_above, is_excluded};
 pub use self::scan::Scan;
+pub use self::settle::Why;
 pub use self::sight::{NoFile, Sight, is_behind_a_link, look_at};
 pub(crate) use self::tree::{Told, Tree, Unwatched, below};
 
@@ -71,6 +74,8 @@ pub enum Seen {
     Settled(Arc<Path>, Stamp),
     /// A file was there in the first scan, and may still be written to.
     Present(Arc<Path>),
+    /// A file is being written to, as it is now, and is not judged until it has settled.
+    Unfinished(Arc<Path>, Option<Stamp>, Why),
     /// Something that a verdict depends on has become another. It need not be a file to check.
     Touched(Arc<Path>, Stamp),
     /// A file has gone.
@@ -98,6 +103,8 @@ pub struct WatchOptions {
     pub poll: Option<Duration>,
     /// Look around this often even when events arrive, because kernels and file systems lose some.
     pub rescan: Duration,
+    /// How long files must be quiet that are written in place, also once they are closed.
+    pub settle: Option<Duration>,
 }
 
 /// What a watcher goes on with that takes the place of another. The first look through everything is over then.
@@ -180,7 +187,7 @@ impl Watcher {
         self.order(Order::Learn(path, stamp));
     }
 
-    /// Somebody found nothing where a file may have been: what is there now, or has gone, is told.
+    /// Somebody asks for a file of which nothing was told: what is there now, or has gone, is told once it is at rest.
     pub fn look(&self, path: Arc<Path>) {
         self.order(Order::Look(path));
     }

@@ -1,5 +1,10 @@
-//! When is a file finished? After a close or a rename into place at once; after anything else when
-//! it has been quiet for a while and neither its size nor its time has moved.
+//! When is a file finished? After a close or a rename into place at once; after anything else when it has been
+//! quiet for a while, neither its size nor its time has moved, and nobody has it open for writing.
+//!
+//! An event tells of a write, and another of the close after it. Of files without events `/proc` tells who has them
+//! open, as far as this user may see it. A lease would tell, too, but while we had it a writer that opens the file
+//! without blocking, as FTP servers do, would be refused. Nobody is waited for longer than [`OPEN_QUIET`] without a
+//! change: a process that keeps a file open for ever does not hide it.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -10,28 +15,125 @@ use crate::core::Stamp;
 /// Files that have been touched and may still be written to.
 #[derive(Debug, Default)]
 pub struct Settling {
+    /// How long files must be quiet, also closed ones, if somebody asks for that.
+    asked: Option<Duration>,
     pending: HashMap<PathBuf, Pending>,
 }
 
 #[derive(Debug)]
 struct Pending {
+    /// When it was first touched.
+    since: Instant,
+    /// When it last changed.
+    changed: Instant,
     due: Instant,
     stamp: Option<Stamp>,
+    /// It was written to and not closed since.
+    is_open: bool,
+    /// It was said that it waits.
+    is_said: bool,
 }
 
-/// How long a file must be quiet.
+/// How long a file must be quiet, if nobody asks for another time.
 pub const QUIET: Duration = Duration::from_millis(250);
 
+/// How long a file must be quiet that somebody has open for writing.
+pub const OPEN_QUIET: Duration = Duration::from_secs(60);
+
+/// How often it is asked who has a file open of whose close no event may tell.
+const ASK_AGAIN: Duration = Duration::from_secs(1);
+
+/// Why a file is not judged yet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Why {
+    /// It is open for writing. So long it must be quiet at most.
+    Open(Duration),
+    /// It has changed, and must be quiet for so long.
+    Young(Duration),
+}
+
+impl std::fmt::Display for Why {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Why::Open(most) => write!(
+                f,
+                "it is open for writing; it is judged when it is closed, or has not changed for {} s",
+                most.as_secs_f64()
+            ),
+            Why::Young(rest) => write!(
+                f,
+                "it is being written to; it is judged when it has not changed for {} s",
+                rest.as_secs_f64()
+            ),
+        }
+    }
+}
+
+/// What a look at the files that are due has found.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Looked {
+    /// Those that have kept still.
+    pub settled: Vec<PathBuf>,
+    /// Those that have to wait longer than usual, each once, as they are now.
+    pub waiting: Vec<(PathBuf, Option<Stamp>, Why)>,
+}
+
 impl Settling {
+    /// `asked`: how long files must be quiet, also closed ones.
+    pub fn new(asked: Option<Duration>) -> Settling {
+        Settling {
+            asked,
+            pending: HashMap::new(),
+        }
+    }
+
+    /// How long a file must be quiet.
+    pub fn rest(&self) -> Duration {
+        self.asked.unwrap_or(QUIET)
+    }
+
+    /// How long one that is open for writing must be quiet.
+    pub fn open_rest(&self) -> Duration {
+        self.rest().max(OPEN_QUIET)
+    }
+
     /// The file was touched in a way that does not say that it is finished.
     pub fn touched(&mut self, path: &Path, stamp: Option<Stamp>, now: Instant) {
-        self.pending.insert(
-            path.to_path_buf(),
-            Pending {
-                due: now + QUIET,
-                stamp,
-            },
-        );
+        let is_open = self.pending.get(path).is_some_and(|it| it.is_open);
+        self.put(path, stamp, is_open, now);
+    }
+
+    /// The file was written to: whoever did that closes it.
+    pub fn written(&mut self, path: &Path, stamp: Option<Stamp>, now: Instant) {
+        self.put(path, stamp, true, now);
+    }
+
+    /// The file was closed after it was open for writing. `false`: it is finished.
+    pub fn closed(&mut self, path: &Path, stamp: Option<Stamp>, now: Instant) -> bool {
+        if self.asked.is_none() {
+            self.done(path);
+            return false;
+        }
+        self.put(path, stamp, false, now);
+        true
+    }
+
+    fn put(&mut self, path: &Path, stamp: Option<Stamp>, is_open: bool, now: Instant) {
+        let rest = if is_open {
+            self.open_rest()
+        } else {
+            self.rest()
+        };
+        let before = self.pending.get(path);
+        let pending = Pending {
+            since: before.map_or(now, |it| it.since),
+            changed: now,
+            due: now + rest,
+            stamp,
+            is_open,
+            is_said: before.is_some_and(|it| it.is_said),
+        };
+        self.pending.insert(path.to_path_buf(), pending);
     }
 
     /// The file was seen in passing, which may happen more often than every quiet time: only a
@@ -48,35 +150,75 @@ impl Settling {
         self.pending.remove(path);
     }
 
-    /// When to look next.
-    pub fn next_due(&self) -> Option<Instant> {
-        self.pending.values().map(|pending| pending.due).min()
+    /// Whether the file may still be written to.
+    pub fn is_pending(&self, path: &Path) -> bool {
+        self.pending.contains_key(path)
     }
 
-    /// The files that are due and have kept still; those that moved meanwhile wait again.
-    pub fn settled(
+    /// The close of a file may be among events that were lost.
+    pub fn events_were_lost(&mut self, now: Instant) {
+        let due = now + self.rest();
+        for pending in self.pending.values_mut().filter(|it| it.is_open) {
+            (pending.is_open, pending.due) = (false, due);
+        }
+    }
+
+    /// When to look next.
+    pub fn next_due(&self) -> Option<Instant> {
+        let times = self.pending.values().map(Pending::next_look);
+        times.min()
+    }
+
+    /// Looks at the files that are due. Those that have kept still are settled, those that moved meanwhile wait again,
+    /// and so do those that `is_open` says are open for writing.
+    pub fn look(
         &mut self,
         now: Instant,
         mut stamp_of: impl FnMut(&Path) -> Option<Stamp>,
-    ) -> Vec<PathBuf> {
-        let mut settled = Vec::new();
+        mut is_open: impl FnMut(&Path) -> bool,
+    ) -> Looked {
+        let mut looked = Looked::default();
+        let (rest, open_rest) = (self.rest(), self.open_rest());
         self.pending.retain(|path, pending| {
-            if pending.due > now {
+            if pending.next_look() > now {
                 return true;
             }
-            let stamp = stamp_of(path);
-            if stamp == pending.stamp {
-                settled.push(path.clone());
-                return false;
-            }
-            *pending = Pending {
-                due: now + QUIET,
-                stamp,
+            let mut why = if pending.is_open {
+                Why::Open(open_rest)
+            } else {
+                Why::Young(rest)
             };
+            if pending.due <= now {
+                let stamp = stamp_of(path);
+                let may_be_open = !pending.is_open && now < pending.changed + open_rest;
+                if stamp != pending.stamp {
+                    let quiet = if pending.is_open { open_rest } else { rest };
+                    (pending.stamp, pending.changed, pending.due) = (stamp, now, now + quiet);
+                } else if may_be_open && stamp.is_some() && is_open(path) {
+                    pending.due = now + ASK_AGAIN;
+                    why = Why::Open(open_rest);
+                } else {
+                    looked.settled.push(path.clone());
+                    return false;
+                }
+            }
+            if !std::mem::replace(&mut pending.is_said, true) {
+                looked.waiting.push((path.clone(), pending.stamp, why));
+            }
             true
         });
-        settled.sort();
-        settled
+        looked.settled.sort();
+        looked
+    }
+}
+
+impl Pending {
+    /// When it is due, or is to be said to wait.
+    fn next_look(&self) -> Instant {
+        if self.is_said {
+            return self.due;
+        }
+        self.due.min(self.since + QUIET)
     }
 }
 
@@ -84,39 +226,122 @@ impl Settling {
 mod tests {
     use super::*;
 
-    #[test]
-    fn looking_often_does_not_keep_a_file_from_settling() {
-        let start = Instant::now();
-        let stamp = |size| Stamp {
+    const NOW: fn() -> Instant = Instant::now;
+
+    fn stamp(size: u64) -> Stamp {
+        Stamp {
             size,
             ..Stamp::default()
-        };
+        }
+    }
+
+    fn path() -> &'static Path {
+        Path::new("/a.xodr")
+    }
+
+    /// What a look finds at a file of this size, which is open or not.
+    fn look(settling: &mut Settling, now: Instant, size: u64, is_open: bool) -> Looked {
+        settling.look(now, |_| Some(stamp(size)), |_| is_open)
+    }
+
+    #[test]
+    fn looking_often_does_not_keep_a_file_from_settling() {
+        let start = NOW();
         let mut settling = Settling::default();
-        let path = Path::new("/a.xodr");
-        settling.seen(path, stamp(1), start);
-        settling.seen(path, stamp(1), start + QUIET / 2);
+        settling.seen(path(), stamp(1), start);
+        settling.seen(path(), stamp(1), start + QUIET / 2);
         assert_eq!(settling.next_due(), Some(start + QUIET));
-        settling.seen(path, stamp(2), start + QUIET / 2);
+        settling.seen(path(), stamp(2), start + QUIET / 2);
+        let looked = look(&mut settling, start + QUIET, 2, false);
+        assert_eq!(looked.settled, [] as [&Path; 0]);
         assert_eq!(settling.next_due(), Some(start + QUIET / 2 + QUIET));
-        settling.touched(path, Some(stamp(2)), start + QUIET);
+        settling.touched(path(), Some(stamp(2)), start + QUIET);
         assert_eq!(settling.next_due(), Some(start + QUIET * 2));
     }
 
     #[test]
-    fn a_file_that_grows_is_not_settled() {
-        let start = Instant::now();
-        let stamp = |size| {
-            Some(Stamp {
-                size,
-                ..Stamp::default()
-            })
-        };
+    fn a_file_that_grows_is_not_settled_and_said_once_to_wait() {
+        let start = NOW();
         let mut settling = Settling::default();
-        let path = Path::new("/a.xodr");
-        settling.touched(path, stamp(1), start);
-        assert!(settling.settled(start, |_| stamp(1)).is_empty());
-        assert!(settling.settled(start + QUIET, |_| stamp(2)).is_empty());
-        assert_eq!(settling.settled(start + QUIET * 2, |_| stamp(2)), [path]);
+        settling.touched(path(), Some(stamp(1)), start);
+        assert_eq!(look(&mut settling, start, 1, false), Looked::default());
+        let grown = look(&mut settling, start + QUIET, 2, false);
+        let young = (path().to_path_buf(), Some(stamp(2)), Why::Young(QUIET));
+        assert_eq!((grown.settled.len(), grown.waiting), (0, vec![young]));
+        let settled = look(&mut settling, start + QUIET * 2, 2, false);
+        assert_eq!(
+            (settled.settled, settled.waiting.len()),
+            (vec![path().to_path_buf()], 0)
+        );
         assert_eq!(settling.next_due(), None);
+    }
+
+    #[test]
+    fn written_file_waits_for_its_close_and_no_longer_than_the_limit() {
+        let start = NOW();
+        let mut settling = Settling::default();
+        settling.written(path(), Some(stamp(1)), start);
+        let looked = look(&mut settling, start + QUIET, 1, false);
+        let open = (path().to_path_buf(), Some(stamp(1)), Why::Open(OPEN_QUIET));
+        assert_eq!((looked.settled.len(), looked.waiting), (0, vec![open]));
+        let before = start + OPEN_QUIET - QUIET;
+        assert_eq!(look(&mut settling, before, 1, false), Looked::default());
+        // Attributes that change tell of no close.
+        settling.touched(path(), Some(stamp(1)), before);
+        let looked = look(&mut settling, start + OPEN_QUIET, 1, false);
+        assert_eq!(looked, Looked::default());
+        let looked = look(&mut settling, before + OPEN_QUIET, 1, false);
+        assert_eq!(looked.settled, [path()]);
+        settling.written(path(), Some(stamp(2)), start);
+        assert!(!settling.closed(path(), Some(stamp(2)), start));
+        assert_eq!(settling.next_due(), None);
+    }
+
+    #[test]
+    fn file_that_others_have_open_is_asked_about_again() {
+        let start = NOW();
+        let mut settling = Settling::default();
+        settling.seen(path(), stamp(1), start);
+        let looked = look(&mut settling, start + QUIET, 1, true);
+        assert_eq!((looked.settled.len(), looked.waiting.len()), (0, 1));
+        let next = start + QUIET + ASK_AGAIN;
+        assert_eq!(settling.next_due(), Some(next));
+        assert_eq!(look(&mut settling, next, 1, true), Looked::default());
+        assert_eq!(
+            look(&mut settling, next + ASK_AGAIN, 1, false).settled,
+            [path()]
+        );
+        settling.seen(path(), stamp(1), start);
+        assert_eq!(
+            look(&mut settling, start + OPEN_QUIET, 1, true).settled,
+            [path()]
+        );
+    }
+
+    #[test]
+    fn time_that_is_asked_for_counts_after_a_close_too() {
+        let start = NOW();
+        let rest = Duration::from_secs(30);
+        let mut settling = Settling::new(Some(rest));
+        settling.written(path(), Some(stamp(1)), start);
+        assert!(settling.closed(path(), Some(stamp(2)), start));
+        let looked = look(&mut settling, start + QUIET, 2, false);
+        assert_eq!(looked.waiting[0].2, Why::Young(rest));
+        assert_eq!(
+            look(&mut settling, start + rest, 2, false).settled,
+            [path()]
+        );
+    }
+
+    #[test]
+    fn after_lost_events_the_close_may_have_been_among_them() {
+        let start = NOW();
+        let mut settling = Settling::default();
+        settling.written(path(), Some(stamp(1)), start);
+        settling.events_were_lost(start);
+        assert_eq!(
+            look(&mut settling, start + QUIET, 1, false).settled,
+            [path()]
+        );
     }
 }

@@ -11,7 +11,6 @@ use super::ignore::IGNORE_FILE;
 use super::looker::Looker;
 use super::settle::QUIET;
 use super::{Seen, WatchOptions};
-use crate::stamp::stamp_of;
 
 /// A looker around one directory, and what it says.
 fn looker(root: &Path) -> (Looker, Receiver<Seen>) {
@@ -20,6 +19,7 @@ fn looker(root: &Path) -> (Looker, Receiver<Seen>) {
         roots: vec![root.to_path_buf()],
         poll: None,
         rescan: Duration::MAX,
+        settle: None,
     };
     let tell = Box::new(move |seen| tell.send(seen).unwrap());
     (Looker::new(options, tell), told)
@@ -38,6 +38,7 @@ fn words(root: &Path, told: &Receiver<Seen>) -> Vec<String> {
     let word = |seen| match seen {
         Seen::Settled(path, _) => format!("settled {}", name(&path)),
         Seen::Present(path) => format!("present {}", name(&path)),
+        Seen::Unfinished(path, ..) => format!("unfinished {}", name(&path)),
         Seen::Vanished(path) => format!("vanished {}", name(&path)),
         Seen::Unseen(it) | Seen::Away(it) => format!("unseen {}", name(&it.path)),
         Seen::SeenAgain(path) => format!("seen again {}", name(&path)),
@@ -50,10 +51,7 @@ fn words(root: &Path, told: &Receiver<Seen>) -> Vec<String> {
 /// What has been touched settles.
 fn settle(looker: &mut Looker) {
     let later = Instant::now() + QUIET * 2;
-    let stamp = |path: &Path| stamp_of(path).ok().flatten();
-    for path in looker.settling.settled(later, stamp) {
-        looker.look(&path);
-    }
+    looker.look_at_what_may_have_settled(later);
 }
 
 #[test]
@@ -213,6 +211,9 @@ fn what_the_broker_found_gone_is_told_again_if_it_is_there() {
     assert_eq!(words(&root, &told), ["settled a.xodr"]);
     // It was away for a moment in which the broker tried to read it.
     looker.forget(&file);
+    let may_be_written_to = ["present a.xodr"];
+    assert_eq!(words(&root, &told), may_be_written_to);
+    settle(&mut looker);
     assert_eq!(words(&root, &told), ["settled a.xodr"]);
     std::fs::remove_file(&file).unwrap();
     looker.forget(&file);
@@ -253,4 +254,39 @@ fn whoever_asks_for_another_look_is_told_what_is_there_or_has_gone() {
     assert_eq!(words(&root, &told), ["vanished a.xodr"]);
     looker.look(&path);
     assert!(words(&root, &told).is_empty());
+}
+
+#[test]
+fn file_without_events_is_told_when_it_is_closed() {
+    let (_dir, root) = farm();
+    let path = root.join("a.xodr");
+    let writer = std::fs::File::create(&path).unwrap();
+    let (mut looker, told) = looker(&root);
+    looker.scan_all(true);
+    assert_eq!(words(&root, &told), ["present a.xodr"]);
+    for ask in [false, true] {
+        if ask {
+            looker.look_again(&path);
+        }
+        settle(&mut looker);
+    }
+    assert_eq!(words(&root, &told), ["unfinished a.xodr"]);
+    drop(writer);
+    looker.look_at_what_may_have_settled(Instant::now() + QUIET * 20);
+    assert_eq!(words(&root, &told), ["settled a.xodr"]);
+}
+
+#[test]
+fn unfinished_file_that_goes_is_told() {
+    let (_dir, root) = farm();
+    let path = root.join("a.xodr");
+    let (mut looker, told) = looker(&root);
+    let _writer = std::fs::File::create(&path).unwrap();
+    looker.look_again(&path);
+    settle(&mut looker);
+    let said = ["present a.xodr", "unfinished a.xodr"];
+    assert_eq!(words(&root, &told), said);
+    std::fs::remove_file(&path).unwrap();
+    looker.look(&path);
+    assert_eq!(words(&root, &told), ["vanished a.xodr"]);
 }

@@ -11,7 +11,6 @@ use super::due::Turn;
 use super::ignore::IgnoreRules;
 use super::looker::Looker;
 use super::scan::{Listing, cannot_look_into, is_too_much, list};
-use super::settle::QUIET;
 use super::tree::{Unwatched, below, children};
 use crate::core::Stamp;
 use crate::seams::{now, step};
@@ -55,6 +54,7 @@ impl Looker {
             }
         }
         if let Some(first) = self.due.ended_pass(now()) {
+            self.open_at_start = None;
             self.end_pass();
             if first {
                 (self.tell)(Seen::Scanned);
@@ -183,17 +183,14 @@ impl Looker {
         if self.known.get(path) == Some(&stamp) {
             return;
         }
-        if first && !is_younger(stamp, QUIET) {
+        if first && !is_younger(stamp, self.settling.rest()) && !self.was_open(path, stamp) {
             let path: Arc<Path> = path.into();
             self.known.insert(path.clone(), stamp);
             (self.tell)(Seen::Settled(path, stamp));
             return;
         }
-        if first && !self.known.contains_key(path) {
-            // Or what is remembered of it would be taken back when the first look is over.
-            (self.tell)(Seen::Present(path.into()));
-            // And should it go before it has settled, that is told.
-            self.known.insert(path.into(), Stamp::default());
+        if first {
+            self.is_there(path);
         }
         self.settling.seen(path, stamp, now());
     }

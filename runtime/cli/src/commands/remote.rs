@@ -109,11 +109,15 @@ pub fn wait(args: &WaitArgs) -> Exit {
 fn why_no_verdict(args: &WaitArgs) -> String {
     let file = named(&args.file);
     let known = match ask(&args.instance, &Request::Status) {
-        Ok(Response::Status(status)) => status.unseen.into_iter().find(|it| it.path == file),
+        Ok(Response::Status(status)) => {
+            let unfinished = status.unfinished.into_iter().map(|it| (it.path, it.why));
+            let unseen = status.unseen.into_iter().map(|it| (it.path, it.why));
+            unfinished.chain(unseen).find(|(path, _)| *path == file)
+        }
         _ => None,
     };
     match known {
-        Some(it) => format!(": {}", shown::line(&it.why)),
+        Some((_, why)) => format!(": {}", shown::line(&why)),
         None if args.file.exists() => String::new(),
         None => ": there is no such file".to_owned(),
     }

@@ -211,6 +211,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         watch: true,
         poll: args.poll,
         rescan: args.rescan,
+        settle: args.settle,
         here: None,
         single_result: None,
         bundles_d: Some(bundles_d),

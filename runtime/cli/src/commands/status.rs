@@ -101,6 +101,12 @@ pub fn render(status: &Status) -> String {
     if let Some(more) = status.unseen.len().checked_sub(5).filter(|it| *it > 0) {
         line("note", format!("and {more} more that cannot be looked at"));
     }
+    for unfinished in status.unfinished.iter().take(5) {
+        line("note", unfinished.to_string());
+    }
+    if let Some(more) = status.unfinished.len().checked_sub(5).filter(|it| *it > 0) {
+        line("note", format!("and {more} more that are being written to"));
+    }
     // What is still unseen has been named, and the rest no longer is.
     let notices = status.notices.iter().filter(|it| it.kind != "unseen");
     for notice in notices.rev().take(5).collect::<Vec<_>>().into_iter().rev() {

@@ -6,7 +6,7 @@ use qcbus_messages::{Hello, PROTOCOL_VERSION};
 use super::*;
 
 /// Everything that comes of an event; the world goes on.
-fn comes_of(world: &mut World, event: Event) -> Vec<Action> {
+pub(super) fn comes_of(world: &mut World, event: Event) -> Vec<Action> {
     world.state.handle(world.now, event)
 }
 
@@ -340,11 +340,11 @@ fn answer(action: &Action) -> Option<&Response> {
     }
 }
 
-fn answers(actions: &[Action]) -> Vec<&Response> {
+pub(super) fn answers(actions: &[Action]) -> Vec<&Response> {
     actions.iter().filter_map(answer).collect()
 }
 
-fn waits(file: u8, unwatched: Option<String>, stamp: Option<Stamp>) -> Event {
+pub(super) fn waits(file: u8, unwatched: Option<String>, stamp: Option<Stamp>) -> Event {
     Event::Wait {
         ticket: Ticket(9),
         path: path_of(file),

@@ -35,6 +35,7 @@ impl Watched {
             roots: vec![root.to_path_buf()],
             poll: None,
             rescan: NEVER,
+            settle: None,
         };
         let tell = move |seen| drop(tell.send(seen));
         let mut watched = Watched {
@@ -55,6 +56,7 @@ impl Watched {
         match seen {
             Seen::Settled(path, _) => format!("settled {}", name(path)),
             Seen::Present(path) => format!("present {}", name(path)),
+            Seen::Unfinished(path, ..) => format!("unfinished {}", name(path)),
             Seen::Touched(path, _) => format!("touched {}", name(path)),
             Seen::Vanished(path) => format!("vanished {}", name(path)),
             Seen::Unseen(it) | Seen::Away(it) => format!("unseen {}", name(&it.path)),

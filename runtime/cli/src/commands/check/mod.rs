@@ -152,6 +152,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         watch: false,
         poll: None,
         rescan: Duration::MAX,
+        settle: None,
         here: Some(here()?),
         single_result: asam.then(|| out.join("Result.xqar")),
         out,

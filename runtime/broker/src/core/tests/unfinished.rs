@@ -1,0 +1,66 @@
+//! Files that are being written to.
+
+use qcbus_messages::control::Response;
+
+use super::words::{answers, comes_of, waits};
+use super::*;
+
+/// File 1 has another stamp, and its writer is not done.
+fn write_slowly(world: &mut World) -> Vec<Action> {
+    world.stamps += 1;
+    let stamp = Some(stamp(world.stamps));
+    let path = path_of(1);
+    let actions = comes_of(world, Event::Unfinished { path, stamp });
+    actions.iter().for_each(|it| world.gate_follows(it));
+    actions
+}
+
+fn shuts(actions: &[Action], file: u8) -> bool {
+    let path = path_of(file);
+    let shut = |it: &Action| matches!(it, Action::CloseGate { path: shut } if *shut == path);
+    actions.iter().any(shut)
+}
+
+#[test]
+fn what_is_being_written_is_not_behind_the_gate_and_not_told() {
+    let mut world = judged_world();
+    assert!(shuts(&write_slowly(&mut world), 1));
+    assert!(!shuts(&write_slowly(&mut world), 1), "once");
+    let asked = comes_of(&mut world, waits(1, None, None));
+    assert!(answers(&asked).is_empty());
+    assert!(world.preparing.is_empty(), "it is not read");
+}
+
+#[test]
+fn finished_file_is_judged_once() {
+    let mut world = judged_world();
+    write_slowly(&mut world);
+    let before = world.stored.len();
+    world.write(1);
+    world.settle();
+    assert_eq!(world.stored.len(), before + 1);
+}
+
+#[test]
+fn file_that_was_opened_and_not_written_to_keeps_its_verdict() {
+    let mut world = judged_world();
+    let (path, stamp) = (path_of(1), stamp(world.there[&path_of(1)]));
+    assert!(world.state.is_settled(&path, stamp));
+    let event = Event::Unfinished {
+        path,
+        stamp: Some(stamp),
+    };
+    assert!(!shuts(&comes_of(&mut world, event), 1));
+    let asked = comes_of(&mut world, waits(1, None, Some(stamp)));
+    assert!(matches!(answers(&asked)[..], [Response::Verdict(_)]));
+}
+
+#[test]
+fn who_waits_for_a_file_that_goes_unfinished_is_told_so() {
+    let mut world = judged_world();
+    let path = path_of(4);
+    assert!(!world.state.is_settled(&path, stamp(1)));
+    comes_of(&mut world, waits(4, None, None));
+    let gone = comes_of(&mut world, Event::Vanished { path });
+    assert!(matches!(answers(&gone)[..], [Response::Unwatched { .. }]));
+}
