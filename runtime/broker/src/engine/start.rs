@@ -58,8 +58,7 @@ impl Broker {
         let lock = results_of(&options)?;
         let in_force = Arc::new(InForce::of(&sources, &loaded)?);
         host.set_config(in_force.digest, &in_force.encoded);
-        let control = control_of(&options, senders.asked)?;
-        let looks = Looks::default();
+        let (control, looks) = (control_of(&options, senders.asked)?, Looks::default());
         let store = Arc::new(store(&options, (journal, lock), &looks, &senders.notices)?);
         let reconciled = reconcile(&options, &loaded, &store)?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
