@@ -215,6 +215,8 @@ impl Drop for DirectoryLock {
         {
             let _ = std::fs::remove_dir(made);
         }
+        // A process that is being started at this moment has the descriptor, too, until it runs its program.
+        let _ = self.file().unlock();
     }
 }
 

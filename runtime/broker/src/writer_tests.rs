@@ -11,7 +11,7 @@ use qcbus_messages::{Digest, JobId, Verdict};
 use tokio::sync::mpsc::unbounded_channel;
 
 use crate::core::{Epoch, FinishedJob, Input, Judged, Jury, PreparedJob, Reading, StoreOutcome};
-use crate::directory_lock::{DirectoryLock, Purpose};
+use crate::directory_lock::DirectoryLock;
 use crate::gate::{Gate, GateOptions, Outside};
 use crate::journal::{Entry, Journal};
 use crate::outputs::Outputs;
@@ -26,7 +26,7 @@ const NOW: u64 = (3 << 32) + 5;
 fn store_in(dir: &Path) -> Store {
     Store {
         outputs: Outputs::default(),
-        lock: DirectoryLock::take(&dir.join("out"), Purpose::Results, "test").unwrap(),
+        lock: DirectoryLock::share(&dir.join("out")).unwrap(),
         scouts: Scouts::default(),
         places: ResultPaths::of_watched(dir.join("out"), vec![dir.join("farm")]),
         choice: Default::default(),

@@ -264,9 +264,7 @@ impl State {
                 self.waiters.retain(|it| it.ticket() != ticket);
                 self.abandon(ticket, &mut actions);
             }
-            Event::RemoveBundle { ticket, name } => {
-                self.removal(ticket, &name, &mut actions);
-            }
+            Event::RemoveBundle { ticket, name } => self.removal(ticket, &name, &mut actions),
             Event::Drain => self.drain(),
             Event::Tick => self.tick(&mut actions),
         }
