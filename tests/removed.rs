@@ -57,6 +57,15 @@ fn remove_whole(directory: &Path) {
     std::fs::remove_dir_all(&aside).unwrap();
 }
 
+/// Waits until the status tells of a trouble in these words.
+fn until_in_trouble(farm: &Farm, words: &str) {
+    let told = || {
+        let troubles = farm.status()?.troubles;
+        troubles.iter().any(|it| it.contains(words)).then_some(())
+    };
+    until_or("the status tells it", told, || farm.log());
+}
+
 fn wait(farm: &Farm, name: &str) -> Option<i32> {
     let file = farm.root().join(name).to_string_lossy().into_owned();
     farm.qcbus(&["wait", &file]).status.code()
@@ -166,14 +175,7 @@ fn directory_that_another_broker_has_taken_is_left_to_it() {
     other.verdict("other.xodr");
     there(&other, &[other.gate().join("other.xodr")]);
     farm.write("late.xodr", &Content::Good(3).bytes());
-    let told = || {
-        let status = farm.status()?;
-        let mut troubles = status.troubles.iter();
-        troubles
-            .any(|it| it.contains("another broker"))
-            .then_some(())
-    };
-    until_or("the status names the other broker", told, || farm.log());
+    until_in_trouble(&farm, "another broker");
     let there: Vec<_> = std::fs::read_dir(other.gate()).unwrap().collect();
     assert_eq!(there.len(), 2, "its mark and its file: {there:?}");
 }
@@ -183,14 +185,7 @@ fn state_directory_that_goes_is_told() {
     let farm = farm();
     let _broker = serve(&farm);
     remove_whole(&farm.base().join("state"));
-    let told = || {
-        let status = farm.status()?;
-        let mut troubles = status.troubles.iter();
-        troubles
-            .any(|it| it.contains("was removed or replaced"))
-            .then_some(())
-    };
-    until_or("the status tells it", told, || farm.log());
+    until_in_trouble(&farm, "was removed or replaced");
     let health = farm.qcbus(&["status", "--health"]);
     assert_eq!(health.status.code(), Some(1), "{health:?}");
     // What is judged is answered all the same.

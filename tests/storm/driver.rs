@@ -184,7 +184,10 @@ impl Driver {
         let said = |words: &str| log.lines().rev().take(20).any(|line| line.contains(words));
         match how.code() {
             Some(2) => said("config.xml:"),
-            Some(5) => self.is_full() && said("error: not enough shared memory"),
+            Some(5) => {
+                let full = ["not enough shared memory", "No space left on device"];
+                self.is_full() && full.into_iter().any(said)
+            }
             _ => false,
         }
     }

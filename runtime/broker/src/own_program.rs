@@ -88,12 +88,12 @@ impl OwnProgram {
         let what = match foreign::metadata(&self.called) {
             Ok(data) if is_same(&data, &std::fs::metadata(RUNNING).ok()?) => return None,
             Ok(_) => {
-                format!("{shown} is another program by now than the one that runs as this broker")
+                format!("{shown} was replaced: this broker still runs the earlier program")
             }
-            Err(_) => format!("{shown} is there no more, from which this broker was started"),
+            Err(_) => format!("{shown} was removed: this broker still runs it"),
         };
         Some(format!(
-            "{what}: broker and bundles go on as the program from before; to run what is installed now, restart \
+            "{what}, and starts its bundles from it; to run what is installed now, restart \
              the broker (`qcbus down`, then `qcbus serve` as before, or `systemctl restart` of its service)"
         ))
     }
@@ -226,10 +226,10 @@ mod tests {
         assert_eq!(program.replaced(), None);
         program.called = dir.path().join("qcbus");
         let said = program.replaced().unwrap();
-        assert!(said.contains("is there no more"), "{said}");
+        assert!(said.contains("was removed"), "{said}");
         std::fs::copy("/bin/sh", &program.called).unwrap();
         let said = program.replaced().unwrap();
-        assert!(said.contains("is another program by now"), "{said}");
+        assert!(said.contains("was replaced"), "{said}");
         assert!(said.contains("restart the broker"), "{said}");
         std::fs::remove_file(&program.called).unwrap();
         symlink(&program.path, &program.called).unwrap();

@@ -199,7 +199,7 @@ const STEP: u64 = 64 << 20;
 fn shared_memory_way_out(source: &std::io::Error) -> &'static str {
     match source.kind() {
         std::io::ErrorKind::ReadOnlyFilesystem => {
-            "; make it writable: `mount -o remount,rw /dev/shm`, for a container `docker run --tmpfs /dev/shm`"
+            "; make it writable: `mount -o remount,rw /dev/shm`"
         }
         std::io::ErrorKind::PermissionDenied => {
             "; let this user make directories there: `chmod 1777 /dev/shm`"

@@ -274,7 +274,7 @@ impl State {
             self.write_again(id, actions);
         }
         if let Some(text) = told_of(lost) {
-            self.notice(Notice::NotWritten(text), actions);
+            self.notice(Notice::Storing(text), actions);
         }
     }
 

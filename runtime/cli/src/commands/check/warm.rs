@@ -112,8 +112,8 @@ fn ask(
 }
 
 /// Whether any broker would find the same: it knows nothing of a configuration or of bundles that are named here, and
-/// has read schemas when it began, which may be others now. Maps and the scenarios on them tell of each other when they
-/// are checked together.
+/// has read schemas when it began, which may be others now. In a run, the verdicts on files that a scenario rests on
+/// count in its own; the broker answers for each file by itself.
 fn may_ask(args: &CheckArgs, options: &Options) -> bool {
     let kinds = options.files.iter().map(|file| FileKind::of_path(file));
     let maps = kinds.filter(|kind| *kind == Some(FileKind::Xodr)).count();
@@ -123,7 +123,7 @@ fn may_ask(args: &CheckArgs, options: &Options) -> bool {
         && options.bundles_d.is_none()
         && args.schema_dir.is_none()
         && options.choice.is_everything()
-        && (maps == 0 || maps == options.files.len())
+        && (options.files.len() == 1 || maps == options.files.len())
 }
 
 /// The terms under which a file would be checked here.

@@ -1,4 +1,4 @@
-//! What the result of a file says of its map's verdict.
+//! Verdicts that rest on those of other files.
 
 use super::*;
 
@@ -7,6 +7,17 @@ fn world() -> World {
     let mut world = World::new();
     world.join("First");
     world.join("Second");
+    world
+}
+
+/// A scenario and its map, which will be rejected, are with the bundles.
+fn both_are_read() -> World {
+    let mut world = world();
+    world.rejected.insert(0);
+    world.write(0);
+    world.write(1);
+    world.prepare(1, true);
+    world.prepare(0, true);
     world
 }
 
@@ -71,12 +82,7 @@ fn answer(world: &mut World) {
 
 #[test]
 fn a_scenario_waits_for_its_map_and_not_for_ever() {
-    let mut world = world();
-    world.rejected.insert(0);
-    world.write(0);
-    world.write(1);
-    world.prepare(1, true);
-    world.prepare(0, true);
+    let mut world = both_are_read();
     // The writer is slow with the map.
     answer(&mut world);
     assert_eq!(storing(&world), [0]);
@@ -129,12 +135,7 @@ fn a_run_waits_for_no_map_that_is_none_of_its_files() {
 
 #[test]
 fn client_hears_of_a_scenario_only_after_its_map() {
-    let mut world = world();
-    world.rejected.insert(0);
-    world.write(0);
-    world.write(1);
-    world.prepare(1, true);
-    world.prepare(0, true);
+    let mut world = both_are_read();
     world.wait(1);
     answer(&mut world);
     world.pass(Duration::from_secs(11));
