@@ -192,3 +192,23 @@ fn state_directory_that_goes_is_told() {
     farm.write("late.xodr", &Content::Good(3).bytes());
     assert_eq!(wait(&farm, "late.xodr"), Some(0));
 }
+
+#[test]
+fn removed_outputs_of_a_file_that_is_touched_are_written_again() {
+    let farm = farm();
+    let _broker = serve(&farm);
+    for _ in 0..5 {
+        for output in outputs(&farm) {
+            // A copy is not behind the gate while its file is judged again.
+            let _ = std::fs::remove_file(&output);
+        }
+        // Its bytes are the same, so that they alone are no reason to judge it again.
+        let file = std::fs::File::options()
+            .write(true)
+            .open(farm.root().join("good.xodr"))
+            .unwrap();
+        file.set_modified(std::time::SystemTime::now()).unwrap();
+        drop(file);
+        there(&farm, &outputs(&farm));
+    }
+}

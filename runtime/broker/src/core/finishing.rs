@@ -50,7 +50,7 @@ impl State {
             if let (Some(finished), Some(job)) = (finished, self.jobs.get_mut(&id)) {
                 job.stage = JobStage::Storing;
                 if let Some(entry) = self.files.get_mut(job.file) {
-                    entry.anew = false;
+                    job.anew = std::mem::take(&mut entry.anew);
                 }
                 self.storing += 1;
                 actions.push(Action::Store(Box::new(finished)));
@@ -117,6 +117,10 @@ impl State {
         }
         self.storing -= 1;
         let file = job.file;
+        let is_stored = matches!(outcome, StoreOutcome::Stored(_));
+        if let Some(entry) = self.files.get_mut(file) {
+            entry.anew |= job.anew && !is_stored;
+        }
         match outcome {
             StoreOutcome::Stored(judged) => {
                 self.is_judged(file, Arc::new(*judged), actions);

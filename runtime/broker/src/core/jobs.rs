@@ -42,6 +42,8 @@ pub(super) struct ActiveJob {
     pub shares: BTreeMap<String, Share>,
     /// It is done for a client, and nothing of it is kept.
     pub errand: Option<Errand>,
+    /// While it is stored: the file was to be judged anew, and is again if nothing is stored.
+    pub anew: bool,
 }
 
 impl ActiveJob {
@@ -209,6 +211,7 @@ impl State {
                 config: self.config,
                 shares: BTreeMap::new(),
                 errand,
+                anew: false,
             },
         );
         actions.push(Action::Prepare { job, path, waited });

@@ -54,6 +54,7 @@ impl World {
             Action::Answer { ticket, response } => self.is_answered(ticket, &response),
             Action::Withdraw { path, .. } => {
                 self.journal.remove(&file_of(&path));
+                self.lost.remove(&file_of(&path));
                 self.judged.remove(&file_of(&path));
             }
             Action::Depend { files } => {

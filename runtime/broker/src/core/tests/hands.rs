@@ -105,6 +105,7 @@ impl World {
             StoreOutcome::Failed("full".to_owned())
         } else {
             self.stored.push(file);
+            self.lost.remove(&file);
             let judged = self.judged(file, &job);
             self.must_be_earned(&judged);
             self.journal.insert(file, judged.clone());
@@ -186,6 +187,8 @@ impl World {
         self.told.clear();
         self.clients = Clients::default();
         self.judged.clear();
+        // Every start looks at results before anything is judged.
+        self.lost.clear();
         self.gate_is_taken_over();
         let known = self.journal.keys();
         self.watched = known

@@ -2,13 +2,18 @@
 
 use super::*;
 
-/// Somebody removes the result of file 1.
-fn lose(world: &mut World) {
-    let lost = vec![LostOutput {
-        file: path_of(1),
-        output: Path::new("/out/1.xodr.xqar").into(),
-    }];
-    world.event(Event::OutputsLost { lost });
+impl World {
+    /// Somebody removes the result of a file, if there is one.
+    pub fn lose(&mut self, file: u8) {
+        if !self.journal.contains_key(&file) {
+            return;
+        }
+        self.lost.insert(file);
+        let output = Path::new(&format!("/out/{file}.xqar")).into();
+        let file = path_of(file);
+        let lost = vec![LostOutput { file, output }];
+        self.event(Event::OutputsLost { lost });
+    }
 }
 
 #[test]
@@ -16,7 +21,7 @@ fn lost_result_is_written_again_though_no_byte_has_changed() {
     let mut world = judged_world();
     let before = world.stored.len();
     assert!(world.gate.contains_key(&1));
-    lose(&mut world);
+    world.lose(1);
     assert!(!world.gate.contains_key(&1), "at once");
     world.settle();
     assert_eq!(world.stored.len(), before + 1);
@@ -28,9 +33,25 @@ fn result_that_is_lost_while_it_is_read_again_is_written() {
     let mut world = judged_world();
     let before = world.stored.len();
     world.step(&Step::Touch(1));
-    lose(&mut world);
+    world.lose(1);
     world.settle();
     assert_eq!(world.stored.len(), before + 1, "not only confirmed");
+}
+
+#[test]
+fn lost_result_whose_file_is_touched_at_the_last_moment_is_written() {
+    let mut world = judged_world();
+    world.lose(1);
+    while world.storing.is_empty() {
+        world.prepare(0, true);
+        world.answer(0);
+        world.pass(Duration::from_millis(300));
+    }
+    // The writer sees other stamps than were read, and nothing is stored.
+    world.step(&Step::Touch(1));
+    world.store(0, true);
+    world.settle();
+    assert!(world.lost.is_empty());
 }
 
 #[test]
@@ -42,7 +63,7 @@ fn result_that_is_lost_before_its_verdict_is_told_is_written_once_more() {
     world.answer(0);
     assert_eq!(world.storing.len(), 1);
     world.write_out(0, true);
-    lose(&mut world);
+    world.lose(1);
     world.settle();
     assert_eq!(world.stored, [1, 1]);
 }
@@ -52,7 +73,7 @@ fn loss_of_a_file_that_has_gone_changes_nothing() {
     let mut world = judged_world();
     world.event(Event::Vanished { path: path_of(1) });
     world.settle();
-    lose(&mut world);
+    world.lose(1);
     world.settle();
     assert_eq!(world.stored, [1]);
 }

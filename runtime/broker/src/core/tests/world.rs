@@ -26,6 +26,8 @@ pub struct World {
     pub waited: BTreeMap<JobId, Duration>,
     pub storing: Vec<FinishedJob>,
     pub stored: Vec<u8>,
+    /// Files whose results were removed by others, and have not been written again.
+    pub lost: BTreeSet<u8>,
     pub peers: BTreeMap<SessionId, Process>,
     pub sessions: u64,
     pub judged: BTreeMap<u8, (Vec<Input>, Verdict)>,
@@ -113,6 +115,7 @@ impl World {
             waited: BTreeMap::new(),
             storing: Vec::new(),
             stored: Vec::new(),
+            lost: BTreeSet::new(),
             peers: BTreeMap::new(),
             sessions: 0,
             judged: BTreeMap::new(),
@@ -356,6 +359,7 @@ impl World {
             let all = all && self.state.files.is_quiet() && self.state.jobs.is_empty();
             let all = all && self.shadow_rests();
             if all && self.reporter_rests() {
+                assert_eq!(self.lost, BTreeSet::new(), "results are missing");
                 return;
             }
         }
