@@ -50,6 +50,7 @@ impl State {
             let read = self.reading_of(dependent, path);
             if matches!(read, Some(Dependence::Read { stamp: read, .. }) if read != stamp) {
                 self.shut(dependent, actions);
+                self.doubt_until_settled(dependent);
             }
         }
         let Some(id) = self.files.id(path) else {
@@ -62,6 +63,16 @@ impl State {
             if let Some(entry) = self.files.get_mut(id) {
                 entry.doubted = true;
             }
+        }
+    }
+
+    /// Something that a verdict depends on is being written to: nobody is told the verdict before that has settled.
+    /// A job that is under way finds out by itself, when it is stored.
+    fn doubt_until_settled(&mut self, id: FileId) {
+        if let Some(entry) = self.files.get_mut(id)
+            && !matches!(entry.stage(), Stage::Active(_))
+        {
+            entry.doubted = true;
         }
     }
 
@@ -78,7 +89,8 @@ impl State {
                 // It rests on the file and has read it by a link, which is watched, too.
                 Some(Dependence::ByLink) => {}
                 Some(Dependence::Read { stamp: read, racy }) if read == Some(stamp) => {
-                    if racy {
+                    let entry = self.files.get(dependent);
+                    if racy || entry.is_some_and(|it| it.doubted) {
                         self.look_again(dependent);
                     }
                 }
@@ -145,13 +157,14 @@ impl State {
         let as_judged = read == Some(stamp);
         let at_work = !matches!(entry.stage(), Stage::Idle);
         let same = entry.present && entry.stamp == stamp && (as_judged || at_work);
+        let is_doubted = entry.doubted && !at_work;
         entry.present = true;
         entry.stamp = stamp;
         entry.asked = self.now;
         if !as_judged {
             self.shut(id, actions);
         }
-        if !same || racy {
+        if !same || racy || is_doubted {
             self.changed(id);
         }
         if !same {

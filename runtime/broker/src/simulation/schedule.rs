@@ -13,6 +13,7 @@ use super::world::World;
 use crate::core::Settings;
 use crate::engine::{line_of, simulate};
 use crate::options::Options;
+use crate::watch::OPEN_QUIET;
 
 /// What is used for many schedules, one after the other.
 pub struct Stage {
@@ -475,6 +476,9 @@ impl Play {
 
     /// What has settled stands after a kill, too.
     fn nothing_is_judged_again(&mut self) -> Ended {
+        // A file whose close was lost counts as open for so long, and what depends on it is judged after that.
+        self.with(|world| world.now += OPEN_QUIET);
+        self.settle()?;
         let before = self.with(|world| world.peers.reports.clone());
         self.kill();
         self.start();

@@ -39,6 +39,8 @@ use crate::seams::{Bell, Sender, channel, thread};
 
 pub use self::ignore::{hidden_above, is_excluded};
 pub use self::scan::Scan;
+#[cfg(test)]
+pub(crate) use self::settle::OPEN_QUIET;
 pub use self::settle::Why;
 pub use self::sight::{NoFile, Sight, is_behind_a_link, look_at};
 pub(crate) use self::tree::{Told, Tree, Unwatched, below};

@@ -182,7 +182,8 @@ impl World {
         }
         // Who was not there has a place in the jury nevertheless.
         for (juror, must) in jury.iter().zip(&expected) {
-            assert!(juror.0 == must.0 && (juror.1.is_none() || juror.1 == must.1));
+            let same = juror.0 == must.0 && (juror.1.is_none() || juror.1 == must.1);
+            assert!(same, "{jury:?} instead of {expected:?}");
         }
         assert_eq!(jury.len(), expected.len());
         let config = digest(self.reconfigured.into());

@@ -115,6 +115,8 @@ impl World {
         let Process { name, drained, .. } = self.peers[&session];
         // One that somebody else has replaced leaves nothing.
         let current = self.state.sessions.contains_key(&session);
+        // Told to go because the broker ends, it must judge when the next one begins.
+        let current = current && !matches!(self.state.phase, Phase::Leaving(_));
         if current && !(name == CHILD && self.manifest.is_some() && !drained) {
             self.demanded.remove(name);
         }

@@ -64,3 +64,38 @@ fn who_waits_for_a_file_that_goes_unfinished_is_told_so() {
     let gone = comes_of(&mut world, Event::Vanished { path });
     assert!(matches!(answers(&gone)[..], [Response::Unwatched { .. }]));
 }
+
+/// File 1 depends on file 0, and both have their verdicts.
+fn two_judged() -> World {
+    let mut world = judged_world();
+    world.write(0);
+    world.settle();
+    world
+}
+
+fn asked_for_1(world: &mut World) -> Vec<Action> {
+    let own = Some(stamp(world.there[&path_of(1)]));
+    comes_of(world, waits(1, None, own))
+}
+
+#[test]
+fn verdict_that_depends_on_an_unfinished_file_is_not_told() {
+    let mut world = two_judged();
+    let (path, slow) = (path_of(0), Some(stamp(world.stamps + 1)));
+    world.event(Event::Unfinished { path, stamp: slow });
+    assert!(answers(&asked_for_1(&mut world)).is_empty());
+}
+
+#[test]
+fn verdict_stands_when_an_unfinished_file_becomes_what_it_was() {
+    let mut world = two_judged();
+    let (before, stored) = (stamp(world.there[&path_of(0)]), world.stored.len());
+    let (path, slow) = (path_of(0), Some(stamp(world.stamps + 1)));
+    world.event(Event::Unfinished { path, stamp: slow });
+    let (path, stamp) = (path_of(0), before);
+    world.event(Event::Settled { path, stamp });
+    world.settle();
+    assert_eq!(world.stored.len(), stored, "nothing is judged again");
+    let asked = asked_for_1(&mut world);
+    assert!(matches!(answers(&asked)[..], [Response::Verdict(_)]));
+}
