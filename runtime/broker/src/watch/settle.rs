@@ -6,7 +6,7 @@
 //! without blocking, as FTP servers do, would be refused. Nobody is waited for longer than [`OPEN_QUIET`] without a
 //! change: a process that keeps a file open for ever does not hide it.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -17,7 +17,8 @@ use crate::core::Stamp;
 pub struct Settling {
     /// How long files must be quiet, also closed ones, if somebody asks for that.
     asked: Option<Duration>,
-    pending: HashMap<PathBuf, Pending>,
+    /// Ordered, so that what is told has the same order every time.
+    pending: BTreeMap<PathBuf, Pending>,
 }
 
 #[derive(Debug)]
@@ -83,7 +84,7 @@ impl Settling {
     pub fn new(asked: Option<Duration>) -> Settling {
         Settling {
             asked,
-            pending: HashMap::new(),
+            pending: BTreeMap::new(),
         }
     }
 
@@ -207,7 +208,6 @@ impl Settling {
             }
             true
         });
-        looked.settled.sort();
         looked
     }
 }
@@ -316,6 +316,21 @@ mod tests {
             look(&mut settling, start + OPEN_QUIET, 1, true).settled,
             [path()]
         );
+    }
+
+    #[test]
+    fn files_are_told_of_in_order() {
+        let start = NOW();
+        let names: Vec<PathBuf> = (0..20).map(|it| format!("/{it:02}.xodr").into()).collect();
+        let mut settling = Settling::default();
+        for name in names.iter().rev() {
+            settling.touched(name, Some(stamp(1)), start);
+        }
+        let grown = look(&mut settling, start + QUIET, 2, false);
+        let waiting: Vec<PathBuf> = grown.waiting.into_iter().map(|it| it.0).collect();
+        assert_eq!(waiting, names);
+        let looked = look(&mut settling, start + QUIET * 2, 2, false);
+        assert_eq!(looked.settled, names);
     }
 
     #[test]
