@@ -39,6 +39,20 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
 }
 
 #[test]
+fn what_a_scenario_rests_on_counts_warm_and_cold() {
+    let bench = Bench::new();
+    let _broker = bench.farm.serve_ready();
+    for (name, bytes) in scenario() {
+        bench.beside(name, &bytes);
+    }
+    let file = text(&bench.desk.path().join("scenario.xosc"));
+    assert_eq!(bench.compared(&[&file]), Made::Warm);
+    bench.beside("map.xodr", Content::NoHeader(2).bytes());
+    assert_eq!(bench.compared(&[&file]), Made::Cold);
+    assert_eq!(bench.compared(&[&file, "--own-verdict"]), Made::Warm);
+}
+
+#[test]
 fn every_verdict_is_the_same_beside_the_farm_and_in_it() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
@@ -172,9 +186,11 @@ fn includes_are_followed_as_far_as_without_the_broker() {
         Content::Catalog(4, Mark::Clean).bytes(),
     );
     let scenario = bench.watched("below/scenario.xosc", scenario);
-    assert_eq!(bench.compared(&[&scenario]), Made::Warm);
+    // Its map is rejected where the include is not followed, and that is counted in without the broker.
+    assert_eq!(bench.compared(&[&scenario]), Made::Cold);
     assert_eq!(served("below/scenario.xosc"), Verdict::Accepted);
-    assert_eq!(bench.compared(&[&scenario]), Made::Warm);
+    assert_eq!(bench.compared(&[&scenario]), Made::Cold);
+    assert_eq!(bench.compared(&[&scenario, "--own-verdict"]), Made::Warm);
     // And what lies beside is included by both.
     let (whole, view) = Content::road_in_two_parts();
     bench.watched("two/view.xml", view);

@@ -270,6 +270,18 @@ pub struct Checked {
     pub verdict: FileVerdict,
     /// The result, as its file is to have it.
     pub result: String,
+    /// The files that this one rests on, which the verdict knows nothing of.
+    pub rests_on: Vec<Under>,
+}
+
+/// A file that another one rests on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Under {
+    /// Absolute path.
+    #[serde(with = "path_text::one")]
+    pub file: PathBuf,
+    /// SHA-256 of the bytes that were read.
+    pub digest: String,
 }
 
 /// The verdict on one file.

@@ -398,6 +398,7 @@ impl State {
             };
         }
         self.depend(file, prepared, actions);
+        self.judge_what_is_under(prepared, actions);
         let same = |judged: &Judged| judged.basis == prepared.basis && !anew;
         match old {
             Some(judged)

@@ -99,6 +99,22 @@ impl State {
         false
     }
 
+    /// A run judges what its files rest on, too, wherever that lies. Who is told of it knows it for no file that was
+    /// to be checked.
+    pub(super) fn judge_what_is_under(&mut self, prepared: &PreparedJob, actions: &mut Actions) {
+        if !self.settings.once || self.settings.own_verdicts {
+            return;
+        }
+        for file in &prepared.rests_on {
+            if self.files.id(&file.path).is_none() {
+                let mut inputs = prepared.inputs.iter();
+                let input = inputs.find(|it| it.path == file.path);
+                let stamp = input.and_then(|it| it.content.stamp());
+                self.settled(&file.path, stamp.unwrap_or_default(), actions);
+            }
+        }
+    }
+
     /// The files that a job rests on, each with the verdict on it.
     pub(super) fn verdicts_under(&self, job: &ActiveJob) -> Vec<(Referenced, RestsOn)> {
         if job.errand.is_some() {

@@ -20,7 +20,7 @@ use crate::core::{Event, Member, Notice, Stamp, State};
 use crate::demand::InForce;
 use crate::descriptors::Descriptors;
 use crate::directory_lock::open_to_others;
-use crate::intake::{Intake, JudgedAs};
+use crate::intake::{Intake, JudgedAs, judged_in_a_run};
 use crate::journal::Void;
 use crate::launches::Launches;
 use crate::options::Options;
@@ -245,8 +245,9 @@ fn intake(options: &Options, host: &Host, in_force: &InForce) -> Arc<Intake> {
 }
 
 /// A file that a link leads to is judged under its own path.
-fn judged_as(options: &Options) -> JudgedAs {
+fn judged_as(options: &Options) -> Box<JudgedAs> {
     let (roots, files) = (options.roots.clone(), options.files.clone());
+    let judges_all = options.settings.once && !options.settings.own_verdicts;
     Box::new(move |path| {
         let is_judged = |path: &Path| {
             let mut files = files.iter();
@@ -256,7 +257,8 @@ fn judged_as(options: &Options) -> JudgedAs {
             return Some(path.into());
         }
         let real = foreign::canonicalize(path).ok();
-        real.filter(|it| is_judged(it)).map(Into::into)
+        let real = real.filter(|it| is_judged(it)).map(Into::into);
+        real.or_else(|| judged_in_a_run(path).filter(|_| judges_all))
     })
 }
 

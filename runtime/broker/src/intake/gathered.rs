@@ -136,7 +136,7 @@ impl Gathered {
         found
     }
 
-    pub fn finish(&self, judged_as: Option<&JudgedAs>) -> PreparedJob {
+    pub fn finish(&self, judged_as: &JudgedAs) -> PreparedJob {
         let root = self.root.first().map(|input| input.path.clone());
         let others = self
             .inputs
@@ -149,7 +149,7 @@ impl Gathered {
             inputs,
             documents: self.documents.clone(),
             missing: self.missing.clone(),
-            rests_on: judged_as.map_or_else(Vec::new, |it| self.rests_on(it)),
+            rests_on: self.rests_on(judged_as),
             bytes: self.bytes,
         }
     }

@@ -16,6 +16,7 @@ use qcbus_messages::{Digest, DocId, JobId};
 
 use crate::core::{Input, PrepareFailure, PreparedJob};
 use crate::stages::reached;
+use crate::watch::is_excluded;
 
 mod failure;
 mod gathered;
@@ -32,7 +33,7 @@ pub struct Intake {
     roots: Vec<PathBuf>,
     max_documents: usize,
     search: Mutex<Arc<SearchPath>>,
-    judged_as: JudgedAs,
+    judged_as: Box<JudgedAs>,
     next_doc: AtomicU64,
     shared: Shared,
     held: Mutex<HashMap<JobId, Vec<(DocId, Held)>>>,
@@ -48,7 +49,17 @@ impl std::fmt::Debug for Intake {
 }
 
 /// The path under which a file gets a verdict of its own, if it does.
-pub type JudgedAs = Box<dyn Fn(&Path) -> Option<Arc<Path>> + Send + Sync>;
+pub type JudgedAs = dyn Fn(&Path) -> Option<Arc<Path>> + Send + Sync;
+
+/// The same in a run, which judges all that its files rest on, unless it is excluded.
+pub fn judged_in_a_run(path: &Path) -> Option<Arc<Path>> {
+    let is_judged = |path: &Path| FileKind::of_path(path).is_some() && !is_excluded(path);
+    if is_judged(path) {
+        return Some(path.into());
+    }
+    let real = foreign::canonicalize(path).ok();
+    real.filter(|it| is_judged(it)).map(Into::into)
+}
 
 /// What the files of a job may include.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,7 +99,7 @@ impl Intake {
         limits: Limits,
         roots: Vec<PathBuf>,
         max_documents: usize,
-        judged_as: JudgedAs,
+        judged_as: Box<JudgedAs>,
     ) -> Intake {
         Intake {
             documents,
@@ -129,8 +140,10 @@ impl Intake {
             .map_err(|failure| explained(failure, path))?;
         let mut gathered = Gathered::new(path, &root);
         self.gather(&root.held, manner, asked, &mut gathered)?;
-        let judged_as = (within == Within::Watched).then_some(&self.judged_as);
-        let prepared = gathered.finish(judged_as);
+        let prepared = gathered.finish(match within {
+            Within::Watched => &*self.judged_as,
+            Within::Beside => &judged_in_a_run,
+        });
         reached("gathered", path);
         self.hold(job, gathered.held);
         Ok(Box::new(prepared))

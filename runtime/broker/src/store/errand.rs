@@ -6,11 +6,11 @@ use std::sync::atomic::Ordering;
 use qcbus_formats::config::Config;
 use qcbus_formats::pool::{BundleOutcome, Pooled, Scope};
 use qcbus_formats::xqar;
-use qcbus_messages::control::Checked;
+use qcbus_messages::control::{Checked, Under};
 
 use super::pooling::reasons;
 use super::{Store, judged, unlooked};
-use crate::core::{ErrandOutcome, FinishedJob, ShareOutcome, file_verdict};
+use crate::core::{ErrandOutcome, FinishedJob, Referenced, ShareOutcome, file_verdict};
 
 impl Store {
     /// Pools what was found for an errand.
@@ -30,11 +30,19 @@ impl Store {
         if self.epoch.load(Ordering::Acquire) != job.epoch.0 {
             return ErrandOutcome::Outdated;
         }
+        let under = |it: &Referenced| Under {
+            file: it.path.to_path_buf(),
+            digest: it.digest.to_string(),
+        };
+        let prepared = job.prepared.iter();
+        let rests_on = prepared.flat_map(|it| &it.rests_on);
         ErrandOutcome::Pooled(Box::new(Checked {
             verdict: file_verdict(&job.path, &judged),
             result: xqar::write(&pooled.results, self.dialect),
+            rests_on: rests_on.map(under).collect(),
         }))
     }
+
     /// Pools what was found, unless something that it rests on is not any more what was read.
     pub(super) fn pool_as_it_is(
         &self,

@@ -253,5 +253,6 @@ fn checked(job: &FinishedJob) -> Checked {
             why: Vec::new(),
         },
         result: job.job.0.to_string(),
+        rests_on: Vec::new(),
     }
 }

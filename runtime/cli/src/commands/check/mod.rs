@@ -124,6 +124,8 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         usize::MAX
     };
     let asam = config.is_some() && roots.is_empty() && files.len() == 1;
+    // The one result that there is then is that of the file that is named.
+    let own_verdicts = args.own_verdict || asam;
     let out = absolute(args.output.out.as_deref().unwrap_or(Path::new(if asam {
         "."
     } else {
@@ -132,11 +134,10 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
     writable(&out)?;
     let outputs = Outputs::new(&args.print, &out)?;
     let program = program();
-    let (kinds, config_named) = (kinds(&roots, &files), parsed.is_some());
-    let kinds = if config_named {
-        FileKind::ALL.into_iter().collect()
-    } else {
-        kinds
+    let config_named = parsed.is_some();
+    let kinds = match config_named {
+        true => FileKind::ALL.into_iter().collect(),
+        false => kinds(&roots, &files, own_verdicts),
     };
     let bundles = standard::bundle_specs(
         program,
@@ -179,7 +180,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         memory_limit: memory_limit(&args.limits),
         limits: limits(&args.limits),
         host: HostOptions::default(),
-        settings: run_settings(args, several),
+        settings: run_settings(args, several, own_verdicts),
     };
     Ok(Prepared {
         options,
@@ -190,11 +191,11 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
 }
 
 /// The state machine of a run that ends by itself. There are no more writers than files to write.
-fn run_settings(args: &CheckArgs, files: usize) -> Settings {
+fn run_settings(args: &CheckArgs, files: usize, own_verdicts: bool) -> Settings {
     let settings = settings(&args.limits);
     Settings {
         once: true,
-        own_verdicts: args.own_verdict,
+        own_verdicts,
         collect: Duration::ZERO,
         max_storing: settings.max_storing.min(files.max(1)),
         ..settings

@@ -103,7 +103,8 @@ impl Printer {
                 self.note(notice.to_string());
             }
             News::Told(Told::Scanned { files }) => {
-                self.expected = files;
+                let is_named = |it: &Arc<Path>| self.places.contains(it);
+                self.expected = files.into_iter().filter(is_named).collect();
                 self.scanned = true;
                 self.say_empty();
                 self.print_ready();
@@ -241,11 +242,16 @@ impl Printer {
         }
     }
 
-    /// What is still to be printed. A scenario may be judged again when its map is: it counts once.
+    /// What is still to be printed. A scenario may be judged again when its map is: it counts once. A file that nobody
+    /// named, and on which others rest, is worth a word when it is not accepted.
     fn rest(&mut self) -> Vec<(Arc<Path>, Arc<Judged>)> {
         let printed: BTreeSet<&Arc<Path>> = self.expected.iter().take(self.printed).collect();
+        let is_named = |path: &Arc<Path>| self.places.contains(path);
         let judged = std::mem::take(&mut self.judged).into_iter();
-        judged.filter(|(path, _)| !printed.contains(path)).collect()
+        let rest = judged.filter(|(path, judged)| {
+            !printed.contains(path) && (is_named(path) || !judged.is_accepted())
+        });
+        rest.collect()
     }
 
     /// The files without a verdict, apart from those that are still to be printed.

@@ -95,13 +95,17 @@ fn input_path(input: &Path, config: Option<&Path>) -> PathBuf {
     }
 }
 
-pub(super) fn kinds(roots: &[PathBuf], files: &[PathBuf]) -> BTreeSet<FileKind> {
-    if roots.is_empty() {
-        files
-            .iter()
-            .filter_map(|file| FileKind::of_path(file))
-            .collect()
-    } else {
-        FileKind::ALL.into_iter().collect()
+/// The kinds of files that may have to be checked: maps rest on nothing, and scenarios on files of any kind.
+pub(super) fn kinds(
+    roots: &[PathBuf],
+    files: &[PathBuf],
+    own_verdicts: bool,
+) -> BTreeSet<FileKind> {
+    let kinds = files.iter().filter_map(|file| FileKind::of_path(file));
+    let kinds: BTreeSet<FileKind> = kinds.collect();
+    let alone = kinds.iter().all(|kind| *kind == FileKind::Xodr) || own_verdicts;
+    match roots.is_empty() && alone {
+        true => kinds,
+        false => FileKind::ALL.into_iter().collect(),
     }
 }

@@ -4,6 +4,7 @@
 //! Whatever would be found otherwise by that broker is checked here: one of another program, with another
 //! configuration or other limits, that cannot read what we can, or that is about to end.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -12,8 +13,9 @@ use qcbus_broker::control::Line;
 use qcbus_broker::{Announcement, GivenResults, InForce, Notice, Options, Told, terms};
 use qcbus_document::FileKind;
 use qcbus_ingest::modular::SearchPath;
-use qcbus_messages::control::{Checked, Request, Response, Terms};
-use qcbus_messages::{Digest, Exit};
+use qcbus_messages::control::{Checked, Request, Response, Terms, Under};
+use qcbus_messages::path_text::to_text;
+use qcbus_messages::{Digest, Exit, Verdict};
 
 use super::printer::{News, Printer};
 use super::run::Run;
@@ -98,32 +100,82 @@ fn ask(
     // Before anything is checked, as always: what lies there was found in other bytes.
     let opened = GivenResults::open(places(options), config);
     let (results, left) = opened.map_err(|error| Elsewhere::Refused(error.to_string()))?;
-    let question = |file: &PathBuf| (file.clone(), terms_of(options, config, file));
-    let questions: Vec<Question> = options.files.iter().map(question).collect();
-    let directory = directory.dir().to_path_buf();
-    let asking = move || match questions.as_slice() {
-        [one] => ask_for(&mut line, one).map(|it| vec![it]),
-        all => ask_for_all(&directory, all),
+    let asking = Asking {
+        options: options.clone(),
+        config,
+        own_verdicts: args.own_verdict,
+        directory: directory.dir().to_path_buf(),
     };
-    let answered = run.unless_stopped(asking).ok_or(Elsewhere::Interrupted)?;
-    let answered = answered.map_err(Elsewhere::Here)?;
-    let files = options.files.iter().cloned().zip(answered).collect();
+    let answered = run.unless_stopped(move || asking.ask_for_everything(&mut line));
+    let answered = answered.ok_or(Elsewhere::Interrupted)?;
+    let files = answered.map_err(Elsewhere::Here)?;
     Ok((Given { by, results, files }, left))
 }
 
+/// What is asked, and whom.
+struct Asking {
+    options: Options,
+    config: Digest,
+    own_verdicts: bool,
+    directory: PathBuf,
+}
+
+impl Asking {
+    /// Asks for all files, and for those that they rest on. A verdict that counts in others must be made here: the
+    /// broker knows of each file by itself. That is so only where one of those others is not accepted.
+    fn ask_for_everything(&self, line: &mut Line) -> Result<Vec<(PathBuf, Checked)>, String> {
+        let mut files = self.ask_for_files(line, self.options.files.clone())?;
+        let mut begin = 0;
+        while !self.own_verdicts && begin < files.len() {
+            let new = files.get(begin..).unwrap_or_default();
+            let under: Vec<Under> = new.iter().flat_map(|it| it.1.rests_on.clone()).collect();
+            begin = files.len();
+            let unknown = |it: &&Under| files.iter().all(|(file, _)| *file != it.file);
+            let unknown = under.iter().filter(unknown).map(|it| it.file.clone());
+            let unknown: BTreeSet<PathBuf> = unknown.collect();
+            files.extend(self.ask_for_files(line, unknown.into_iter().collect())?);
+            let is_accepted = |it: &Under| {
+                let mut answers = files.iter().filter(|(file, _)| *file == it.file);
+                answers.all(|(_, checked)| {
+                    let verdict = &checked.verdict;
+                    verdict.verdict == Verdict::Accepted && verdict.digest == it.digest
+                })
+            };
+            if let Some(it) = under.iter().find(|it| !is_accepted(it)) {
+                return Err(format!("{} counts in other verdicts", to_text(&it.file)));
+            }
+        }
+        Ok(files)
+    }
+
+    fn ask_for_files(
+        &self,
+        line: &mut Line,
+        files: Vec<PathBuf>,
+    ) -> Result<Vec<(PathBuf, Checked)>, String> {
+        let question = |file: &PathBuf| {
+            let terms = terms_of(&self.options, self.config, file);
+            (file.clone(), terms)
+        };
+        let questions: Vec<Question> = files.iter().map(question).collect();
+        let answers = match questions.as_slice() {
+            [] => Vec::new(),
+            [one] => vec![ask_for(line, one)?],
+            all => ask_for_all(&self.directory, all)?,
+        };
+        Ok(files.into_iter().zip(answers).collect())
+    }
+}
+
 /// Whether any broker would find the same: it knows nothing of a configuration or of bundles that are named here, and
-/// has read schemas when it began, which may be others now. In a run, the verdicts on files that a scenario rests on
-/// count in its own; the broker answers for each file by itself.
+/// has read schemas when it began, which may be others now.
 fn may_ask(args: &CheckArgs, options: &Options) -> bool {
-    let kinds = options.files.iter().map(|file| FileKind::of_path(file));
-    let maps = kinds.filter(|kind| *kind == Some(FileKind::Xodr)).count();
     options.roots.is_empty()
         && options.files.len() <= MOST_FILES
         && options.config.is_none()
         && options.bundles_d.is_none()
         && args.schema_dir.is_none()
         && options.choice.is_everything()
-        && (options.files.len() == 1 || maps == options.files.len())
 }
 
 /// The terms under which a file would be checked here.

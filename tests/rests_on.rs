@@ -1,0 +1,121 @@
+//! Who checks a scenario alone is told as well what is wrong with the files that it rests on: accepted means that
+//! it can be run.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::path::Path;
+
+use support::content::{CATALOG, Content, Mark};
+use support::desk::{Desk, Said, files_below, issues};
+
+const SCENARIO: &str = "scenarios/a.xosc";
+const MAP: &str = "maps/m.xodr";
+
+/// A scenario in one directory, and its map in another.
+fn place(map: &Content) -> Desk {
+    let desk = Desk::new();
+    let scenario = Content::Scenario(1, format!("../{MAP}"));
+    desk.write(SCENARIO, scenario.bytes());
+    desk.write(
+        &format!("scenarios/{CATALOG}"),
+        Content::Catalog(1, Mark::Clean).bytes(),
+    );
+    desk.write(MAP, map.bytes());
+    desk
+}
+
+fn check(desk: &Desk, more: &[&str]) -> Said {
+    desk.qcbus(&[&["check", SCENARIO][..], more].concat())
+}
+
+/// The rules that findings about one file name, by how they end.
+fn is_found(desk: &Desk, file: &str, checker: &str) -> bool {
+    let results = desk.result(&format!("qcbus-out/{file}.xqar"));
+    issues(&results).any(|(it, _)| it.id.ends_with(checker))
+}
+
+#[test]
+fn a_scenario_alone_is_rejected_for_its_map_until_that_is_mended() {
+    let desk = place(&Content::NoHeader(1));
+    let said = check(&desk, &[]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    for words in [
+        "maps/m.xodr",
+        "fileheader_is_present",
+        "in 2 of 2 files; 2 rejected",
+    ] {
+        assert!(
+            said.stdout.contains(words),
+            "{words}: {}",
+            said.whole(&desk)
+        );
+    }
+    assert!(is_found(&desk, SCENARIO, "qcbus_rests_on"));
+    assert!(is_found(&desk, MAP, "fileheader_is_present"));
+
+    let said = check(&desk, &["--own-verdict"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    assert!(!is_found(&desk, SCENARIO, "qcbus_rests_on"));
+
+    desk.write(MAP, Content::Good(1).bytes());
+    let said = check(&desk, &[]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    let whole = "of 1 file; 1 accepted";
+    assert!(said.stdout.contains(whole), "{}", said.whole(&desk));
+}
+
+#[test]
+fn directory_of_scenarios_is_checked_with_maps_elsewhere() {
+    let desk = place(&Content::NoHeader(1));
+    let said = desk.qcbus(&["check", "scenarios"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    assert!(is_found(&desk, MAP, "fileheader_is_present"));
+}
+
+#[test]
+fn a_catalog_is_judged_with_the_map_that_nobody_named() {
+    let desk = place(&Content::Good(1));
+    let catalog = Content::Catalog(1, Mark::Clean).bytes();
+    let catalog = String::from_utf8(catalog).unwrap();
+    let broken = catalog.replacen("maxSpeed=\"", "maxSpeed=\"-", 1);
+    assert_ne!(broken, catalog);
+    desk.write(&format!("scenarios/{CATALOG}"), broken);
+    let said = check(&desk, &[]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    assert!(is_found(&desk, SCENARIO, "qcbus_rests_on"));
+}
+
+#[test]
+fn map_that_is_excluded_does_not_count() {
+    let desk = place(&Content::NoHeader(1));
+    desk.write(".qcignore", "maps/\n");
+    let said = check(&desk, &[]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    let results = files_below(&desk.path().join("qcbus-out"));
+    let of_map = |it: &&std::path::PathBuf| it.starts_with("maps");
+    assert_eq!(results.iter().find(of_map), None);
+}
+
+#[test]
+fn the_one_result_of_a_configuration_is_that_of_its_file() {
+    let desk = place(&Content::NoHeader(1));
+    let config = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Config>\n\
+         <Param name=\"InputFile\" value=\"{SCENARIO}\"/>\n\
+         <CheckerBundle application=\"xoscBundle\"/>\n\
+         <CheckerBundle application=\"xodrBundle\"/>\n</Config>\n"
+    );
+    desk.write("config.xml", config);
+    let said = desk.qcbus(&["check", "-c", "config.xml"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    let results = desk.result("Result.xqar");
+    let inputs = results.bundles.iter().flat_map(|it| &it.params);
+    let mut named = inputs.filter(|it| it.name == "InputFile");
+    assert!(named.all(|it| Path::new(&it.value).ends_with(SCENARIO)));
+}
