@@ -1,11 +1,13 @@
 //! The driver: it knows what is in every file, and what it has done to whom.
 
 use std::collections::BTreeMap;
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use qcbus_messages::control::{PeerStatus, Request, Response};
 use rustix::process::Signal;
 
+use super::files::Writer;
 use super::ledger::Ledger;
 use super::tally::Tally;
 use super::trouble::{self, ANIMALS, GUESTS, Trouble};
@@ -61,6 +63,10 @@ pub struct Driver {
     pub(super) removed_until: Option<Instant>,
     /// When its manifest was away: from when to when.
     pub(super) removals: Vec<(Duration, Duration)>,
+    /// The program that brokers are started from was replaced.
+    pub(super) is_replaced: bool,
+    /// Files that are being written to.
+    pub(super) writers: Vec<Writer>,
 }
 
 impl Driver {
@@ -87,6 +93,9 @@ impl Driver {
             gone_until: None,
             removed_until: None,
             removals: Vec::new(),
+            // There is none yet.
+            is_replaced: true,
+            writers: Vec::new(),
         }
     }
 
@@ -95,7 +104,10 @@ impl Driver {
         if self.config == trouble::BROKEN {
             self.write_config(trouble::CALM);
         }
-        self.broker = Some(self.farm.serve());
+        let mut command = Command::new(self.installed());
+        let serve = self.farm.serve_command();
+        command.args(serve.get_args()).env("NO_COLOR", "1");
+        self.broker = Some(Broker::start(&mut command, &self.farm.log_path()));
         self.start_at = None;
     }
 
@@ -128,6 +140,9 @@ impl Driver {
             Trouble::Vanish => self.vanish(),
             Trouble::Remove => self.remove(),
             Trouble::LoseOutput => self.lose_output(),
+            Trouble::Hide => self.hide(),
+            Trouble::WriteSlowly => self.write_slowly(),
+            Trouble::Replace => self.replace_program(),
         }
     }
 
@@ -155,6 +170,7 @@ impl Driver {
         }
         self.bring_back_when_due(now);
         self.want_again_when_due(now);
+        self.end_writers(|writer| writer.until <= now);
     }
 
     /// It did not end by our hand. A shared memory that somebody else fills may take it down (a
@@ -207,6 +223,7 @@ impl Driver {
             self.farm.send_away(animal);
         }
         self.bring_back();
+        self.end_writers(|_| true);
         self.share_what_has_gone();
         self.write_config(trouble::CALM);
         if self.broker.as_mut().is_none_or(|broker| !broker.is_alive()) {

@@ -1,7 +1,9 @@
 //! What the driver does to files.
 
+use std::fs::File;
+use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, UNIX_EPOCH};
+use std::time::{Duration, Instant, UNIX_EPOCH};
 
 use super::driver::Driver;
 use crate::support::content::{CATALOG, CATALOGS, Content, Mark};
@@ -16,6 +18,20 @@ const LONG_AGO: Duration = Duration::from_secs(1_000_000);
 const SHARED_MAPS: &[&str] = &["shared-0.xodr", "shared-1.xodr", "shared-2.xodr"];
 /// What maps include. No files to check.
 const SHARED_PARTS: &[&str] = &["part-0.xml", "part-1.xml"];
+
+/// Where a copy tool keeps what it has not finished.
+pub const HIDDEN: &str = ".~tmp~";
+
+/// Somebody who has a file open and has written half of it.
+#[derive(Debug)]
+pub struct Writer {
+    file: File,
+    name: String,
+    content: Content,
+    begun: Duration,
+    /// When the rest comes.
+    pub until: Instant,
+}
 
 fn mark(dice: &mut Dice) -> Mark {
     match dice.below(3) {
@@ -173,7 +189,7 @@ impl Driver {
             1 => UNIX_EPOCH + LONG_AGO,
             _ => return,
         };
-        let file = std::fs::File::options().write(true).open(path).unwrap();
+        let file = File::options().write(true).open(path).unwrap();
         file.set_modified(time).unwrap();
     }
 
@@ -199,19 +215,78 @@ impl Driver {
     }
 
     pub fn write_torn(&mut self) {
-        use std::io::Write;
         let Some(name) = self.any_file() else { return };
         let content = self.content_for(&name);
         let bytes = content.bytes();
         let (first, second) = bytes.split_at(bytes.len() / 2);
         let begun = self.ledger.now();
-        let mut file = std::fs::File::create(self.path(&name)).unwrap();
+        let mut file = File::create(self.path(&name)).unwrap();
         file.write_all(first).unwrap();
         let wait = self.dice.millis(400);
         pause(wait);
         file.write_all(second).unwrap();
         self.tally.note("write torn", &name);
         self.now_holds(&name, begun, content);
+    }
+
+    /// Somebody writes half of a file, and the rest seconds later.
+    pub fn write_slowly(&mut self) {
+        let name = self.new_name();
+        let content = self.content_for(&name);
+        let bytes = content.bytes();
+        let begun = self.ledger.now();
+        let mut file = File::create(self.path(&name)).unwrap();
+        file.write_all(&bytes[..bytes.len() / 2]).unwrap();
+        self.tally.note("write slowly", &name);
+        self.writers.push(Writer {
+            file,
+            name,
+            content,
+            begun,
+            until: Instant::now() + self.dice.millis(6000),
+        });
+    }
+
+    /// Some of them write the rest. Half of a file is never judged, also by a broker that began meanwhile.
+    pub(super) fn end_writers(&mut self, is_over: impl Fn(&Writer) -> bool) {
+        let (over, rest) = std::mem::take(&mut self.writers)
+            .into_iter()
+            .partition(is_over);
+        self.writers = rest;
+        let over: Vec<Writer> = over;
+        for mut writer in over {
+            let name = writer.name;
+            let result = self.farm.out().join(format!("{name}.xqar"));
+            assert!(
+                !result.exists(),
+                "{name} was judged before it was whole\n{}",
+                self.tally.last_lines()
+            );
+            let bytes = writer.content.bytes();
+            writer.file.write_all(&bytes[bytes.len() / 2..]).unwrap();
+            drop(writer.file);
+            self.tally.note("write the rest", &name);
+            self.now_holds(&name, writer.begun, writer.content);
+        }
+    }
+
+    /// A copy tool writes in a directory of its own, and may move the file from there into place.
+    pub fn hide(&mut self) {
+        let name = self.new_name();
+        let content = self.content_for(&name);
+        let hidden = self.path(HIDDEN);
+        std::fs::create_dir_all(&hidden).unwrap();
+        let unfinished = hidden.join(&name);
+        std::fs::write(&unfinished, content.bytes()).unwrap();
+        self.tally.note("hide", &name);
+        if self.files.len() < FILES && self.dice.below(2) == 0 {
+            let wait = self.dice.millis(200);
+            pause(wait);
+            let begun = self.ledger.now();
+            std::fs::rename(&unfinished, self.path(&name)).unwrap();
+            self.tally.note("move from hidden", &name);
+            self.now_holds(&name, begun, content);
+        }
     }
 
     pub fn rename_into_place(&mut self) {

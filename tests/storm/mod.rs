@@ -166,6 +166,7 @@ fn demand(mut driver: Driver, seen: usize, start_kib: u64, end_kib: u64, seconds
     );
     judgement.demand(&log);
     condemned_are_few(&driver, &judgement.condemned);
+    nothing_hidden_is_judged(&driver);
     reports_are_there(&driver);
     let fresh = Content::Good(driver.dice.roll());
     driver.farm.write("fresh.xodr", &fresh.bytes());
@@ -209,6 +210,15 @@ fn demand(mut driver: Driver, seen: usize, start_kib: u64, end_kib: u64, seconds
          broker {start_kib} KiB before, {end_kib} KiB after, {peak} KiB at most",
         tally.kills()
     ));
+}
+
+/// What copy tools keep for themselves has no result and is not published.
+fn nothing_hidden_is_judged(driver: &Driver) {
+    for directory in [driver.farm.out(), driver.farm.gate()] {
+        let mut files = files_below(&directory).into_iter();
+        let hidden = files.find(|it| it.starts_with(files::HIDDEN));
+        assert_eq!(hidden, None, "{}", driver.tally.last_lines());
+    }
 }
 
 /// The reporters have everything, too, and nothing about files that have gone.

@@ -1,11 +1,12 @@
 //! What operators do to a farm besides writing files: they copy and move states, and remove results.
 
-use std::path::Path;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use super::driver::Driver;
 use crate::support::desk::files_below;
-use crate::support::farm::Farm;
+use crate::support::farm::{Farm, copy_program};
 
 impl Driver {
     /// Somebody removes a result, a verdict file or a published file.
@@ -29,6 +30,31 @@ impl Driver {
             let name = output.file_name().unwrap_or_default();
             self.tally.note("lose output", &name.to_string_lossy());
         }
+    }
+
+    /// The program that brokers are started from, as it was installed.
+    pub(super) fn installed(&mut self) -> PathBuf {
+        let program = self.farm.base().join("qcbus");
+        if std::mem::take(&mut self.is_replaced) {
+            let newer = self.farm.base().join("newer");
+            copy_program(Path::new(env!("CARGO_BIN_EXE_qcbus")), &newer);
+            std::fs::rename(newer, &program).unwrap();
+        }
+        program
+    }
+
+    /// Another program takes the place of the one that runs, and one that does nothing useful: what a broker starts is
+    /// what it is itself.
+    pub fn replace_program(&mut self) {
+        if self.broker.is_none() {
+            return;
+        }
+        let newer = self.farm.base().join("newer");
+        std::fs::write(&newer, "#!/bin/sh\necho another program >&2\nexit 1\n").unwrap();
+        std::fs::set_permissions(&newer, std::fs::Permissions::from_mode(0o755)).unwrap();
+        std::fs::rename(newer, self.farm.base().join("qcbus")).unwrap();
+        self.is_replaced = true;
+        self.tally.note("replace the program", "");
     }
 
     /// While no broker runs, somebody copies or moves its results with their state.
@@ -63,9 +89,12 @@ impl Driver {
 
     /// Results and state get another inode, as after a backup was played back.
     fn move_state(&mut self) {
-        let (out, aside) = (self.farm.out(), self.farm.base().join("aside"));
+        let (out, base) = (self.farm.out(), self.farm.base());
+        let [copy, aside] = ["copy", "aside"].map(|it| base.join(it));
+        copy_tree(&out, &copy);
         std::fs::rename(&out, &aside).unwrap();
-        copy_tree(&aside, &out);
+        // At once: who reads results meanwhile sees no half of one.
+        std::fs::rename(&copy, &out).unwrap();
         std::fs::remove_dir_all(&aside).unwrap();
         self.tally.note("move the state", "");
     }

@@ -103,6 +103,12 @@ pub enum Trouble {
     Remove,
     /// A result, a verdict file or a published file is removed.
     LoseOutput,
+    /// A copy tool writes in a hidden directory, and may move the file from there into place.
+    Hide,
+    /// A file is open for writing for seconds, half-written.
+    WriteSlowly,
+    /// The program on the disk is replaced by another one.
+    Replace,
 }
 
 /// Every trouble with its share.
@@ -130,6 +136,9 @@ const SHARES: &[(u64, Trouble)] = &[
     (2, Trouble::Vanish),
     (2, Trouble::Remove),
     (6, Trouble::LoseOutput),
+    (6, Trouble::Hide),
+    (6, Trouble::WriteSlowly),
+    (2, Trouble::Replace),
 ];
 
 /// What comes next.
