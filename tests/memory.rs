@@ -192,6 +192,14 @@ fn many_checks_at_once_in_a_small_memory_all_end_with_a_verdict() {
     );
 }
 
+/// Whether `nohup` has started this process, whose children go on when a terminal is closed.
+fn ignores_hangups() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let mut lines = status.lines();
+    let mask = lines.find_map(|line| line.strip_prefix("SigIgn:")).unwrap();
+    u64::from_str_radix(mask.trim(), 16).unwrap() & 1 == 1
+}
+
 #[test]
 fn a_check_that_is_ended_by_a_signal_says_what_it_did_not_look_at() {
     with_memory(
@@ -207,6 +215,10 @@ fn a_check_that_is_ended_by_a_signal_says_what_it_did_not_look_at() {
                     ("TERM", rustix::process::Signal::TERM),
                     ("HUP", rustix::process::Signal::HUP),
                 ] {
+                    if ignores_hangups() && name == rustix::process::Signal::HUP {
+                        eprintln!("skipped: SIGHUP, which programs ignore that nohup has started");
+                        continue;
+                    }
                     let mut check = place.command(&["check", "large.xodr", "--out", "out"]);
                     let mut check = check
                         .stderr(Stdio::piped())

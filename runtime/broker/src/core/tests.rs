@@ -171,16 +171,18 @@ impl World {
             Step::ClientLeaves(n) => self.client_leaves(n),
             Step::PoolErrand(n, well) => self.pool(n, well),
             Step::TellPooled => self.tell_pooled(),
-            Step::Reconfigure(n) => {
-                self.reconfigured = n;
-                let in_force = InForce::new(None, SearchPath::default()).unwrap();
-                let event = Event::Configured {
-                    digest: digest(n.into()),
-                    demand: in_force.demand(),
-                };
-                self.event(event);
-            }
+            Step::Reconfigure(n) => self.reconfigure(n),
         }
+    }
+
+    fn reconfigure(&mut self, number: u8) {
+        self.reconfigured = number;
+        let in_force = InForce::new(None, SearchPath::default()).unwrap();
+        let event = Event::Configured {
+            digest: digest(number.into()),
+            demand: in_force.demand(),
+        };
+        self.event(event);
     }
 }
 
