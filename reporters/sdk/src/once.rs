@@ -95,7 +95,10 @@ fn outdated(result: &ResultMessage) -> Option<&'static str> {
         return Some("the result does not say which file was checked");
     }
     match (modified(&result.input), modified(&result.xqar)) {
-        (Err(_), _) => Some("the file is not there any more; its lines cannot be shown"),
+        (Err(error), _) if error.kind() == std::io::ErrorKind::NotFound => {
+            Some("the file is not there any more; its lines cannot be shown")
+        }
+        (Err(_), _) => Some("the file cannot be looked at; its lines cannot be shown"),
         (Ok(file), Ok(checked)) if file > checked => {
             Some("the file has changed since it was checked; places are those of then")
         }

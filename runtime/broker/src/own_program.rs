@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 use std::fs::Metadata;
+use std::io;
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -90,7 +91,14 @@ impl OwnProgram {
             Ok(_) => {
                 format!("{shown} was replaced: this broker still runs the earlier program")
             }
-            Err(_) => format!("{shown} was removed: this broker still runs it"),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                format!("{shown} was removed: this broker still runs it")
+            }
+            Err(error) => {
+                return Some(format!(
+                    "{shown} cannot be looked at ({error}): whether this broker runs it is not known"
+                ));
+            }
         };
         Some(format!(
             "{what}, and starts its bundles from it; to run what is installed now, restart \

@@ -39,10 +39,29 @@ pub(crate) struct Inside {
     door: Door,
 }
 
-/// The broker goes, or has gone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the broker is about to end, or somebody has removed its shared memory")]
-pub(crate) struct IsShut;
+/// Why nobody comes in.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum NoEntry {
+    /// The broker goes, or has gone.
+    #[error("the broker is about to end, or somebody has removed its shared memory")]
+    Shut,
+    /// It may be open: this process cannot use it.
+    #[error("cannot use the shared memory of the broker in {root}: {source}")]
+    Failed { root: PathBuf, source: io::Error },
+}
+
+impl NoEntry {
+    fn of(root: &Path, source: io::Error) -> NoEntry {
+        match source.kind() {
+            // Somebody who has locked it is about to shut it.
+            io::ErrorKind::NotFound | io::ErrorKind::WouldBlock => NoEntry::Shut,
+            _ => NoEntry::Failed {
+                root: root.to_path_buf(),
+                source,
+            },
+        }
+    }
+}
 
 /// Gives a generation its door.
 ///
@@ -56,10 +75,11 @@ pub(crate) fn make(root: &Path) -> io::Result<()> {
 
 impl Door {
     /// The door of a generation that is there.
-    pub(crate) fn of(root: &Path) -> Result<Door, IsShut> {
+    pub(crate) fn of(root: &Path) -> Result<Door, NoEntry> {
         let mut how = File::options();
         let how = how.read(true).custom_flags(libc::O_NOFOLLOW);
-        let file = how.open(root.join(DOOR)).map_err(|_| IsShut)?;
+        let opened = how.open(root.join(DOOR));
+        let file = opened.map_err(|error| NoEntry::of(root, error))?;
         Ok(Door {
             file: Arc::new(file),
             root: root.to_path_buf(),
@@ -67,12 +87,12 @@ impl Door {
     }
 
     /// Goes in for a moment. Of one door one at a time is inside: the kernel does not count locks of one file.
-    pub(crate) fn enter(&self) -> Result<Inside, IsShut> {
-        // Somebody who has locked it is about to shut it.
-        flock(&self.file, FlockOperation::NonBlockingLockShared).map_err(|_| IsShut)?;
+    pub(crate) fn enter(&self) -> Result<Inside, NoEntry> {
+        let locked = flock(&self.file, FlockOperation::NonBlockingLockShared);
+        locked.map_err(|error| NoEntry::of(&self.root, error.into()))?;
         let inside = Inside { door: self.clone() };
         match self.says_at_least(SHUT) {
-            true => Err(IsShut),
+            true => Err(NoEntry::Shut),
             false => Ok(inside),
         }
     }
@@ -162,8 +182,18 @@ mod tests {
         drop(early.enter().unwrap());
         shut_and_remove(&root).unwrap();
         assert!(!root.exists());
-        assert_eq!(early.enter().err(), Some(IsShut));
-        assert_eq!(Door::of(&root).err(), Some(IsShut));
+        assert!(matches!(early.enter(), Err(NoEntry::Shut)));
+        assert!(matches!(Door::of(&root), Err(NoEntry::Shut)));
+    }
+
+    #[test]
+    fn what_cannot_be_opened_is_not_said_to_be_shut() {
+        let (_dir, root) = root();
+        fs::remove_file(root.join(DOOR)).unwrap();
+        std::os::unix::fs::symlink("elsewhere", root.join(DOOR)).unwrap();
+        let refused = Door::of(&root).unwrap_err().to_string();
+        assert!(refused.contains("symbolic links"), "{refused}");
+        assert!(!refused.contains("about to end"), "{refused}");
     }
 
     #[test]

@@ -9,7 +9,7 @@ use iceoryx2::prelude::*;
 use qcbus_messages::services::{HELLO_BYTES, Services};
 use qcbus_messages::{Digest, Hello, ToPeer, codec};
 
-use crate::door::{Door, IsShut};
+use crate::door::{Door, NoEntry};
 use crate::entrance::{Statement, introduce};
 use crate::generation::Generation;
 use crate::host::{ConfigHeader, HelloHeader};
@@ -51,8 +51,8 @@ pub(crate) enum BeginError {
     Port(String),
 }
 
-impl From<IsShut> for BeginError {
-    fn from(error: IsShut) -> Self {
+impl From<NoEntry> for BeginError {
+    fn from(error: NoEntry) -> Self {
         BeginError::Port(error.to_string())
     }
 }

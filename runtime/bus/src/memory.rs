@@ -194,7 +194,7 @@ impl Backing {
     /// That of the publisher with this id, which has lent nothing yet.
     ///
     /// # Errors
-    /// When there is no room.
+    /// When there is no room, or what else the system says.
     pub(crate) fn of(root: &Path, publisher: u128) -> io::Result<Backing> {
         let mut backing = Backing {
             file: segment(root, publisher),
@@ -207,27 +207,29 @@ impl Backing {
             Some(file) => backing.len = file.metadata()?.len(),
             None => tracing::debug!(publisher, "the memory of a publisher is not to be found"),
         }
-        match backing.is_ahead() {
-            true => Ok(backing),
-            false => Err(io::ErrorKind::StorageFull.into()),
-        }
+        backing.go_ahead()?;
+        Ok(backing)
     }
 
     /// All of it at once.
     ///
     /// # Errors
-    /// When there is no room.
+    /// When there is no room, or what else the system says.
     pub(crate) fn whole(root: &Path, publisher: u128) -> io::Result<()> {
-        let mut backing = Backing::of(root, publisher)?;
-        match backing.reach(u64::MAX) {
-            true => Ok(()),
-            false => Err(io::ErrorKind::StorageFull.into()),
-        }
+        Backing::of(root, publisher)?.reach(u64::MAX)
     }
 
     /// Whether the next slot may be lent. To be asked before every loan.
     pub(crate) fn is_ahead(&mut self) -> bool {
-        self.reach(self.used + STREAM_STEP_BYTES / 2) || self.had >= self.len
+        let ahead = self.go_ahead();
+        if let Err(error) = &ahead {
+            tracing::debug!(%error, "no shared memory for further frames");
+        }
+        ahead.is_ok()
+    }
+
+    fn go_ahead(&mut self) -> io::Result<()> {
+        self.reach(self.used + STREAM_STEP_BYTES / 2)
     }
 
     /// A slot of so many bytes was lent at this address.
@@ -240,22 +242,21 @@ impl Backing {
         };
     }
 
-    fn reach(&mut self, wanted: u64) -> bool {
+    fn reach(&mut self, wanted: u64) -> io::Result<()> {
         let Some(file) = self.file.as_ref() else {
-            return true;
+            return Ok(());
         };
         if wanted <= self.had || self.had >= self.len {
-            return true;
+            return Ok(());
         }
         let until = wanted.saturating_add(STREAM_STEP_BYTES / 2).min(self.len);
-        let done = have(file, FallocateFlags::KEEP_SIZE, self.had..until);
-        match done {
+        match have(file, FallocateFlags::KEEP_SIZE, self.had..until) {
             Ok(()) => self.had = until,
             // A file system without it: there the reserve alone has to do.
             Err(Errno::OPNOTSUPP) => self.had = self.len,
-            Err(error) => tracing::debug!(%error, "no shared memory for further frames"),
+            Err(error) => return Err(error.into()),
         }
-        wanted.min(self.len) <= self.had
+        Ok(())
     }
 }
 

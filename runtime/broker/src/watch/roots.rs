@@ -42,7 +42,7 @@ impl Looker {
     fn check_root(&mut self, root: &Path) {
         let now = match look(root) {
             Root::Here(now) => now,
-            Root::Away(how) => return self.lose_root(root, how),
+            Root::Away(how) => return self.lose_root(root, &how),
         };
         let before = self.roots.seen.get(root).copied();
         if before.is_some_and(|before| is_unmounted(root, before, now)) {
@@ -101,7 +101,7 @@ impl Looker {
         let roots: Vec<PathBuf> = self.options.roots.iter().filter(inside).cloned().collect();
         for root in roots {
             if let Root::Away(how) = look(&root) {
-                self.lose_root(&root, how);
+                self.lose_root(&root, &how);
             }
         }
         self.roots.is_away(path)
@@ -112,19 +112,24 @@ impl Looker {
 enum Root {
     Here(Identity),
     /// No directory that can be looked at; what has become of it.
-    Away(&'static str),
+    Away(String),
 }
 
 fn look(root: &Path) -> Root {
-    match foreign::symlink_metadata(root) {
-        Ok(data) if data.is_dir() => Root::Here((data.dev(), data.ino())),
+    let how = match foreign::symlink_metadata(root) {
+        Ok(data) if data.is_dir() => return Root::Here((data.dev(), data.ino())),
         // It would have been resolved when the broker started; the kernel tells nothing through it.
         Ok(data) if data.is_symlink() => {
-            Root::Away("has become a symbolic link, which only a broker that starts anew follows")
+            "has become a symbolic link, which only a broker that starts anew follows".to_owned()
         }
-        Err(error) if error.kind() == io::ErrorKind::TimedOut => Root::Away("does not answer"),
-        Ok(_) | Err(_) => Root::Away("is gone"),
-    }
+        Ok(_) => "is no directory any more".to_owned(),
+        Err(error) => match error.kind() {
+            io::ErrorKind::TimedOut => "does not answer".to_owned(),
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => "is gone".to_owned(),
+            _ => format!("cannot be looked at: {error}"),
+        },
+    };
+    Root::Away(how)
 }
 
 /// Whether what lies there is the place where something was mounted.
