@@ -172,6 +172,23 @@ fn a_watched_directory_that_goes_and_comes_back() {
     farm.verdict("b.xodr");
 }
 
+#[test]
+fn what_takes_the_place_of_a_watched_directory_is_not_said_to_be_gone() {
+    let farm = Farm::new();
+    let _broker = farm.serve_ready();
+    let aside = farm.base().join("aside");
+    std::fs::write(&aside, "no directory").unwrap();
+    // At once: otherwise it would be gone in between.
+    let exchange = || {
+        let flags = rustix::fs::RenameFlags::EXCHANGE;
+        rustix::fs::renameat_with(rustix::fs::CWD, &aside, rustix::fs::CWD, farm.root(), flags)
+    };
+    exchange().unwrap();
+    notice(&farm, "is no directory any more");
+    exchange().unwrap();
+    notice(&farm, "is back");
+}
+
 /// A bundle comes, so that every verdict is outdated, and nothing can be read.
 fn what_must_be_judged_again_while_its_directory_is_away(farm: &Farm, aside: &Path) {
     std::fs::rename(farm.root(), aside).unwrap();
