@@ -11,8 +11,11 @@ mod support;
 
 use std::path::Path;
 
+use qcbus_formats::xqar::Level;
+use qcbus_messages::Verdict;
 use support::content::{CATALOG, Content, Mark};
 use support::desk::{Desk, Said, files_below, issues};
+use support::farm::Farm;
 
 const SCENARIO: &str = "scenarios/a.xosc";
 const MAP: &str = "maps/m.xodr";
@@ -70,6 +73,30 @@ fn a_scenario_alone_is_rejected_for_its_map_until_that_is_mended() {
     assert!(said.stdout.contains(whole), "{}", said.whole(&desk));
 }
 
+/// Who watches scenarios alone is told what nobody judges.
+#[test]
+fn a_broker_says_which_map_it_does_not_watch() {
+    let farm = Farm::new();
+    let scenario = Content::Scenario(1, "../elsewhere.xodr".to_owned());
+    let map = farm.base().join("elsewhere.xodr");
+    std::fs::write(&map, Content::Good(1).bytes()).unwrap();
+    std::fs::create_dir(farm.root().join("catalogs")).unwrap();
+    farm.write(CATALOG, &Content::Catalog(1, Mark::Clean).bytes());
+    farm.write("a.xosc", &scenario.bytes());
+    let mut broker = farm.serve_ready();
+    assert_eq!(farm.verdict("a.xosc").verdict, Verdict::Accepted);
+    let results = farm.result("a.xosc");
+    let said = issues(&results).filter(|(it, _)| it.id.ends_with("qcbus_rests_on"));
+    let said: Vec<_> = said.map(|(_, it)| (it.level, &*it.description)).collect();
+    let [(Level::Warning, told)] = said[..] else {
+        panic!("{said:?}");
+    };
+    let names_it = told.contains(map.to_str().unwrap());
+    assert!(names_it && told.contains("judged by nobody"), "{told}");
+    farm.qcbus(&["down"]);
+    broker.wait();
+}
+
 #[test]
 fn directory_of_scenarios_is_checked_with_maps_elsewhere() {
     let desk = place(&Content::NoHeader(1));
@@ -118,4 +145,18 @@ fn the_one_result_of_a_configuration_is_that_of_its_file() {
     let inputs = results.bundles.iter().flat_map(|it| &it.params);
     let mut named = inputs.filter(|it| it.name == "InputFile");
     assert!(named.all(|it| Path::new(&it.value).ends_with(SCENARIO)));
+}
+
+/// Broker and bundles keep few documents at a time, and one scenario may need all of them.
+#[test]
+fn scenario_with_many_catalogs_does_not_hold_up_what_it_waits_for() {
+    let desk = place(&Content::Good(1));
+    for number in 2..70 {
+        let catalog = Content::Catalog(number, Mark::Clean).bytes();
+        desk.write(&format!("scenarios/catalogs/z{number}.xosc"), catalog);
+    }
+    let said = desk.qcbus(&["check", "scenarios"]);
+    assert_eq!(said.code, Some(3), "{}", said.whole(&desk));
+    let whole = "70 files; 69 accepted, 1 undetermined";
+    assert!(said.stdout.contains(whole), "{}", said.whole(&desk));
 }

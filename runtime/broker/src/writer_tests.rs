@@ -59,6 +59,7 @@ fn finished(dir: &Path, epoch: u64) -> FinishedJob {
         documents: Vec::new(),
         missing: Vec::new(),
         rests_on: Vec::new(),
+        unwatched: Vec::new(),
         bytes: bytes.len() as u64,
     };
     FinishedJob {

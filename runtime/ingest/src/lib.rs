@@ -33,4 +33,4 @@ pub use qcbus_document::BuildError;
 pub use read::{Content, FileStamp, Stat};
 pub use references::{Reference, references};
 pub use remarks::{RESTS_ON_CHECKER, Resting};
-pub use remarks::{faults_of_root, missing_references, remarks, resting};
+pub use remarks::{faults_of_root, missing_references, remarks, resting, unwatched};

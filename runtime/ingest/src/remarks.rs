@@ -130,6 +130,8 @@ fn missing_reference(root: &Document<'_>, missing: &MissingDocument) -> Remark {
 /// Checker of the bundle `qcbus` that says what a file rests on and that is not accepted itself.
 pub const RESTS_ON_CHECKER: &str = "qcbus_rests_on";
 
+const RESTS_ON_DESCRIPTION: &str = "What the file rests on is accepted itself.";
+
 /// A file that the root rests on, and the verdict on it.
 #[derive(Debug, Clone, Copy)]
 pub struct Resting<'a> {
@@ -165,7 +167,7 @@ pub fn resting(root: &Document<'_>, it: &Resting<'_>, binding: bool) -> Option<R
     };
     let remark = Remark {
         checker: RESTS_ON_CHECKER.to_owned(),
-        description: "What the file rests on is accepted itself.".to_owned(),
+        description: RESTS_ON_DESCRIPTION.to_owned(),
         open: (level == Level::Warning).then_some(fact),
         issue: Some(Issue {
             id: 0,
@@ -177,6 +179,26 @@ pub fn resting(root: &Document<'_>, it: &Resting<'_>, binding: bool) -> Option<R
         }),
     };
     Some(remark)
+}
+
+/// The remark that nobody judges a file on which another one rests, because it is not watched.
+pub fn unwatched(root: &Document<'_>, role: DocumentRole, path: &str, referred_at: u32) -> Remark {
+    let (what, place) = (name_of_role(role), referring_place(root, referred_at));
+    Remark {
+        checker: RESTS_ON_CHECKER.to_owned(),
+        description: RESTS_ON_DESCRIPTION.to_owned(),
+        open: None,
+        issue: Some(Issue {
+            id: 0,
+            description: format!(
+                "{what} {path} is judged by nobody: it lies outside of the watched directories; watch its directory, too"
+            ),
+            level: Level::Warning,
+            rule_uid: RESTS_ON.to_owned(),
+            locations: vec![place],
+            domain_info: Vec::new(),
+        }),
+    }
 }
 
 fn name_of_role(role: DocumentRole) -> &'static str {

@@ -24,6 +24,11 @@ pub enum Action {
         /// How long ago it came or was last asked for: nothing that is read may be older.
         waited: Duration,
     },
+    /// Let go of a job's documents apart from the root: nobody reads them any more.
+    ReleaseParts {
+        /// The job.
+        job: JobId,
+    },
     /// Let go of a job's documents.
     Release {
         /// The job.

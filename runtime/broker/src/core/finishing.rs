@@ -31,6 +31,12 @@ impl State {
     /// Gives finished jobs to the writers, as far as there is room.
     pub(super) fn store_finished(&mut self, actions: &mut Actions) {
         let now = self.now;
+        for (id, job) in &mut self.jobs {
+            let waits = matches!(job.stage, JobStage::Finished(at) if at > now);
+            if waits && !std::mem::replace(&mut job.is_slim, true) {
+                actions.push(Action::ReleaseParts { job: *id });
+            }
+        }
         let due = |job: &ActiveJob| matches!(job.stage, JobStage::Finished(at) if at <= now);
         let ids: Vec<JobId> = self
             .jobs

@@ -44,6 +44,8 @@ pub(super) struct ActiveJob {
     pub errand: Option<Errand>,
     /// While it is stored: the file was to be judged anew, and is again if nothing is stored.
     pub anew: bool,
+    /// It waits for other verdicts, and of its documents the root alone is still on the bus.
+    pub is_slim: bool,
 }
 
 impl ActiveJob {
@@ -160,13 +162,14 @@ impl State {
         held_up.count().min(self.settings.max_active)
     }
 
+    /// Documents that bundles read. Jobs that wait for other verdicts take no room from those that are to come.
     fn documents_active(&self) -> usize {
         let documents = |job: &ActiveJob| {
-            job.prepared
-                .as_ref()
-                .map_or(1, |it| it.documents.len().max(1))
+            let prepared = job.prepared.as_ref();
+            prepared.map_or(1, |it| it.documents.len().max(1))
         };
-        self.jobs.values().map(documents).sum()
+        let active = self.jobs.values().filter(|job| !job.is_slim);
+        active.map(documents).sum()
     }
 
     /// Begins with one file, unless its verdict still stands.
@@ -212,6 +215,7 @@ impl State {
                 shares: BTreeMap::new(),
                 errand,
                 anew: false,
+                is_slim: false,
             },
         );
         actions.push(Action::Prepare { job, path, waited });

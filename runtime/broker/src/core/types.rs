@@ -153,6 +153,8 @@ pub struct PreparedJob {
     pub missing: Vec<MissingDocument>,
     /// Those of the documents that the root rests on and that get verdicts of their own.
     pub rests_on: Vec<Referenced>,
+    /// Those that the root rests on and that nobody judges, because they lie outside of all that is watched.
+    pub unwatched: Vec<Referenced>,
     /// Source bytes in total.
     pub bytes: u64,
 }

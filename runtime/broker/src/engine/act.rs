@@ -23,6 +23,7 @@ impl Broker {
         match action {
             Action::Stop => return false,
             Action::Prepare { job, path, waited } => self.prepare(job, path, waited),
+            Action::ReleaseParts { job } => self.intake.release_parts(job),
             Action::Release { job } => self.intake.release(job),
             Action::PublishAgain { job, doc } => {
                 let intake = self.intake.clone();

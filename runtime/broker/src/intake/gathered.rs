@@ -12,7 +12,7 @@ use qcbus_messages::path_text::{from_text, to_text};
 use qcbus_messages::{Absence, Digest, DocId, DocumentRole, JobDocument, MissingDocument};
 use sha2::{Digest as _, Sha256};
 
-use super::{Intake, JudgedAs, Manner, Published};
+use super::{Intake, JudgedAs, Manner, Published, judged_in_a_run};
 use crate::core::{Input, PrepareFailure, PreparedJob, Reading, Referenced, Stamp};
 use crate::stamp::{from_content, is_racy, stamp_through_links};
 
@@ -111,21 +111,27 @@ impl Gathered {
         );
     }
 
-    /// The documents that the root rests on and that are judged by themselves. `judged_as` gives the path
-    /// under which a file is. A member of an archive is judged with its archive.
-    pub fn rests_on(&self, judged_as: &JudgedAs) -> Vec<Referenced> {
+    /// The documents that the root rests on: those that are judged by themselves, and those that could be and are
+    /// not. `judged_as` gives the path under which a file is. A member of an archive is judged with its archive.
+    fn rests_on(&self, judged_as: &JudgedAs) -> (Vec<Referenced>, Vec<Referenced>) {
         let root = self.root.first().map(|input| &*input.path);
         let documents = self.documents.iter().zip(&self.rests_on);
-        let mut found: Vec<Referenced> = Vec::new();
+        let (mut found, mut unwatched) = (Vec::new(), Vec::new());
         for (document, _) in documents.filter(|(_, rests)| **rests) {
             let file = qcbus_ingest::outer_file(&from_text(&document.path));
-            let digest = self.inputs.get(&file).and_then(Input::digest);
-            let Some((path, digest)) = judged_as(&file).zip(digest) else {
+            let Some(digest) = self.inputs.get(&file).and_then(Input::digest) else {
                 continue;
             };
-            let is_new = Some(&*path) != root && found.iter().all(|it| it.path != path);
-            if is_new {
-                found.push(Referenced {
+            let (list, path) = match judged_as(&file) {
+                Some(path) => (&mut found, path),
+                None => match judged_in_a_run(&file) {
+                    Some(path) => (&mut unwatched, path),
+                    None => continue,
+                },
+            };
+            let is_new = |it: &Referenced| it.path != path;
+            if Some(&*path) != root && list.iter().all(is_new) {
+                list.push(Referenced {
                     path,
                     digest,
                     role: document.role,
@@ -133,7 +139,7 @@ impl Gathered {
                 });
             }
         }
-        found
+        (found, unwatched)
     }
 
     pub fn finish(&self, judged_as: &JudgedAs) -> PreparedJob {
@@ -143,13 +149,15 @@ impl Gathered {
             .values()
             .filter(|input| Some(&input.path) != root.as_ref());
         let inputs: Vec<Input> = self.root.iter().chain(others).cloned().collect();
+        let (rests_on, unwatched) = self.rests_on(judged_as);
         PreparedJob {
             basis: basis(&inputs),
             racy: self.racy || inputs.iter().any(was_racy),
             inputs,
             documents: self.documents.clone(),
             missing: self.missing.clone(),
-            rests_on: self.rests_on(judged_as),
+            rests_on,
+            unwatched,
             bytes: self.bytes,
         }
     }

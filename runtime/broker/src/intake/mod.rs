@@ -191,6 +191,13 @@ impl Intake {
             .map(|(_, doc)| *doc)
     }
 
+    /// Lets go of a job's documents apart from the root.
+    pub fn release_parts(&self, job: JobId) {
+        if let Some(held) = lock(&self.held).get_mut(&job) {
+            held.truncate(1);
+        }
+    }
+
     /// Lets go of a job's documents.
     pub fn release(&self, job: JobId) {
         let held = lock(&self.held).remove(&job);

@@ -73,7 +73,14 @@ impl Store {
             let remark = qcbus_ingest::resting(root, &resting, !self.own_verdicts);
             remark.filter(|_| !is_said(&path))
         };
-        job.rests_on.iter().filter_map(remark).collect()
+        let judged = job.rests_on.iter().filter_map(remark);
+        let prepared = job.prepared.iter().filter(|_| !self.own_verdicts);
+        let unwatched = prepared.flat_map(|it| &it.unwatched).filter_map(|file| {
+            let path = to_text(&file.path);
+            let remark = || qcbus_ingest::unwatched(root, file.role, &path, file.referred_at);
+            (!is_said(&path)).then(remark)
+        });
+        judged.chain(unwatched).collect()
     }
 }
 

@@ -194,6 +194,7 @@ fn a_client_may_read_what_the_broker_may_not() {
             within: None,
         }],
         rests_on: Vec::new(),
+        unwatched: Vec::new(),
         bytes: 1,
     }));
     world.event(Event::Prepared { job, result });

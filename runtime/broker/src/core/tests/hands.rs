@@ -57,6 +57,7 @@ impl World {
                     documents,
                     missing: Vec::new(),
                     rests_on,
+                    unwatched: Vec::new(),
                     bytes: 1,
                 }))
             }

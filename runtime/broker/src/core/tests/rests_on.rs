@@ -40,6 +40,24 @@ fn a_rejected_map_is_named_whichever_comes_first() {
     }
 }
 
+/// A scenario that is read first has all documents that there may be on the bus, and its map must be read, too.
+#[test]
+fn who_waits_for_a_verdict_leaves_room_to_those_that_are_to_come() {
+    let mut world = world();
+    world.state.settings.max_documents = 2;
+    world.lay(0, 100);
+    world.write(1);
+    world.prepare(0, true);
+    world.find(0);
+    world.settle();
+    assert_eq!(world.judged[&1].1, Verdict::Accepted);
+    assert_eq!(
+        world.stored.len(),
+        2,
+        "each once, and none without the other"
+    );
+}
+
 #[test]
 fn a_map_that_is_mended_is_named_no_more() {
     let mut world = world();
@@ -122,8 +140,21 @@ fn a_run_tells_the_verdict_on_a_scenario_once_however_late_its_map_is_found() {
 }
 
 #[test]
-fn a_run_waits_for_no_map_that_is_none_of_its_files() {
+fn a_run_judges_a_map_that_is_none_of_its_files() {
     let mut world = run();
+    world.rejected.insert(0);
+    world.lay(0, 100);
+    world.write(1);
+    world.event(Event::Scanned);
+    world.settle();
+    assert_eq!(world.said_of_maps[&1], [0]);
+    assert_eq!(world.stored, [0, 1]);
+}
+
+#[test]
+fn a_run_for_own_verdicts_waits_for_no_map_that_is_none_of_its_files() {
+    let mut world = run();
+    world.state.settings.own_verdicts = true;
     world.lay(0, 100);
     world.write(1);
     world.prepare(0, true);
