@@ -359,6 +359,10 @@ impl State {
         }
         if job.shares.values().any(|share| !share.is_over()) {
             job.stage = JobStage::Checking;
+            if job.is_slim {
+                // Whoever is to look now would look for documents that have left the bus.
+                return self.begin_anew(id, actions);
+            }
         }
         // Nothing is given out or stored before every job has followed.
         self.finish_if_over(id);

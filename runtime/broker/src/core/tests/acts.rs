@@ -14,7 +14,7 @@ impl World {
     pub fn act(&mut self, action: Action) {
         match action {
             Action::Prepare { job, path, waited } => self.is_to_be_read(job, &path, waited),
-            Action::Release { job } => {
+            Action::Release { job } | Action::ReleaseParts { job } => {
                 self.released.insert(job);
             }
             Action::Send { session, message } => self.is_sent(session, message),
@@ -74,6 +74,7 @@ impl World {
     fn is_sent(&mut self, session: SessionId, message: ToPeer) {
         match message {
             ToPeer::Job(job) => {
+                assert!(!self.released.contains(&job.job), "its documents are there");
                 let bundle = self
                     .peers
                     .get_mut(&session)
