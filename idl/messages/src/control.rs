@@ -271,12 +271,12 @@ pub struct Checked {
     /// The result, as its file is to have it.
     pub result: String,
     /// The files that this one rests on, which the verdict knows nothing of.
-    pub rests_on: Vec<Under>,
+    pub rests_on: Vec<Referenced>,
 }
 
 /// A file that another one rests on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Under {
+pub struct Referenced {
     /// Absolute path.
     #[serde(with = "path_text::one")]
     pub file: PathBuf,

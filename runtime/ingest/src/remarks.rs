@@ -130,8 +130,6 @@ fn missing_reference(root: &Document<'_>, missing: &MissingDocument) -> Remark {
 /// Checker of the bundle `qcbus` that says what a file rests on and that is not accepted itself.
 pub const RESTS_ON_CHECKER: &str = "qcbus_rests_on";
 
-const RESTS_ON_DESCRIPTION: &str = "What the file rests on is accepted itself.";
-
 /// A file that the root rests on, and the verdict on it.
 #[derive(Debug, Clone, Copy)]
 pub struct Resting<'a> {
@@ -160,42 +158,40 @@ pub fn resting(root: &Document<'_>, it: &Resting<'_>, binding: bool) -> Option<R
             Level::Information,
         ),
         (true, Some(Verdict::Rejected)) => (
-            format!("{fact}; this file is judged again when that one is fixed"),
+            format!("{fact}; this file is rejected until that one is fixed"),
             Level::Error,
         ),
         (true, _) => (fact.clone(), Level::Warning),
     };
-    let remark = Remark {
+    let open = (level == Level::Warning).then_some(fact);
+    Some(rests_on_remark(root, it.referred_at, text, level, open))
+}
+
+/// The remark that nobody judges a file on which another one rests, because it is not watched.
+pub fn unwatched(root: &Document<'_>, role: DocumentRole, path: &str, referred_at: u32) -> Remark {
+    let what = name_of_role(role);
+    let text =
+        format!("{what} {path} is not watched, so nobody judges it; watch its directory, too");
+    rests_on_remark(root, referred_at, text, Level::Warning, None)
+}
+
+fn rests_on_remark(
+    root: &Document<'_>,
+    referred_at: u32,
+    text: String,
+    level: Level,
+    open: Option<String>,
+) -> Remark {
+    Remark {
         checker: RESTS_ON_CHECKER.to_owned(),
-        description: RESTS_ON_DESCRIPTION.to_owned(),
-        open: (level == Level::Warning).then_some(fact),
+        description: String::from("What the file rests on is accepted itself."),
+        open,
         issue: Some(Issue {
             id: 0,
             description: text,
             level,
             rule_uid: RESTS_ON.to_owned(),
-            locations: vec![referring_place(root, it.referred_at)],
-            domain_info: Vec::new(),
-        }),
-    };
-    Some(remark)
-}
-
-/// The remark that nobody judges a file on which another one rests, because it is not watched.
-pub fn unwatched(root: &Document<'_>, role: DocumentRole, path: &str, referred_at: u32) -> Remark {
-    let (what, place) = (name_of_role(role), referring_place(root, referred_at));
-    Remark {
-        checker: RESTS_ON_CHECKER.to_owned(),
-        description: RESTS_ON_DESCRIPTION.to_owned(),
-        open: None,
-        issue: Some(Issue {
-            id: 0,
-            description: format!(
-                "{what} {path} is judged by nobody: it lies outside of the watched directories; watch its directory, too"
-            ),
-            level: Level::Warning,
-            rule_uid: RESTS_ON.to_owned(),
-            locations: vec![place],
+            locations: vec![referring_place(root, referred_at)],
             domain_info: Vec::new(),
         }),
     }

@@ -44,7 +44,7 @@ pub(super) struct ActiveJob {
     pub errand: Option<Errand>,
     /// While it is stored: the file was to be judged anew, and is again if nothing is stored.
     pub anew: bool,
-    /// It waits for other verdicts, and of its documents the root alone is still on the bus.
+    /// Its bundles have answered and it must wait: of its documents only the root is still on the bus.
     pub is_slim: bool,
 }
 
@@ -162,7 +162,7 @@ impl State {
         held_up.count().min(self.settings.max_active)
     }
 
-    /// Documents that bundles read. Jobs that wait for other verdicts take no room from those that are to come.
+    /// Documents that bundles read. Jobs that wait for other verdicts leave the room to those that they wait for.
     fn documents_active(&self) -> usize {
         let documents = |job: &ActiveJob| {
             let prepared = job.prepared.as_ref();

@@ -99,8 +99,7 @@ impl State {
         false
     }
 
-    /// A run judges what its files rest on, too, wherever that lies. Who is told of it knows it for no file that was
-    /// to be checked.
+    /// A run also judges what its files rest on, wherever that lies.
     pub(super) fn judge_what_is_under(&mut self, prepared: &PreparedJob, actions: &mut Actions) {
         if !self.settings.once || self.settings.own_verdicts {
             return;

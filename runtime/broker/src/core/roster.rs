@@ -360,7 +360,7 @@ impl State {
         if job.shares.values().any(|share| !share.is_over()) {
             job.stage = JobStage::Checking;
             if job.is_slim {
-                // Whoever is to look now would look for documents that have left the bus.
+                // Its documents have left the bus, and a bundle is to read them now.
                 return self.begin_anew(id, actions);
             }
         }

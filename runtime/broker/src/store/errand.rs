@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use qcbus_formats::config::Config;
 use qcbus_formats::pool::{BundleOutcome, Pooled, Scope};
 use qcbus_formats::xqar;
-use qcbus_messages::control::{Checked, Under};
+use qcbus_messages::control::{self, Checked};
 
 use super::pooling::reasons;
 use super::{Store, judged, unlooked};
@@ -30,7 +30,7 @@ impl Store {
         if self.epoch.load(Ordering::Acquire) != job.epoch.0 {
             return ErrandOutcome::Outdated;
         }
-        let under = |it: &Referenced| Under {
+        let referenced = |it: &Referenced| control::Referenced {
             file: it.path.to_path_buf(),
             digest: it.digest.to_string(),
         };
@@ -39,7 +39,7 @@ impl Store {
         ErrandOutcome::Pooled(Box::new(Checked {
             verdict: file_verdict(&job.path, &judged),
             result: xqar::write(&pooled.results, self.dialect),
-            rests_on: rests_on.map(under).collect(),
+            rests_on: rests_on.map(referenced).collect(),
         }))
     }
 

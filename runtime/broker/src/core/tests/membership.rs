@@ -12,7 +12,7 @@ fn session_of(world: &World, name: &str) -> SessionId {
 }
 
 /// A file at the writers, checked by the first bundle alone.
-fn world_with_a_file_at_the_writers() -> World {
+pub fn world_with_a_file_at_the_writers() -> World {
     let mut world = World::new();
     world.join("First");
     world.write(1);

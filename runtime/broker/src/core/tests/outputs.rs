@@ -1,5 +1,6 @@
 //! Results and published files that somebody else removes.
 
+use super::membership::world_with_a_file_at_the_writers;
 use super::*;
 
 impl World {
@@ -56,12 +57,7 @@ fn lost_result_whose_file_is_touched_at_the_last_moment_is_written() {
 
 #[test]
 fn result_that_is_lost_before_its_verdict_is_told_is_written_once_more() {
-    let mut world = World::new();
-    world.join("First");
-    world.write(1);
-    world.prepare(0, true);
-    world.answer(0);
-    assert_eq!(world.storing.len(), 1);
+    let mut world = world_with_a_file_at_the_writers();
     world.write_out(0, true);
     world.lose(1);
     world.settle();

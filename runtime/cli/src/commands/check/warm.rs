@@ -13,7 +13,7 @@ use qcbus_broker::control::Line;
 use qcbus_broker::{Announcement, GivenResults, InForce, Notice, Options, Told, terms};
 use qcbus_document::FileKind;
 use qcbus_ingest::modular::SearchPath;
-use qcbus_messages::control::{Checked, Request, Response, Terms, Under};
+use qcbus_messages::control::{Checked, Referenced, Request, Response, Terms};
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Digest, Exit, Verdict};
 
@@ -128,21 +128,22 @@ impl Asking {
         let mut begin = 0;
         while !self.own_verdicts && begin < files.len() {
             let new = files.get(begin..).unwrap_or_default();
-            let under: Vec<Under> = new.iter().flat_map(|it| it.1.rests_on.clone()).collect();
+            let referenced = new.iter().flat_map(|it| it.1.rests_on.clone());
+            let referenced: Vec<Referenced> = referenced.collect();
             begin = files.len();
-            let unknown = |it: &&Under| files.iter().all(|(file, _)| *file != it.file);
-            let unknown = under.iter().filter(unknown).map(|it| it.file.clone());
+            let unknown = |it: &&Referenced| files.iter().all(|(file, _)| *file != it.file);
+            let unknown = referenced.iter().filter(unknown).map(|it| it.file.clone());
             let unknown: BTreeSet<PathBuf> = unknown.collect();
             files.extend(self.ask_for_files(line, unknown.into_iter().collect())?);
-            let is_accepted = |it: &Under| {
+            let is_accepted = |it: &Referenced| {
                 let mut answers = files.iter().filter(|(file, _)| *file == it.file);
                 answers.all(|(_, checked)| {
                     let verdict = &checked.verdict;
                     verdict.verdict == Verdict::Accepted && verdict.digest == it.digest
                 })
             };
-            if let Some(it) = under.iter().find(|it| !is_accepted(it)) {
-                return Err(format!("{} counts in other verdicts", to_text(&it.file)));
+            if let Some(it) = referenced.iter().find(|it| !is_accepted(it)) {
+                return Err(format!("{} is not accepted", to_text(&it.file)));
             }
         }
         Ok(files)
