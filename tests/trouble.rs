@@ -336,3 +336,27 @@ fn a_shared_memory_that_is_full() {
         assert_eq!(verdict.verdict, Content::Good(1).verdict());
     });
 }
+
+#[test]
+fn a_shared_memory_that_is_mounted_for_reading_only() {
+    let prepare = "mount -t tmpfs -o ro tmpfs /dev/shm";
+    inside(
+        "a_shared_memory_that_is_mounted_for_reading_only",
+        prepare,
+        || {
+            let farm = Farm::new();
+            let served = farm.serve_command().output().unwrap();
+            assert_eq!(served.status.code(), Some(5));
+            insta::assert_snapshot!(told(&farm, &stderr(&served)));
+            let looked_at = farm.qcbus(&["doctor"]);
+            assert_eq!(looked_at.status.code(), Some(1));
+            let remarks = String::from_utf8_lossy(&looked_at.stdout).into_owned();
+            let remark: Vec<&str> = remarks
+                .lines()
+                .skip_while(|line| !line.contains("shared memory"))
+                .take(2)
+                .collect();
+            insta::assert_snapshot!(remark.join("\n"));
+        },
+    );
+}
