@@ -236,10 +236,6 @@ impl AnyRule for HostedRule {
         false
     }
 
-    fn looks_at_the_whole(&self) -> bool {
-        true
-    }
-
     fn with_model<'d>(
         &self,
         subject: &'d Subject<'d>,

@@ -129,10 +129,6 @@ impl AnyRule for PyRule {
         false
     }
 
-    fn looks_at_the_whole(&self) -> bool {
-        true
-    }
-
     fn with_model<'d>(
         &self,
         subject: &'d Subject<'d>,

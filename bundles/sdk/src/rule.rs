@@ -106,7 +106,7 @@ pub struct Rule<M: Model> {
     /// Looks at a part of the document and says what it found, one part after the other: for
     /// rules that need to know nothing of one part to judge the next.
     pub each: Option<Each<M>>,
-    /// Looks at the document and says what it found, after `each` has seen all parts.
+    /// Looks at the document and says what it found, after `each` has seen all parts. Nothing by default.
     pub run: fn(&M::Of<'_>, &mut Sink<'_>),
 }
 
@@ -208,8 +208,6 @@ pub trait AnyRule: Sync {
     fn model(&self) -> TypeId;
     /// Whether it looks at one part of the model after the other.
     fn goes_by_parts(&self) -> bool;
-    /// Whether it looks at the whole model. May be true of one that does nothing then.
-    fn looks_at_the_whole(&self) -> bool;
     /// Builds this rule's model and hands it on, for every rule of the same model.
     #[doc(hidden)]
     fn with_model<'d>(
@@ -260,13 +258,6 @@ impl<M: Model> AnyRule for Rule<M> {
 
     fn goes_by_parts(&self) -> bool {
         self.each.is_some()
-    }
-
-    fn looks_at_the_whole(&self) -> bool {
-        !std::ptr::fn_addr_eq(
-            self.run,
-            finds_nothing::<M> as fn(&M::Of<'_>, &mut Sink<'_>),
-        )
     }
 
     fn with_model<'d>(

@@ -113,9 +113,10 @@ fn rules_look_at_a_part_in_turn_and_then_at_the_whole() {
     let (complete, heard) = heard(None);
     assert!(complete);
     let parts = [[0, 1].as_slice(), &[0, 1], &[0]].concat();
-    // Those that look at the whole only, then the one that goes by parts, too.
+    // The one that looks at the whole only, then the one that went by parts and did not fail.
     let whole = [2, 0];
-    let dependent = [3, 3, 3];
+    // Three parts and the whole.
+    let dependent = [3, 3, 3, 3];
     let begun = heard.begun.into_inner().unwrap();
     assert_eq!(begun, [parts.as_slice(), &whole, &dependent].concat());
     let order: Vec<usize> = heard.ended.iter().map(|(checker, ..)| *checker).collect();

@@ -45,7 +45,7 @@ struct Tasks<'t, 'r> {
     turns: &'t [Turn<'r>],
     /// By place in `turns`: those that go by parts.
     by_parts: Vec<usize>,
-    /// Those that look at the whole only. Whoever does so after the parts may ask what was found in them.
+    /// Those that look at the whole only. The others do so after the parts, and may ask what was found in them.
     wholes: Vec<usize>,
     built: &'t dyn Built<'r>,
     next: AtomicUsize,
@@ -71,7 +71,7 @@ impl<'r> Work<'r> {
             work: self,
             turns,
             by_parts: places(|rule| rule.goes_by_parts()),
-            wholes: places(|rule| rule.looks_at_the_whole() && !rule.goes_by_parts()),
+            wholes: places(|rule| !rule.goes_by_parts()),
             built,
             next: AtomicUsize::new(0),
         };
@@ -213,7 +213,7 @@ impl<'r> Tasks<'_, 'r> {
             1 => found.remove(0),
             _ => merged(found).unwrap_or_else(|| self.alone(turn)),
         };
-        if turn.rule.goes_by_parts() && turn.rule.looks_at_the_whole() {
+        if turn.rule.goes_by_parts() {
             self.look(turn, &mut had, None, &mut Instant::now());
         }
         let Had {
