@@ -179,6 +179,10 @@ const LOOK_AT_REPORTS: u32 = 50;
 /// Every so many looks the broker is asked what it has to say.
 const ASK_STATUS: u32 = 10;
 
+/// How verdict files end. A state that is moved as a copy has them with other inodes and the times of before:
+/// nobody tells those verdicts then, and some may be of a time when less was demanded.
+const VERDICTS: &str = ".verdict.json";
+
 /// Files seen before, by what would be different had they changed.
 type Marks = BTreeMap<PathBuf, (u64, i64, i64, u64)>;
 
@@ -191,7 +195,7 @@ fn look(shared: &Shared) {
     let mut reports = documents.map(|suffix| (suffix, Marks::new()));
     while !shared.is_over() {
         let begun = shared.start.elapsed();
-        for (name, bytes) in changed(&shared.out, &mut results, ".verdict.json") {
+        for (name, bytes) in changed(&shared.out, &mut results, VERDICTS) {
             if let Some(told) = Told::read(&name, &bytes) {
                 shared.saw(from, What::Told(Box::new(told)));
             }
@@ -254,7 +258,8 @@ fn changed(directory: &Path, marks: &mut Marks, suffix: &str) -> Vec<(String, Ve
         let Ok(is) = std::fs::metadata(&whole) else {
             continue;
         };
-        let mark = (is.ino(), is.mtime(), is.mtime_nsec(), is.size());
+        let inode = if suffix == VERDICTS { 0 } else { is.ino() };
+        let mark = (inode, is.mtime(), is.mtime_nsec(), is.size());
         let known = marks.get(&path) == Some(&mark);
         // What went while it was looked at is looked for again.
         if let Ok(bytes) = (!known).then(|| std::fs::read(&whole)).transpose() {
