@@ -179,8 +179,8 @@ const LOOK_AT_REPORTS: u32 = 50;
 /// Every so many looks the broker is asked what it has to say.
 const ASK_STATUS: u32 = 10;
 
-/// How verdict files end. A state that is moved as a copy has them with other inodes and the times of before:
-/// nobody tells those verdicts then, and some may be of a time when less was demanded.
+/// How the names of verdict files end. Their inodes do not count: the storm moves the state as a copy, and a
+/// copied verdict is not a new one.
 const VERDICTS: &str = ".verdict.json";
 
 /// Files seen before, by what would be different had they changed.

@@ -4,6 +4,8 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use rustix::fs::{CWD, RenameFlags, renameat_with};
+
 use super::driver::Driver;
 use crate::support::desk::files_below;
 use crate::support::farm::{Farm, copy_program};
@@ -90,12 +92,11 @@ impl Driver {
     /// Results and state get another inode, as after a backup was played back.
     fn move_state(&mut self) {
         let (out, base) = (self.farm.out(), self.farm.base());
-        let [copy, aside] = ["copy", "aside"].map(|it| base.join(it));
+        let copy = base.join("copy");
         copy_tree(&out, &copy);
-        std::fs::rename(&out, &aside).unwrap();
-        // At once: who reads results meanwhile sees no half of one.
-        std::fs::rename(&copy, &out).unwrap();
-        std::fs::remove_dir_all(&aside).unwrap();
+        // One step: the watchers never find a moment without results, after which all of them would be new.
+        renameat_with(CWD, &copy, CWD, &out, RenameFlags::EXCHANGE).unwrap();
+        std::fs::remove_dir_all(&copy).unwrap();
         self.tally.note("move the state", "");
     }
 }
