@@ -17,7 +17,7 @@ use crate::options::Options;
 /// results must not take it for one.
 const FILE: &str = "belongs-to";
 
-/// Most bytes of that file: two paths and two numbers.
+/// Most bytes of that file: two paths and a number.
 const MOST: u64 = 64 << 10;
 
 /// What a state directory belongs to.
@@ -25,9 +25,8 @@ const MOST: u64 = 64 << 10;
 struct Identity {
     /// Absolute path of the state directory.
     state: String,
-    /// Device number of the state directory.
-    device: u64,
-    /// Inode number of the state directory.
+    /// Inode number of the state directory. Its device number is no help: overlay, NFS and btrfs get another one
+    /// with every mount.
     inode: u64,
     /// Absolute path of the directory of results.
     out: String,
@@ -51,7 +50,6 @@ fn identify(state: &Path, out: &Path, durable: bool) -> io::Result<Option<String
     let data = std::fs::metadata(state)?;
     let now = Identity {
         state: to_text(state),
-        device: data.dev(),
         inode: data.ino(),
         out: to_text(out),
     };
@@ -69,7 +67,7 @@ fn identify(state: &Path, out: &Path, durable: bool) -> io::Result<Option<String
 
 fn difference(before: &Identity, now: &Identity) -> Option<String> {
     let (is, was) = (&now.state, &before.state);
-    let same_directory = (before.device, before.inode) == (now.device, now.inode);
+    let same_directory = before.inode == now.inode;
     if !same_directory && was != is && from_text(was).exists() {
         return Some(format!(
             "the state directory {is} is a copy of {was}: results that it names outside of {} belong to that \
@@ -129,6 +127,33 @@ mod tests {
         );
         assert_eq!(said(&copy, "/copy/out"), None, "it is said once");
         assert_eq!(said(&live, "/live/out"), None, "the original is untouched");
+    }
+
+    #[test]
+    fn state_on_a_file_system_that_was_mounted_again_says_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        said(dir.path(), "/out");
+        let file = dir.path().join(FILE);
+        let mut written: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+        written["device"] = 1_u64.into(); // as the version before wrote it, under another mount
+        std::fs::write(&file, written.to_string()).unwrap();
+        assert_eq!(said(dir.path(), "/out"), None);
+    }
+
+    #[test]
+    fn state_from_a_backup_says_that_it_was_replaced() {
+        let dir = tempfile::tempdir().unwrap();
+        let state = dir.path().join("state");
+        std::fs::create_dir(&state).unwrap();
+        said(&state, "/out");
+        let backup = dir.path().join("backup");
+        std::fs::create_dir(&backup).unwrap();
+        std::fs::copy(state.join(FILE), backup.join(FILE)).unwrap();
+        std::fs::remove_dir_all(&state).unwrap();
+        std::fs::rename(&backup, &state).unwrap();
+        let told = said(&state, "/out").unwrap();
+        assert!(told.contains("was replaced"), "{told}");
     }
 
     #[test]
