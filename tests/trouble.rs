@@ -11,7 +11,7 @@
 mod support;
 
 use std::path::Path;
-use std::process::Output;
+use std::process::{Command, Output};
 
 use qcbus_messages::Verdict;
 use qcbus_messages::control::{Request, Response};
@@ -335,6 +335,33 @@ fn a_shared_memory_that_is_full() {
         let verdict = farm.verdict("a.xodr");
         assert_eq!(verdict.verdict, Content::Good(1).verdict());
     });
+}
+
+#[test]
+fn shared_memory_that_others_fill_to_the_last_page_kills_no_broker() {
+    let prepare = "mount -t tmpfs -o size=64m tmpfs /dev/shm";
+    inside(
+        "shared_memory_that_others_fill_to_the_last_page_kills_no_broker",
+        prepare,
+        || {
+            let farm = Farm::new();
+            let _broker = farm.serve_ready();
+            for number in 1..4 {
+                farm.write("a.xodr", &Content::Good(number).bytes());
+                farm.verdict("a.xodr");
+            }
+            let full = Command::new("dd")
+                .args(["if=/dev/zero", "of=/dev/shm/filler", "bs=4k"])
+                .output()
+                .unwrap();
+            assert!(stderr(&full).contains("No space left"), "{full:?}");
+            farm.write("a.xodr", &Content::Good(4).bytes());
+            notice(&farm, "cannot publish");
+            std::fs::remove_file("/dev/shm/filler").unwrap();
+            let verdict = farm.verdict("a.xodr");
+            assert_eq!(verdict.verdict, Content::Good(4).verdict());
+        },
+    );
 }
 
 #[test]

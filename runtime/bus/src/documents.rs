@@ -142,9 +142,12 @@ impl Class {
         if self.lent.load(Ordering::Acquire) != 1 {
             return;
         }
-        if free_shared_memory() >= self.letting_go_bytes()
-            && self.used.swap(false, Ordering::AcqRel)
-        {
+        // To lend a slot is to write to its head. Where others have filled the memory to its last page, that write
+        // would kill the process; what they take is not ours to give back.
+        if free_shared_memory() < self.letting_go_bytes() {
+            return;
+        }
+        if self.used.swap(false, Ordering::AcqRel) {
             self.push_everything_out(&publisher);
         }
         let mut used = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
