@@ -182,7 +182,11 @@ impl Looker {
             }
             // One that cannot be looked at may still be there.
             Sight::Hidden(why) => return self.unseen(path, why),
-            Sight::NoFile(what) if is_checkable => self.unseen(path, what.to_string()),
+            Sight::NoFile(what)
+                if is_checkable || (what.hides_more() && !self.ignored(path, true)) =>
+            {
+                self.unseen(path, what.to_string());
+            }
             Sight::Directory | Sight::Known | Sight::Nothing | Sight::NoFile(_) => {
                 self.seen_again(path);
             }

@@ -118,6 +118,17 @@ fn what_cannot_be_looked_at_is_said_once_and_when_it_can_be() {
 }
 
 #[test]
+fn link_in_place_of_a_directory_is_named_as_long_as_it_is_there() {
+    let ((_dir, root), (_other, outside)) = (farm(), farm());
+    symlink(&outside, root.join("maps")).unwrap();
+    let (mut looker, told) = looker(&root);
+    looker.scan_all(true);
+    assert_eq!(words(&root, &told), ["unseen maps"]);
+    looker.look(&root.join("maps"));
+    assert!(words(&root, &told).is_empty());
+}
+
+#[test]
 fn what_the_first_look_sees_is_there_before_it_has_settled() {
     let (_dir, root) = farm();
     std::fs::write(root.join("young.xodr"), "").unwrap();
