@@ -403,7 +403,8 @@ impl State {
         }
         self.depend(file, prepared, actions);
         self.judge_what_is_under(prepared, actions);
-        let same = |judged: &Judged| judged.basis == prepared.basis && !anew;
+        let as_now = |judged: &Judged| self.rests_on_the_same(judged, prepared);
+        let same = |judged: &Judged| judged.basis == prepared.basis && !anew && as_now(judged);
         match old {
             Some(judged)
                 if same(&judged)

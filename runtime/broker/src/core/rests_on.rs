@@ -6,6 +6,7 @@
 //! them, or with one that is another by now, is given anew. So the verdict does not depend on the order in
 //! which files came.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -216,6 +217,17 @@ impl State {
             let judged = self.entry_of(&it.path).and_then(|it| it.judged.as_ref());
             judged.is_some_and(|judged| !says(judged, it))
         })
+    }
+
+    /// Whether a verdict counted in those on the files that a job with the same bytes would count in. A map is judged
+    /// no more, for instance, when its directory has become a symbolic link.
+    pub(super) fn rests_on_the_same(&self, judged: &Judged, prepared: &PreparedJob) -> bool {
+        if self.settings.own_verdicts {
+            return true;
+        }
+        let now: BTreeSet<&Path> = prepared.rests_on.iter().map(|it| &*it.path).collect();
+        let counted = judged.rests_on.as_ref();
+        counted.is_some_and(|all| all.iter().map(|it| &*it.path).collect::<BTreeSet<_>>() == now)
     }
 
     pub(super) fn judge_anew(&mut self, id: FileId) {
