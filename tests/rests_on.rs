@@ -9,13 +9,16 @@
 
 mod support;
 
+use std::os::unix::fs::symlink;
 use std::path::Path;
 
 use qcbus_formats::xqar::Level;
 use qcbus_messages::Verdict;
+use support::broker::Broker;
 use support::content::{CATALOG, Content, Mark};
 use support::desk::{Desk, Said, files_below, issues};
 use support::farm::Farm;
+use support::watchdog::until_or;
 
 const SCENARIO: &str = "scenarios/a.xosc";
 const MAP: &str = "maps/m.xodr";
@@ -95,6 +98,77 @@ fn a_broker_says_which_map_it_does_not_watch() {
     assert!(names_it && told.contains("is not watched"), "{told}");
     farm.qcbus(&["down"]);
     broker.wait();
+}
+
+/// A broker that gets no help from looks in intervals, with a scenario, its map and its catalog.
+fn served() -> (Farm, Broker) {
+    let farm = Farm::with(&["--rescan", "1h"]);
+    for directory in ["catalogs", "maps"] {
+        std::fs::create_dir(farm.root().join(directory)).unwrap();
+    }
+    farm.write(CATALOG, &Content::Catalog(1, Mark::Clean).bytes());
+    farm.write(MAP, &Content::Good(1).bytes());
+    farm.write("a.xosc", &Content::Scenario(1, MAP.to_owned()).bytes());
+    let broker = farm.serve_ready();
+    assert_eq!(farm.verdict("a.xosc").verdict, Verdict::Accepted);
+    (farm, broker)
+}
+
+#[test]
+fn map_in_a_directory_that_becomes_a_link_is_named_as_not_watched() {
+    let (farm, _broker) = served();
+    let elsewhere = farm.base().join("elsewhere");
+    std::fs::rename(farm.root().join("maps"), &elsewhere).unwrap();
+    symlink(&elsewhere, farm.root().join("maps")).unwrap();
+    let told = || {
+        farm.verdict("a.xosc");
+        let results = farm.result("a.xosc");
+        let mut said = issues(&results).filter(|(it, _)| it.id.ends_with("qcbus_rests_on"));
+        said.any(|(_, it)| it.description.contains("is not watched"))
+    };
+    until_or("the map is named", || told().then_some(()), || farm.log());
+    let named = farm.status().unwrap().unseen;
+    assert!(
+        named.iter().any(|it| it.path.ends_with("maps")),
+        "{named:?}"
+    );
+}
+
+/// No event tells of what is written to a file under a name that nobody watches.
+#[test]
+fn map_changed_under_another_name_is_judged_for_who_waits_for_its_scenario() {
+    let (farm, _broker) = served();
+    let other_name = farm.base().join("other name");
+    std::fs::hard_link(farm.root().join(MAP), &other_name).unwrap();
+    std::fs::write(&other_name, Content::NoHeader(1).bytes()).unwrap();
+    assert_eq!(farm.verdict("a.xosc").verdict, Verdict::Rejected);
+    assert_eq!(farm.verdict_file(MAP)["verdict"], "rejected");
+}
+
+#[test]
+fn waiting_for_what_lies_in_a_directory_that_is_away_takes_no_result() {
+    let (farm, _broker) = served();
+    let aside = farm.base().join("aside");
+    std::fs::rename(farm.root(), &aside).unwrap();
+    for file in ["a.xosc", MAP] {
+        let file = farm.root().join(file);
+        let waited = farm.qcbus(&["wait", file.to_str().unwrap(), "--timeout", "1s"]);
+        let said = String::from_utf8(waited.stderr).unwrap();
+        assert_eq!(waited.status.code(), Some(3), "{said}");
+        assert!(
+            said.contains("the watched directory") && said.contains("is gone"),
+            "{said}"
+        );
+    }
+    for result in [
+        "a.xosc.xqar",
+        "maps/m.xodr.xqar",
+        "catalogs/vehicles.xosc.xqar",
+    ] {
+        assert!(farm.out().join(result).exists(), "{result}: {}", farm.log());
+    }
+    std::fs::rename(&aside, farm.root()).unwrap();
+    assert_eq!(farm.verdict("a.xosc").verdict, Verdict::Accepted);
 }
 
 #[test]

@@ -217,10 +217,24 @@ impl Broker {
             .filter(|(path, stamp)| stamp.is_none() || !is_settling(path))
             .collect();
         for (path, stamp) in moved {
-            let event = match stamp {
-                Some(stamp) => Event::Touched { path, stamp },
-                None => Event::Vanished { path },
+            let is_watched = self.options.roots.iter().any(|it| path.starts_with(it));
+            let watcher = self.watcher.as_ref().filter(|_| is_watched);
+            let event = match (stamp, watcher) {
+                (Some(stamp), _) => Event::Touched {
+                    path: path.clone(),
+                    stamp,
+                },
+                // Whether it has gone, or its watched directory is away as a whole, the watcher tells.
+                (None, Some(_)) => Event::Unfinished {
+                    path: path.clone(),
+                    stamp,
+                },
+                (None, None) => Event::Vanished { path: path.clone() },
             };
+            // It may have a verdict of its own, which is of other bytes now.
+            if let Some(watcher) = watcher {
+                watcher.look(path);
+            }
             self.handle(event);
         }
     }

@@ -105,21 +105,28 @@ pub fn wait(args: &WaitArgs) -> Exit {
     }
 }
 
-/// What the broker knows of a file that it has no verdict on.
+/// What the broker knows of a file that it has no verdict on, or of a directory above it.
 fn why_no_verdict(args: &WaitArgs) -> String {
     let file = named(&args.file);
-    let known = match ask(&args.instance, &Request::Status) {
-        Ok(Response::Status(status)) => {
-            let unfinished = status.unfinished.into_iter().map(|it| (it.path, it.why));
-            let unseen = status.unseen.into_iter().map(|it| (it.path, it.why));
-            unfinished.chain(unseen).find(|(path, _)| *path == file)
+    if let Ok(Response::Status(status)) = ask(&args.instance, &Request::Status) {
+        let unfinished = status.unfinished.into_iter().map(|it| (it.path, it.why));
+        let unseen = status.unseen.into_iter().map(|it| (it.path, it.why));
+        let known = unfinished.chain(unseen);
+        let known = known.filter(|(path, _)| file.starts_with(path));
+        if let Some((path, why)) = known.max_by_key(|(path, _)| path.as_os_str().len()) {
+            let (at, why) = (to_text(&path), shown::line(&why));
+            return match path {
+                path if path == file => format!(": {why}"),
+                path if status.watching.contains(&path) => {
+                    format!(": the watched directory {at} {why}")
+                }
+                _ => format!(": {at}: {why}"),
+            };
         }
-        _ => None,
-    };
-    match known {
-        Some((_, why)) => format!(": {}", shown::line(&why)),
-        None if args.file.exists() => String::new(),
-        None => ": there is no such file".to_owned(),
+    }
+    match args.file.exists() {
+        true => String::new(),
+        false => ": there is no such file".to_owned(),
     }
 }
 
