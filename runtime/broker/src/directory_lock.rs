@@ -91,13 +91,30 @@ pub enum LockError {
 /// A directory that is ours until this is dropped, or the process ends in whatever way.
 #[derive(Debug)]
 pub struct DirectoryLock {
-    file: Mutex<File>,
+    locked: Mutex<Locked>,
     directory: PathBuf,
     purpose: Purpose,
     /// The instance that has the directory alone; `None` when runs of `check` share it.
     instance: Option<String>,
     /// The directory, if it was made for this and is to go with it as long as it is empty.
     made: Option<PathBuf>,
+}
+
+/// What is open as long as a directory is ours.
+#[derive(Debug)]
+struct Locked {
+    file: File,
+    /// The directory itself, open so that none that is made later gets its inode. `None` where it cannot be opened.
+    directory: Option<File>,
+}
+
+impl Locked {
+    fn new(file: File, directory: &Path) -> Locked {
+        Locked {
+            file,
+            directory: File::open(directory).ok(),
+        }
+    }
 }
 
 impl DirectoryLock {
@@ -111,7 +128,10 @@ impl DirectoryLock {
         instance: &str,
     ) -> Result<DirectoryLock, LockError> {
         Ok(DirectoryLock {
-            file: Mutex::new(lock_alone(directory, purpose, instance)?),
+            locked: Mutex::new(Locked::new(
+                lock_alone(directory, purpose, instance)?,
+                directory,
+            )),
             directory: directory.to_path_buf(),
             purpose,
             instance: Some(instance.to_owned()),
@@ -126,7 +146,7 @@ impl DirectoryLock {
     pub fn share(directory: &Path) -> Result<DirectoryLock, LockError> {
         let made = (!directory.exists()).then(|| directory.to_path_buf());
         Ok(DirectoryLock {
-            file: Mutex::new(lock_shared(directory)?),
+            locked: Mutex::new(Locked::new(lock_shared(directory)?, directory)),
             directory: directory.to_path_buf(),
             purpose: Purpose::Results,
             instance: None,
@@ -140,20 +160,32 @@ impl DirectoryLock {
     /// # Errors
     /// When it cannot be taken, because another broker has it. Nothing may be written to it or removed from it then.
     pub fn hold(&self) -> Result<(), LockError> {
-        let mut file = self.file();
-        if is_in_place(&file, &locked_at(&self.directory, self.purpose)) {
+        let mut locked = self.locked();
+        if is_in_place(&locked.file, &locked_at(&self.directory, self.purpose)) {
             return Ok(());
         }
-        *file = match &self.instance {
+        let file = match &self.instance {
             Some(instance) => lock_alone(&self.directory, self.purpose, instance)?,
             None => lock_shared(&self.directory)?,
         };
+        *locked = Locked::new(file, &self.directory);
         Ok(())
     }
 
     /// Whether the directory that was taken lies there still.
     pub fn is_in_place(&self) -> bool {
-        is_in_place(&self.file(), &locked_at(&self.directory, self.purpose))
+        is_in_place(
+            &self.locked().file,
+            &locked_at(&self.directory, self.purpose),
+        )
+    }
+
+    /// Whether the very directory that was taken lies there still, and its lock file was removed from it.
+    pub fn has_lost_its_file(&self) -> bool {
+        let locked = self.locked();
+        let directory = locked.directory.as_ref();
+        directory.is_some_and(|it| is_in_place(it, &self.directory))
+            && !is_in_place(&locked.file, &locked_at(&self.directory, self.purpose))
     }
 
     /// The directory.
@@ -161,8 +193,8 @@ impl DirectoryLock {
         &self.directory
     }
 
-    fn file(&self) -> MutexGuard<'_, File> {
-        self.file.lock().unwrap_or_else(PoisonError::into_inner)
+    fn locked(&self) -> MutexGuard<'_, Locked> {
+        self.locked.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -211,12 +243,12 @@ impl Drop for DirectoryLock {
     fn drop(&mut self) {
         // It stays when there is anything in it, or somebody else uses it.
         if let Some(made) = &self.made
-            && self.file().try_lock().is_ok()
+            && self.locked().file.try_lock().is_ok()
         {
             let _ = std::fs::remove_dir(made);
         }
         // A process that is being started at this moment has the descriptor, too, until it runs its program.
-        let _ = self.file().unlock();
+        let _ = self.locked().file.unlock();
     }
 }
 

@@ -113,8 +113,18 @@ impl Gate {
         if self.lock.is_in_place() {
             return Ok(());
         }
-        contents::refuse_foreign(&self.options.directory).map_err(io::Error::other)?;
+        if !self.lock.has_lost_its_file() {
+            contents::refuse_foreign(&self.options.directory).map_err(io::Error::other)?;
+        }
         self.lock.hold().map_err(io::Error::other)
+    }
+
+    /// Puts the file by which a start knows the gate in its place again, if somebody has removed it alone.
+    pub fn keep_its_file(&self) {
+        if self.lock.has_lost_its_file() {
+            // The next file that is written there says why it cannot be.
+            let _ = self.hold();
+        }
     }
 
     /// Brings the directory in agreement with the verdicts that still stand: what belongs to none of

@@ -304,6 +304,27 @@ fn a_directory_of_others_is_no_gate() {
     contents::refuse_foreign(dir.path()).unwrap();
 }
 
+#[test]
+fn gate_whose_file_is_removed_gets_it_back_and_another_directory_does_not() {
+    let bench = Bench::new(Outside::Name);
+    bench.accept("a.xodr");
+    let directory = &bench.gate.options.directory;
+    let file = directory.join(crate::directory_lock::GATE_FILE);
+    std::fs::remove_file(&file).unwrap();
+    bench.gate.keep_its_file();
+    assert!(file.exists());
+    std::fs::remove_file(&file).unwrap();
+    bench.accept("b.xodr");
+    assert_eq!(bench.behind(), names(&["a.xodr", "b.xodr", "part.xml"]));
+    assert!(file.exists(), "whoever writes there puts it back, too");
+
+    std::fs::rename(directory, bench.dir.path().join("aside")).unwrap();
+    std::fs::create_dir(directory).unwrap();
+    std::fs::write(directory.join("precious"), "").unwrap();
+    bench.gate.keep_its_file();
+    assert!(!file.exists(), "a directory of others is not ours to have");
+}
+
 /// What happens to a file.
 #[derive(Debug, Clone, Copy)]
 enum Step {
