@@ -242,6 +242,28 @@ fn a_broker_that_is_stopped_is_named_and_not_waited_for() {
     broker.signal(rustix::process::Signal::CONT);
 }
 
+#[test]
+fn whoever_waits_when_the_broker_is_stopped_is_told_that_none_runs() {
+    let farm = Farm::new();
+    let broker = farm.serve_ready();
+    let before = descriptors(&broker);
+    let file = farm.root().join("later.xodr");
+    let (waited, down) = std::thread::scope(|scope| {
+        let waiting = scope.spawn(|| farm.qcbus(&["wait", file.to_str().unwrap()]));
+        let is_there = || (descriptors(&broker) > before).then_some(());
+        until_or("a client is there", is_there, || farm.log());
+        let down = farm.qcbus(&["down"]);
+        (waiting.join().unwrap(), down)
+    });
+    assert_eq!(down.status.code(), Some(0));
+    let said = String::from_utf8(waited.stderr).unwrap();
+    assert_eq!(waited.status.code(), Some(4), "{said}");
+    assert!(
+        said.contains("the broker left before it answered"),
+        "{said}"
+    );
+}
+
 /// `qcbus down && qcbus serve` is what everybody writes.
 #[test]
 fn what_is_down_can_be_started_again_at_once() {

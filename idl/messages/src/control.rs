@@ -102,7 +102,8 @@ pub enum Response {
         /// For a person.
         reason: String,
     },
-    /// Answer to `Down`, sent when everything has been drained.
+    /// Answer to `Down`, sent when everything has been drained; to any other request, the broker stopped before it had
+    /// an answer.
     Stopped,
     /// Answer to `Reload`: what changed, line by line; nothing when nothing did.
     Reloaded {

@@ -133,6 +133,9 @@ impl Line {
         let written = self.stream.get_mut().write_all(&text);
         written.map_err(|error| AskError::Left(error.to_string()))?;
         let answer = answer(&mut self.stream, request, self.process.as_ref())?;
+        if matches!(answer, Response::Stopped) && !matches!(request, Request::Down) {
+            return Err(AskError::Left("it has stopped".to_owned()));
+        }
         if let (Response::Stopped, Some(process)) = (&answer, &self.process)
             && !process.ends_within(END_WITHIN)
         {

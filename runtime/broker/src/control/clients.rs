@@ -301,16 +301,13 @@ async fn answer(visit: &Visit, line: &[u8], stream: &UnixStream) -> Option<Respo
     } else {
         Stage::Asking
     });
-    let stopped = || Response::Failed {
-        reason: "the broker is stopping".to_owned(),
-    };
     let (answer, mut answered) = oneshot::channel();
     if visit.clients.inbox.send(Asked { request, answer }).is_err() {
-        return Some(stopped());
+        return Some(Response::Stopped);
     }
     loop {
         match timeout(LOOK, &mut answered).await {
-            Ok(response) => return Some(response.unwrap_or_else(|_| stopped())),
+            Ok(response) => return Some(response.unwrap_or(Response::Stopped)),
             Err(_) if has_left(stream) => return None,
             Err(_) => {}
         }

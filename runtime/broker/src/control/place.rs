@@ -100,8 +100,8 @@ mod tests {
         let directory = directory.to_owned();
         let client = tokio::task::spawn_blocking(move || ask_broker(&directory, &Request::Reload));
         let question = asked.recv().await.unwrap();
-        question.answer.send(Response::Stopped).unwrap();
-        assert!(matches!(client.await.unwrap(), Ok(Response::Stopped)));
+        question.answer.send(Response::TimedOut).unwrap();
+        assert!(matches!(client.await.unwrap(), Ok(Response::TimedOut)));
     }
 
     #[test]

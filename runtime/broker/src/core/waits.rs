@@ -217,10 +217,9 @@ impl State {
     /// The broker stops: nobody is left without an answer.
     pub(super) fn end_waits(&mut self, actions: &mut Actions) {
         for waiter in std::mem::take(&mut self.waiters) {
-            let reason = "the broker has stopped".to_owned();
             actions.push(Action::Answer {
                 ticket: waiter.ticket,
-                response: Response::Failed { reason },
+                response: Response::Stopped,
             });
         }
     }
