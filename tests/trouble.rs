@@ -224,7 +224,7 @@ fn inside(test: &str, prepare: &str, body: fn()) {
 }
 
 fn mount(directory: &Path, options: &str) {
-    let mut command = std::process::Command::new("mount");
+    let mut command = Command::new("mount");
     command
         .args(["-t", "tmpfs", "-o", options, "tmpfs"])
         .arg(directory);

@@ -24,9 +24,7 @@ pub enum JournalError {
     #[error("{0}")]
     State(#[from] LockError),
     /// Its disk is full.
-    #[error(
-        "the journal {path} cannot be written: its disk is full; make room, it is tried again until there is some"
-    )]
+    #[error("the journal {path} cannot be written: its disk is full; make room")]
     Full {
         /// The journal.
         path: PathBuf,

@@ -200,10 +200,10 @@ impl Store {
         self.recorded(&entries, found);
         if !removed.is_empty() {
             let results = some_of(&removed);
-            let why = "the journal knows nothing of them";
-            found
-                .said
-                .push(format!("results withdrawn: {results}: {why}"));
+            let out = to_text(&self.places.out);
+            found.said.push(format!(
+                "results removed from {out}, because the journal does not know them: those of {results}"
+            ));
         }
     }
 
@@ -293,7 +293,8 @@ fn left_alone(directories: &BTreeSet<PathBuf>, out: &Path) -> String {
     let directories: Vec<Arc<Path>> = directories.iter().map(|it| it.as_path().into()).collect();
     format!(
         "results in {} are left alone: the journal names them, but this broker writes to {} only. The state was \
-         copied from another broker, or --out was another directory before; remove them if nobody needs them",
+         copied from another broker, or --out was another directory before; remove them only if no other broker writes \
+         there",
         some_of(&directories),
         to_text(out)
     )

@@ -34,14 +34,14 @@ impl Store {
             } else {
                 gate.refuse(&job.path)
             };
-            made_way.map_err(|error| unwritten(&job.path, &error))?;
+            made_way.map_err(|error| unwritten(&gate.place(&job.path), &error))?;
             step("made way", &job.path);
         }
         let written = self.write_files(job, pooled, judged)?;
         step("named", &job.path);
         if let Some(gate) = self.gate.as_ref().filter(|_| judged.is_accepted()) {
             let published = gate.accept(&job.path, judged);
-            published.map_err(|error| unwritten(&job.path, &error))?;
+            published.map_err(|error| unwritten(&gate.place(&job.path), &error))?;
         }
         reached("written", &job.path);
         let entry = Entry::Judged {
@@ -52,7 +52,7 @@ impl Store {
         };
         self.record(&[entry]).map_err(|what| Unwritten {
             what,
-            further: "",
+            further: "; it is tried again",
             for_good: false,
         })
     }
