@@ -226,6 +226,36 @@ fn watched_directory_that_is_away_is_no_health() {
 }
 
 #[test]
+fn configuration_that_is_not_in_force_is_no_health() {
+    let mut farm = Farm::new();
+    let config = farm.base().join("config.xml");
+    let good = "<Config><CheckerBundle application=\"xodrBundle\"/></Config>";
+    std::fs::write(&config, good).unwrap();
+    farm.arguments
+        .extend(["-c".to_owned(), config.to_str().unwrap().to_owned()]);
+    let _broker = farm.serve_ready();
+    until_health(&farm, 0, "healthy\n");
+    std::fs::write(&config, "<Config>").unwrap();
+    until_health(
+        &farm,
+        1,
+        "the configuration in force is not the one on disk",
+    );
+    std::fs::write(&config, good).unwrap();
+    until_health(&farm, 0, "healthy\n");
+}
+
+#[test]
+fn broker_that_stands_still_is_no_health() {
+    let farm = Farm::new();
+    let broker = farm.serve_ready();
+    broker.signal(Signal::STOP);
+    let (code, _) = health(&farm);
+    broker.signal(Signal::CONT);
+    assert_eq!(code, Some(1));
+}
+
+#[test]
 fn missing_report_is_no_health() {
     let farm = Farm::with(&["--report", "text"]);
     let _broker = farm.serve_ready();

@@ -65,6 +65,11 @@ impl Descriptors {
         (descriptors, limited)
     }
 
+    /// Whether a broker may not start with them.
+    pub fn are_too_few(&self) -> bool {
+        self.allowed < FOR_THE_REST
+    }
+
     /// For how many peers they are enough, of so many that are wanted, and what is to be said when these
     /// are fewer.
     pub fn peers(&self, wanted: usize) -> (usize, Option<String>) {

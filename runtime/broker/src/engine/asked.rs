@@ -241,6 +241,12 @@ impl Broker {
 
     /// Reads configuration and manifests again and applies them as a whole, or not at all.
     pub(super) fn reload(&mut self) -> Result<Vec<String>, LoadError> {
+        let loaded = self.load_anew();
+        self.not_in_force = loaded.as_ref().err().map(ToString::to_string);
+        loaded
+    }
+
+    fn load_anew(&mut self) -> Result<Vec<String>, LoadError> {
         let loaded = self.sources.load()?;
         self.sources.still_has(&self.loaded, &loaded)?;
         let changes = differences(&self.loaded, &loaded);
@@ -285,9 +291,10 @@ impl Broker {
             return;
         }
         let (sources, read) = (self.sources.clone(), self.loaded.read.clone());
-        let lock = self.state_directory.lock.clone();
+        let (lock, store) = (self.state_directory.lock.clone(), self.store.clone());
         // Where no thread can be started now, one may in a second.
         let look = move || {
+            store.gate.iter().for_each(|it| it.keep_its_file());
             let around = Around {
                 replaced: OwnProgram::this().replaced(),
                 state_is_gone: lock.is_some_and(|it| !it.is_in_place()),
@@ -383,6 +390,11 @@ impl Broker {
         }
         if let Some(text) = self.said_of_state() {
             troubles.push(text);
+        }
+        if let Some(why) = &self.not_in_force {
+            troubles.push(format!(
+                "the configuration in force is not the one on disk, with which no broker would start: {why}"
+            ));
         }
         troubles
     }

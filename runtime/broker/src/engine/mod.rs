@@ -121,6 +121,8 @@ pub struct Broker {
     children: Children,
     sources: Sources,
     loaded: Loaded,
+    /// Why the configuration or a manifest as it lies there now is not in force.
+    not_in_force: Option<String>,
     in_force: Arc<InForce>,
     /// Of all that was last looked at for what is in force: at first from before it was read, because what has
     /// changed since is not.

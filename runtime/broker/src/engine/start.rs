@@ -47,6 +47,10 @@ impl Broker {
         let sources = sources_of(&options);
         let loaded = sources.load()?;
         let (descriptors, limited) = Descriptors::for_peers(&mut options.host.max_peers);
+        // The bus may not even start with so few, and its error would not say why.
+        if let Some(said) = limited.as_ref().filter(|_| descriptors.are_too_few()) {
+            tracing::warn!("{said}");
+        }
         let (inbox, senders) = Inbox::new();
         let early = early_children(&mut options, &loaded, descriptors, &inbox);
         let mut host = Host::start(&options.instance, shape(&options, &loaded))?;
@@ -74,6 +78,7 @@ impl Broker {
             sources,
             fingerprint: loaded.read.clone(),
             loaded,
+            not_in_force: None,
             in_force,
             watcher: None,
             watching: None,

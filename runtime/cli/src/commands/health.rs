@@ -1,5 +1,7 @@
 //! `qcbus status --health`: whether a broker needs a look, for scripts and service managers.
 
+use std::collections::BTreeMap;
+
 use qcbus_messages::control::{NoticeStatus, PeerStatus, Status};
 use qcbus_messages::{Exit, shown};
 
@@ -37,8 +39,14 @@ pub fn reasons(status: &Status) -> Vec<String> {
     if let Some(more) = status.unseen.len().checked_sub(NAMED).filter(|it| *it > 0) {
         reasons.push(format!("{more} more cannot be looked at"));
     }
-    let told = status.notices.iter().filter(|it| is_trouble(it));
-    reasons.extend(told.map(|it| format!("{} ({} s ago)", it.text, it.ago_s)));
+    let mut told: BTreeMap<&str, u64> = BTreeMap::new();
+    for notice in status.notices.iter().filter(|it| is_trouble(it)) {
+        // What is tried again is told again.
+        let ago_s = told.entry(&notice.text).or_insert(notice.ago_s);
+        *ago_s = notice.ago_s.min(*ago_s);
+    }
+    let told = told.into_iter();
+    reasons.extend(told.map(|(text, ago_s)| format!("{text} ({ago_s} s ago)")));
     if status.watching.is_empty() {
         reasons.push("no directory is watched".to_owned());
     }
@@ -144,6 +152,11 @@ mod tests {
         };
         assert_eq!(told(notice("not-written", 3)), ["no space left (3 s ago)"]);
         assert!(told(notice("not-written", 3600)).is_empty());
+        let tried_again = reasons(&Status {
+            notices: [9, 5, 7].map(|ago_s| notice("not-written", ago_s)).into(),
+            ..status()
+        });
+        assert_eq!(tried_again, ["no space left (5 s ago)"]);
         assert!(told(notice("held-back", 3)).is_empty());
     }
 

@@ -19,6 +19,8 @@ pub fn run(args: &StatusArgs) -> Exit {
             talk::fail(&format!("the broker answered something else: {other:?}"));
             return Exit::Internal;
         }
+        // It is there and does not answer, which has been said.
+        Err(Exit::Internal) if args.health => return Exit::Rejected,
         Err(exit) => return exit,
     };
     if args.health {
