@@ -10,6 +10,8 @@ use crate::seams::is_simulated;
 const PER_PEER: u64 = 26;
 /// What everything else takes: the bus, the journal, threads that read and write, commands that ask.
 const FOR_THE_REST: u64 = 448;
+/// With fewer the bus does not start.
+const FOR_THE_BUS: u64 = 64;
 /// More is of no use, and some programs walk through all that they may have.
 const ENOUGH: u64 = 1 << 16;
 
@@ -62,12 +64,14 @@ impl Descriptors {
         let descriptors = Descriptors::take();
         let (peers, limited) = descriptors.peers(*most);
         *most = peers;
+        // The bus may not even start with so few, and its error would not say why.
+        if let Some(said) = limited
+            .as_ref()
+            .filter(|_| descriptors.allowed < FOR_THE_BUS)
+        {
+            tracing::warn!("{said}");
+        }
         (descriptors, limited)
-    }
-
-    /// Whether a broker may not start with them.
-    pub fn are_too_few(&self) -> bool {
-        self.allowed < FOR_THE_REST
     }
 
     /// For how many peers they are enough, of so many that are wanted, and what is to be said when these

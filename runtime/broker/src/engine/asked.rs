@@ -5,9 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_document::FileKind;
-use qcbus_messages::control::{
-    BundleStanding, Request, Response, Status, Terms, Unfinished, Unseen,
-};
+use qcbus_messages::control::{BundleStanding, Request, Response, Terms};
 use qcbus_messages::path_text::to_text;
 use tokio::sync::oneshot;
 
@@ -16,14 +14,9 @@ use super::{Broker, Told};
 use crate::control::Asked;
 use crate::core::{Errand, Event, Notice, Stamp, Ticket, Until};
 use crate::demand::InForce;
-use crate::gate::Gate;
 use crate::own_program::OwnProgram;
 use crate::reload::{Fingerprint, LoadError, command_of, differences};
 use crate::terms::{differs, terms};
-use crate::watch::Why;
-
-/// Most that is told of what could not be looked at, or is not finished.
-const UNSEEN_SHOWN: usize = 100;
 
 impl Broker {
     pub(super) fn asked(&mut self, asked: Asked) -> bool {
@@ -313,7 +306,7 @@ impl Broker {
         }
     }
 
-    fn said_of_state(&self) -> Option<String> {
+    pub(super) fn said_of_state(&self) -> Option<String> {
         let directory = &self.state_directory;
         let lock = directory.lock.as_ref().filter(|_| directory.is_gone)?;
         Some(format!(
@@ -355,66 +348,6 @@ impl Broker {
                 )));
             }
         }
-    }
-
-    pub(super) fn status(&self) -> Status {
-        let mut status = self.state.status();
-        for peer in &mut status.peers {
-            peer.sandbox = self.children.sandbox_of(peer);
-        }
-        Status {
-            instance: self.options.instance.name().to_owned(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            pid: std::process::id(),
-            uptime_s: self.started.elapsed().as_secs(),
-            watching: self.options.roots.clone(),
-            watch_mode: self.watch_mode.clone(),
-            out: self.options.out.clone(),
-            unseen: self.all_unseen(),
-            unfinished: self.first_unfinished(),
-            state: self.options.state.clone(),
-            bundles_d: self.options.bundles_d.clone(),
-            troubles: self.troubles(),
-            replaced: self.looks.around.replaced.clone(),
-            scratch: self.looks.around.scratch.clone(),
-            gate: self.store.gate.as_ref().map(Gate::status),
-            ..status
-        }
-    }
-
-    /// What keeps the broker from its work at this moment.
-    fn troubles(&self) -> Vec<String> {
-        let mut troubles: Vec<String> = self.writers.troubles().into_iter().collect();
-        if self.is_nobody_watching() {
-            troubles.push("nobody watches for changes".to_owned());
-        }
-        if let Some(text) = self.said_of_state() {
-            troubles.push(text);
-        }
-        if let Some(why) = &self.not_in_force {
-            troubles.push(format!(
-                "the configuration in force is not the one on disk, with which no broker would start: {why}"
-            ));
-        }
-        troubles
-    }
-
-    fn first_unfinished(&self) -> Vec<Unfinished> {
-        let unfinished = |(path, why): (&Arc<Path>, &Why)| Unfinished {
-            path: path.to_path_buf(),
-            why: why.to_string(),
-        };
-        let all = self.unfinished.iter().map(unfinished);
-        all.take(UNSEEN_SHOWN).collect()
-    }
-
-    fn all_unseen(&self) -> Vec<Unseen> {
-        let unseen = |(path, why): (&PathBuf, &String)| Unseen {
-            path: path.clone(),
-            why: why.clone(),
-        };
-        // Whoever asks wants to see where to look, and no answer of any length.
-        self.unseen.iter().take(UNSEEN_SHOWN).map(unseen).collect()
     }
 }
 

@@ -7,6 +7,7 @@ mod looks;
 #[cfg(test)]
 mod simulated;
 mod start;
+mod status;
 mod stores;
 mod systemd;
 mod watching;

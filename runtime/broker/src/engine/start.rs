@@ -47,10 +47,6 @@ impl Broker {
         let sources = sources_of(&options);
         let loaded = sources.load()?;
         let (descriptors, limited) = Descriptors::for_peers(&mut options.host.max_peers);
-        // The bus may not even start with so few, and its error would not say why.
-        if let Some(said) = limited.as_ref().filter(|_| descriptors.are_too_few()) {
-            tracing::warn!("{said}");
-        }
         let (inbox, senders) = Inbox::new();
         let early = early_children(&mut options, &loaded, descriptors, &inbox);
         let mut host = Host::start(&options.instance, shape(&options, &loaded))?;
@@ -58,8 +54,7 @@ impl Broker {
         let journal = journal_of(&options)?;
         let (numbers, members) = remembered_by(journal.as_ref())?;
         options.settings.numbers = numbers.max(host.generation());
-        let state_directory = StateDirectory::of(journal.as_ref());
-        let lock = results_of(&options)?;
+        let (state_directory, lock) = (StateDirectory::of(journal.as_ref()), results_of(&options)?);
         let in_force = Arc::new(InForce::of(&sources, &loaded)?);
         host.set_config(in_force.digest, &in_force.encoded);
         let (control, looks) = (control_of(&options, senders.asked)?, Looks::default());
