@@ -11,8 +11,8 @@
 
 mod support;
 
-use std::fs::File;
-use std::os::unix::fs::symlink;
+use std::fs::{File, Permissions};
+use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -231,6 +231,27 @@ fn leases_hold_up_nobody() {
     }
     assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
     assert!(broker.wait().success());
+}
+
+/// A process of the same user that was stopped at the wrong moment, in a debugger for instance, keeps the lock by which
+/// one after the other takes shared memory.
+#[test]
+fn a_stopped_process_keeps_no_bundle_of_others_from_joining() {
+    let farm = Farm::new();
+    let runtime = farm.base().join("runtime");
+    std::fs::create_dir_all(runtime.join("qcbus")).unwrap();
+    for directory in [&runtime, &runtime.join("qcbus")] {
+        std::fs::set_permissions(directory, Permissions::from_mode(0o700)).unwrap();
+    }
+    let held = File::create(runtime.join("qcbus/.memory")).unwrap();
+    held.lock().unwrap();
+    let mut command = farm.serve_command();
+    command.env("XDG_RUNTIME_DIR", &runtime);
+    let _broker = Broker::start(&mut command, &farm.log_path());
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    is_judged(&farm, "a.xodr", &Content::Good(1));
+    let log = farm.log();
+    assert!(!log.contains("does not answer"), "{log}");
 }
 
 #[test]

@@ -10,6 +10,7 @@ use std::io;
 use std::ops::Range;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -22,9 +23,13 @@ use crate::instance::Instance;
 /// Where it is.
 pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 
-/// A turn takes milliseconds, and many processes may stand in line on a busy machine. Whoever waits
-/// longer waits for a process that was stopped in its turn.
-const IN_LINE: Duration = Duration::from_secs(10);
+/// A turn takes milliseconds, and several processes may stand in line on a busy machine. Whoever waits
+/// longer waits for a process that was stopped in its turn. Well below the time in which a peer must have joined.
+const IN_LINE: Duration = Duration::from_secs(2);
+
+/// Whether this process has last waited for a turn in vain. It does not wait again before it has had one: each wait
+/// would be as long, and whoever joins would be too late.
+static IN_VAIN: AtomicBool = AtomicBool::new(false);
 
 /// Bytes that are had by one call: some hundred microseconds.
 const HAVE_STEP: u64 = 256 << 10;
@@ -99,17 +104,27 @@ impl Turns {
     /// Waits for a turn, but not for ever: whoever was stopped in its turn must not stop the others.
     pub(crate) fn take(&self) -> Turn<'_> {
         let file = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let until = Instant::now() + IN_LINE;
-        let mut locked = false;
-        while let (false, Some(file)) = (locked, file.as_ref()) {
-            match flock(file, FlockOperation::NonBlockingLockExclusive) {
-                Ok(()) => locked = true,
-                Err(_) if Instant::now() >= until => break,
-                Err(_) => std::thread::sleep(Duration::from_millis(1)),
-            }
-        }
+        let locked = file.as_ref().is_some_and(wait_for);
         Turn { file, locked }
     }
+}
+
+/// Whether the lock was had within the time.
+fn wait_for(file: &File) -> bool {
+    let patience = match IN_VAIN.load(Ordering::Relaxed) {
+        true => Duration::ZERO,
+        false => IN_LINE,
+    };
+    let until = Instant::now() + patience;
+    let locked = loop {
+        match flock(file, FlockOperation::NonBlockingLockExclusive) {
+            Ok(()) => break true,
+            Err(_) if Instant::now() >= until => break false,
+            Err(_) => std::thread::sleep(Duration::from_millis(1)),
+        }
+    };
+    IN_VAIN.store(!locked, Ordering::Relaxed);
+    locked
 }
 
 /// Nobody else takes shared memory meanwhile.
