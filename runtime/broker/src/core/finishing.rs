@@ -7,7 +7,7 @@ use qcbus_messages::{JobId, Verdict};
 
 use super::action::Action;
 use super::files::{FileId, Priority, Stage};
-use super::jobs::{ActiveJob, JobStage, Share};
+use super::jobs::{ActiveJob, JobStage, NOTICE_PAUSE, Share};
 use super::notice::Notice;
 use super::outcome::{ShareOutcome, not_applicable, outcome};
 use super::types::{FinishedJob, Judged, StoreOutcome};
@@ -146,13 +146,16 @@ impl State {
             // What was found counts for nothing under another configuration.
             StoreOutcome::Outdated => self.begin_anew(id, actions),
             StoreOutcome::Failed(why) => {
-                if let Some(entry) = self.files.get_mut(file) {
-                    entry.half_written = true;
-                }
+                let entry = self.files.get_mut(file);
+                let is_new = entry.is_some_and(|it| !std::mem::replace(&mut it.half_written, true));
                 job.stage = JobStage::Finished(self.now + self.settings.retry_after);
                 let same = job.config == self.config;
                 self.shut_unstored(file, actions);
-                self.notice(Notice::NotWritten(why), actions);
+                // On a full disk every file would say the same with every try.
+                if is_new || self.now >= self.mute_unwritten_until {
+                    self.mute_unwritten_until = self.now + NOTICE_PAUSE;
+                    self.notice(Notice::NotWritten(why), actions);
+                }
                 if same {
                     self.reseat(id, actions);
                 } else {

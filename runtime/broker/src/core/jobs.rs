@@ -18,8 +18,8 @@ use super::staging::Staged;
 use super::types::{Input, Judged, PrepareFailure, PreparedJob, Reading};
 use super::{Actions, State};
 
-/// Between two notices that there is no room, or that files cannot be read for now.
-const ROOM_NOTICE_PAUSE: Duration = Duration::from_secs(10);
+/// Between two notices that there is no room, or that files cannot be read or results written for now.
+pub(super) const NOTICE_PAUSE: Duration = Duration::from_secs(10);
 
 /// Files without a place on the bus of which each is tried again in every pause.
 const TRIED_AT_ONCE: usize = 8;
@@ -245,7 +245,7 @@ impl State {
                 self.trials_give_way(id, actions);
                 // Every file in the queue would say the same and push out all other notices.
                 if self.now >= self.mute_room_until {
-                    self.mute_room_until = self.now + ROOM_NOTICE_PAUSE;
+                    self.mute_room_until = self.now + NOTICE_PAUSE;
                     self.notice(Notice::NoRoom(why.clone()), actions);
                 }
                 self.wait_for_room(id, &why, self.settings.retry_after, actions);
@@ -274,7 +274,7 @@ impl State {
         }
         entry.hindered += 1;
         if self.now >= self.mute_hindered_until {
-            self.mute_hindered_until = self.now + ROOM_NOTICE_PAUSE;
+            self.mute_hindered_until = self.now + NOTICE_PAUSE;
             let what = format!("{reason}; it is tried again");
             self.notice(Notice::NotRead(what), actions);
         }

@@ -123,6 +123,7 @@ pub struct State {
     /// Until then nobody need be told again that there is no room.
     mute_room_until: Duration,
     mute_hindered_until: Duration,
+    mute_unwritten_until: Duration,
     /// Files for which the bus had no place, in their order: with each job that ends one is tried again.
     crowded: VecDeque<files::FileId>,
     /// Files that have gone, and how often that is to be written to the journal: until it is, no reporter takes back
@@ -184,6 +185,7 @@ impl State {
             read_early: Vec::new(),
             mute_room_until: Duration::ZERO,
             mute_hindered_until: Duration::ZERO,
+            mute_unwritten_until: Duration::ZERO,
             crowded: VecDeque::new(),
             withdrawing: BTreeMap::new(),
             stuck_since: None,
