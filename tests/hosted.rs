@@ -28,8 +28,12 @@ const FINDS: &str = r#"{ begin; checker one completed "$(issue 1 "wrong in $inpu
 
 /// A module that is polite over small files and does this over real ones.
 fn install(path: &Path, script: &str) {
+    install_text(path, &format!("#!/bin/sh\n{MANNERS}\n{script}\n"));
+}
+
+fn install_text(path: &Path, text: &str) {
     let aside = path.with_extension("new");
-    std::fs::write(&aside, format!("#!/bin/sh\n{MANNERS}\n{script}\n")).unwrap();
+    std::fs::write(&aside, text).unwrap();
     std::fs::set_permissions(&aside, std::fs::Permissions::from_mode(0o755)).unwrap();
     std::fs::rename(&aside, path).unwrap();
 }
@@ -353,6 +357,35 @@ fn it_is_added_looked_at_upgraded_and_removed_as_any_bundle() {
             .iter()
             .all(|it| it.name != "guest")
     );
+}
+
+#[test]
+fn program_that_was_not_learned_judges_nothing() {
+    let (farm, program, _broker) = farm_with(FINDS);
+    let (code, text) = add(&farm, "guest", &program);
+    assert_eq!(code, Some(0), "{text}");
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Rejected);
+    // It cannot be learned, and finds nothing any more.
+    let fails = MANNERS.replacen("polite; exit 0", "exit 3", 1);
+    assert_ne!(fails, MANNERS);
+    install_text(&program, &format!("#!/bin/sh\n{fails}\npolite\n"));
+    let upgraded = farm.qcbus(&["bundle", "upgrade", "guest"]);
+    assert_ne!(upgraded.status.code(), Some(0), "{}", told(&upgraded).1);
+    farm.write("b.xodr", &Content::Good(2).bytes());
+    let verdict = farm.verdict("b.xodr");
+    assert_eq!(
+        verdict.verdict,
+        Verdict::Undetermined,
+        "{verdict:?}\n{}",
+        farm.log()
+    );
+    let health = farm.qcbus(&["status", "--health"]);
+    assert_eq!(health.status.code(), Some(1), "{}", told(&health).1);
+    // The former one is back.
+    install(&program, FINDS);
+    let back = || (farm.verdict("b.xodr").verdict == Verdict::Rejected).then_some(());
+    until_or("it judges again", back, || farm.log());
 }
 
 #[test]

@@ -141,7 +141,7 @@ impl Host {
             Ok(answered) => answered,
             Err(error) => {
                 // Behind the fence no other one can be started: whoever started this process starts a new one.
-                tracing::error!(module = name, %error, "the office is gone");
+                tracing::error!(module = name, %error, "nothing more can be run");
                 std::process::exit(i32::from(Exit::Internal.code()));
             }
         };

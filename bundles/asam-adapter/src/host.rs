@@ -55,10 +55,12 @@ pub fn run(
 }
 
 fn begin(
-    hosted: Hosted,
+    mut hosted: Hosted,
     count: usize,
     program: &[&str],
 ) -> Result<&'static qcbus_sdk::Bundle, String> {
+    // Before anything is run: each run looks whether they are still the same.
+    hosted.programs.iter_mut().for_each(crate::Program::look);
     let name = hosted.name.clone();
     let offices = Offices::start(count, &hosted, program)
         .map_err(|error| format!("`{name}` cannot be run: {error}"))?;

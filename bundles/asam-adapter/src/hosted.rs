@@ -8,6 +8,8 @@ use lexopt::ValueExt as _;
 use qcbus_document::FileKind;
 use qcbus_sdk::run::UsageError;
 
+use crate::program::Program;
+
 /// A one-shot module of ASAM's framework that takes part as a bundle.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hosted {
@@ -26,6 +28,8 @@ pub struct Hosted {
     pub kinds: Option<Vec<FileKind>>,
     /// What a run may use up.
     pub limits: Limits,
+    /// The files that the command runs, where they are known.
+    pub programs: Vec<Program>,
     /// Where private directories are made.
     pub scratch: PathBuf,
     /// Every run begins from nothing: no interpreter is kept that has loaded the module already.
@@ -89,6 +93,7 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Ask
             environment: Vec::new(),
             kinds: None,
             limits: Limits::default(),
+            programs: Vec::new(),
             scratch: usual_scratch(),
             is_cold: false,
         },
@@ -103,6 +108,13 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Ask
             Long("exec") => command = Some(parser.value()?.string()?),
             Long("application") => hosted.application = Some(parser.value()?.string()?),
             Long("directory") => hosted.directory = Some(parser.value()?.into()),
+            Long("program") => hosted.programs.push(Program::at(parser.value()?.into())),
+            Long("digest") => {
+                let digest = parser.value()?.parse()?;
+                if let Some(program) = hosted.programs.last_mut() {
+                    program.digest = Some(digest);
+                }
+            }
             Long("scratch") => hosted.scratch = parser.value()?.into(),
             Long("env") => hosted
                 .environment
@@ -153,6 +165,12 @@ impl Hosted {
         for kind in self.kinds.iter().flatten() {
             add("--kind", kind.as_str().into());
         }
+        for program in &self.programs {
+            add("--program", program.path.clone().into());
+            if let Some(digest) = program.digest {
+                add("--digest", digest.to_string().into());
+            }
+        }
         let limits = &self.limits;
         add("--seconds", limits.time.as_secs().to_string().into());
         add("--memory-mb", (limits.memory >> 20).to_string().into());
@@ -192,7 +210,8 @@ mod tests {
     #[test]
     fn what_is_hosted_reads_back_what_it_says() {
         let line = "--name a --exec x --application b --directory /d --env K=V=W --kind xodr --seconds 7 \
-                    --memory-mb 8 --output-mb 9 --scratch /s --cold --launch 3 --die-with-parent";
+                    --memory-mb 8 --output-mb 9 --program /p --digest 0707070707070707070707070707070707070707070707070707070707070707 \
+                    --program /q --scratch /s --cold --launch 3 --die-with-parent";
         let asked = parse(line.split_whitespace().map(OsString::from)).unwrap();
         assert_eq!(asked.rest, ["--launch", "3", "--die-with-parent"]);
         assert_eq!(asked.hosted.environment, [("K".into(), "V=W".into())]);

@@ -49,6 +49,8 @@ pub(crate) enum Answer {
     Ran(Ran),
     /// The module was not started.
     Not(String),
+    /// The program is not the one that was learned, for a person.
+    Changed(String),
 }
 
 /// A run that has ended.

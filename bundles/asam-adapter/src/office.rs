@@ -16,6 +16,7 @@ use crate::hosted::Hosted;
 use crate::keeper::Keeper;
 use crate::messages::{Answer, MOST, Ran, Request};
 use crate::process::{self, Broken, Run};
+use crate::program::Programs;
 use crate::scratch::{Room, Scratch};
 use crate::staging::Staged;
 use crate::written;
@@ -46,11 +47,13 @@ fn office(hosted: &Hosted) -> io::Result<()> {
         channel: Channel::from_socket(socket),
         may,
         keeper: Keeper::new(hosted.is_cold),
+        programs: Programs::new(&hosted.programs),
     };
     while let Some(message) = office.channel.receive(MOST)? {
         let (answer, result) = match office.answer(&message) {
             Ok((ran, result)) => (Answer::Ran(ran), result),
             Err(NotRun::Why(why) | NotRun::Unkept(why)) => (Answer::Not(why), Vec::new()),
+            Err(NotRun::Changed(why)) => (Answer::Changed(why), Vec::new()),
             Err(NotRun::Over) => return Ok(()),
             Err(NotRun::Lost(error)) => return Err(io::Error::other(error)),
         };
@@ -66,6 +69,8 @@ fn office(hosted: &Hosted) -> io::Result<()> {
 enum NotRun {
     /// For a person.
     Why(String),
+    /// The program is not the one that was learned.
+    Changed(String),
     /// Its interpreter has gone.
     Unkept(String),
     /// Nobody waits for it any more.
@@ -87,6 +92,7 @@ struct Office<'h> {
     /// What runs may do. `None`: they are not confined.
     may: Option<May>,
     keeper: Keeper,
+    programs: Programs,
 }
 
 /// What a run is prepared with.
@@ -119,6 +125,7 @@ impl Office<'_> {
 
     fn run(&mut self, message: &Message, plainly: bool) -> Result<(Ran, Vec<u8>), NotRun> {
         let request: Request = message.head()?;
+        self.is_as_learned()?;
         let prepared = self.prepare(&request, &message.body)?;
         let environment = self.environment(&prepared);
         let run = Run {
@@ -135,6 +142,8 @@ impl Office<'_> {
             Err(error @ Broken::Start(_)) => return Err(NotRun::Why(error.to_string())),
             Err(error @ Broken::Lasts(_)) => return Err(NotRun::Lost(error)),
         };
+        // It may have become another just before it was started.
+        self.is_as_learned()?;
         let text = |path: &Path| path.to_string_lossy().into_owned();
         let mut ran = Ran {
             fault: ended.fault,
@@ -161,6 +170,12 @@ impl Office<'_> {
             None => self.collect(&prepared, &mut ran),
         };
         Ok((ran, result))
+    }
+
+    fn is_as_learned(&mut self) -> Result<(), NotRun> {
+        self.programs
+            .changed()
+            .map_or(Ok(()), |why| Err(NotRun::Changed(why)))
     }
 
     fn prepare(&mut self, request: &Request, body: &[u8]) -> Result<Prepared, NotRun> {

@@ -41,7 +41,7 @@ impl Offices {
     /// Has the module run once, when an office is free.
     ///
     /// # Errors
-    /// When the office is gone.
+    /// When the office is gone, or the program is not the one that was learned: nothing more can be run.
     pub fn ask(&self, request: &Request, body: &[&[u8]]) -> io::Result<Answered> {
         let channel = self.take();
         let number = self.next.fetch_add(1, Ordering::Relaxed) ^ process_salt();
@@ -113,6 +113,7 @@ fn hear(channel: &Channel, number: u64) -> io::Result<Answered> {
         return Ok(match message.head()? {
             Answer::Ran(ran) => Ok((ran, message.body)),
             Answer::Not(why) => Err(why),
+            Answer::Changed(why) => return Err(io::Error::other(why)),
         });
     }
 }

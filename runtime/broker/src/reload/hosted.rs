@@ -93,6 +93,12 @@ impl Adapter {
         if once.cold {
             words.push("--cold".to_owned());
         }
+        // A report module judges nothing.
+        if role == Role::Bundle {
+            for file in programs::files_of(&words) {
+                words.extend(["--program".to_owned(), file.to_string_lossy().into_owned()]);
+            }
+        }
         let mut add =
             |option: &str, value: &str| words.extend([option.to_owned(), value.to_owned()]);
         for (limit, number) in &once.limits {

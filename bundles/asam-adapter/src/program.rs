@@ -1,0 +1,89 @@
+//! The files that a module's command runs: they must stay the ones from which it was learned what the module checks.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use qcbus_disk::{FileMark, foreign};
+use qcbus_messages::Digest;
+use sha2::{Digest as _, Sha256};
+
+/// Most bytes of such a file. A larger one is told from others by size, times and inode alone.
+const MOST: u64 = 256 << 20;
+
+/// A file that a command runs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Program {
+    /// Its absolute path.
+    pub path: PathBuf,
+    /// Of what it was when the module was learned; `None` where nobody has looked, or it could not be read.
+    pub digest: Option<Digest>,
+}
+
+impl Program {
+    /// Nobody has looked at it yet.
+    pub(crate) fn at(path: PathBuf) -> Program {
+        Program { path, digest: None }
+    }
+
+    /// Remembers what it is now.
+    pub(crate) fn look(&mut self) {
+        self.digest = digest_of(&self.path).ok();
+    }
+}
+
+fn digest_of(path: &Path) -> io::Result<Digest> {
+    let bytes = foreign::read(path, MOST)?;
+    Ok(Digest(Sha256::digest(bytes).into()))
+}
+
+/// Programs, and how each looked when it was last seen to be the one that was learned.
+#[derive(Debug)]
+pub(crate) struct Programs(Vec<(Program, Option<FileMark>)>);
+
+impl Programs {
+    pub(crate) fn new(programs: &[Program]) -> Programs {
+        Programs(programs.iter().map(|it| (it.clone(), None)).collect())
+    }
+
+    /// Why what would be run now is not what was learned, for a person.
+    pub(crate) fn changed(&mut self) -> Option<String> {
+        self.0.iter_mut().find_map(|(program, seen)| {
+            let digest = program.digest?;
+            let now = FileMark::at(&program.path);
+            if now.is_some() && now == *seen {
+                return None;
+            }
+            if digest_of(&program.path).is_ok_and(|it| it == digest) {
+                *seen = now;
+                return None;
+            }
+            Some(format!(
+                "{} is not the program any more from which it was learned what this module checks: that is learned \
+                 anew",
+                program.path.display()
+            ))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn program_with_other_bytes_is_named_and_the_same_bytes_are_not() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("module.py");
+        std::fs::write(&path, "one").unwrap();
+        let mut program = Program::at(path.clone());
+        program.look();
+        let mut programs = Programs::new(&[program]);
+        assert_eq!(programs.changed(), None);
+        std::fs::write(&path, "two").unwrap();
+        assert!(programs.changed().unwrap().contains("module.py"));
+        std::fs::remove_file(&path).unwrap();
+        assert!(programs.changed().is_some(), "it has gone");
+        std::fs::write(&path, "one").unwrap();
+        assert_eq!(programs.changed(), None, "it is back");
+    }
+}
