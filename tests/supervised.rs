@@ -246,6 +246,27 @@ fn configuration_that_is_not_in_force_is_no_health() {
 }
 
 #[test]
+fn demanded_bundle_that_is_missing_is_no_health() {
+    let mut farm = Farm::new();
+    let config = farm.base().join("config.xml");
+    let names = |second: &str| {
+        let bundle = |name: &str| format!("<CheckerBundle application=\"{name}\"/>");
+        format!(
+            "<Config>{}{}</Config>",
+            bundle("xodrBundle"),
+            bundle(second)
+        )
+    };
+    std::fs::write(&config, names("xoscBundle")).unwrap();
+    let option = ["-c".to_owned(), config.to_str().unwrap().to_owned()];
+    farm.arguments.extend(option);
+    let _broker = farm.serve_ready();
+    until_health(&farm, 0, "healthy\n");
+    std::fs::write(&config, names("nixBundle")).unwrap();
+    until_health(&farm, 1, "demands nixBundle, which has not joined\n");
+}
+
+#[test]
 fn broker_that_stands_still_is_no_health() {
     let farm = Farm::new();
     let broker = farm.serve_ready();

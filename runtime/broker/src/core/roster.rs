@@ -234,7 +234,7 @@ impl State {
     }
 
     /// Bundles that the configuration names and nobody has seen. A shadow that is named by its name need not judge.
-    fn absent_by_name(&self) -> Vec<String> {
+    pub(super) fn absent_by_name(&self) -> Vec<String> {
         let means = |named: &str, name: &str, alias: &str| self.demand.means(named, name, alias);
         let is_shadow = |named: &str| {
             let mut children = self.children.iter();

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
+use qcbus_document::FileKind;
 use qcbus_messages::Verdict;
 use qcbus_messages::control::{self, FileCounts, PeerStatus, QueueStatus, Status};
 
@@ -71,6 +72,20 @@ impl State {
             },
             ..Status::default()
         }
+    }
+
+    /// Why files cannot be accepted, whatever is in them.
+    pub fn hindrances(&self) -> Vec<String> {
+        let missing = self.absent_by_name().into_iter();
+        let missing = missing.filter_map(|name| self.hopeless(&name));
+        let is_unseated = |kind: &FileKind| {
+            let files = self.files.iter();
+            let mut there = files.filter(|(_, it)| it.present && it.errand.is_none());
+            self.seats(*kind).is_empty() && there.any(|(_, it)| it.kind == *kind)
+        };
+        let unseated = FileKind::ALL.into_iter().filter(is_unseated);
+        let unseated = unseated.map(|kind| format!("nobody must check .{} files", kind.as_str()));
+        missing.chain(unseated).collect()
     }
 
     /// The files that are there, in the order of their paths.

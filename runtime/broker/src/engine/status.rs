@@ -47,6 +47,7 @@ impl Broker {
         if let Some(text) = self.said_of_state() {
             troubles.push(text);
         }
+        troubles.extend(self.state.hindrances());
         if let Some(why) = &self.not_in_force {
             troubles.push(format!(
                 "the configuration in force is not the one on disk, with which no broker would start: {why}"
