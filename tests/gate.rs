@@ -104,6 +104,20 @@ fn all_that_is_accepted_is_published_with_what_it_needs() {
     assert_eq!((gate.published, gate.held_back), (15, 0), "{gate:?}");
 }
 
+/// Scripts wait for the verdict, and then run what lies behind the gate.
+#[test]
+fn accepted_file_lies_behind_the_gate_when_the_answer_comes() {
+    let farm = farm_of(&[], &[]);
+    let _broker = farm.serve_ready();
+    for number in 0..50 {
+        let bytes = Content::Good(number).bytes();
+        put(&farm, "a.xodr", &bytes);
+        assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
+        let there = std::fs::read(gate(&farm).join("a.xodr"));
+        assert!(there.is_ok_and(|it| it == bytes), "{number}");
+    }
+}
+
 #[test]
 fn a_map_goes_with_what_it_includes_and_comes_back_with_it() {
     let farm = farm_of(&[ISLAND, ISLAND_ROADS], &[]);

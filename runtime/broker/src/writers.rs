@@ -326,6 +326,7 @@ impl Writer {
     fn open_gate(&self, path: &Arc<Path>, judged: &Judged) -> Result<Option<Order>, Trouble> {
         self.store.open_gate(path, judged)?;
         let path = path.clone();
+        let _ = self.events.send(Event::Opened { path: path.clone() });
         Ok(judged.is_accepted().then_some(Order::Follow { path }))
     }
 

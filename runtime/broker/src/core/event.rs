@@ -61,6 +61,11 @@ pub enum Event {
         /// What it gave.
         outcome: StoreOutcome,
     },
+    /// A file whose acceptance stands after all is behind the gate again, or held back there.
+    Opened {
+        /// Its path.
+        path: Arc<Path>,
+    },
     /// That a file has gone is in the journal, with who is to take back a report about it.
     Withdrawn {
         /// Its path.

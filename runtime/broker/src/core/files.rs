@@ -58,6 +58,8 @@ pub struct FileEntry {
     pub touched: bool,
     /// What it is accepted for was taken from behind the gate, until it is known to stand.
     pub shut: bool,
+    /// How many times it is about to be published again: nobody is told before that it is accepted.
+    pub opening: u32,
     /// Not before then, after something failed for want of room or disk.
     pub not_before: Duration,
     /// The bus had no place for it, and it waits for one.
@@ -142,6 +144,7 @@ impl FileEntry {
             doubted: false,
             touched: false,
             shut: false,
+            opening: 0,
             anew: false,
             half_written: false,
             not_before: Duration::ZERO,

@@ -448,6 +448,7 @@ impl State {
         };
         let path = entry.path.clone();
         if std::mem::take(&mut entry.shut) {
+            entry.opening += 1;
             let (path, judged) = (path.clone(), judged.clone());
             actions.push(Action::OpenGate { path, judged });
         }

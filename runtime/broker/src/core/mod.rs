@@ -233,6 +233,7 @@ impl State {
             Event::Scanned => self.scanned(&mut actions),
             Event::Prepared { job, result } => self.was_read(job, result, &mut actions),
             Event::Stored { job, outcome } => self.stored(job, outcome, &mut actions),
+            Event::Opened { path } => self.opened(&path, &mut actions),
             Event::Withdrawn { path } => self.withdrawn(&path, &mut actions),
             Event::Hello { session, hello } => self.hello(session, &hello, &mut actions),
             Event::Message { session, message } => {

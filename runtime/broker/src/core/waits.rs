@@ -136,11 +136,23 @@ impl State {
             settled
                 && entry.present
                 && !entry.doubted
+                && entry.opening == 0
                 && self.stands(entry.kind, judged)
                 && self.rests_firmly(judged)
         };
         let judged = entry.judged.clone().filter(stands)?;
         Some((entry.path.clone(), judged))
+    }
+
+    /// An acceptance lies behind the gate again: who waits for it may be told.
+    pub(super) fn opened(&mut self, path: &Path, actions: &mut Actions) {
+        let Some(id) = self.files.id(path) else {
+            return;
+        };
+        if let Some(entry) = self.files.get_mut(id) {
+            entry.opening = entry.opening.saturating_sub(1);
+        }
+        self.settle_waits(id, actions);
     }
 
     /// Answers clients that wait for reports of which nobody is in debt any more: a reporter may have been removed.

@@ -153,10 +153,13 @@ impl World {
     pub fn event(&mut self, event: Event) {
         self.clients_look();
         let other_terms = self.brings_other_terms(&event);
-        let mut withdrawn = Vec::new();
+        let (mut withdrawn, mut opened) = (Vec::new(), Vec::new());
         for action in self.state.handle(self.now, event) {
             if let Action::Withdraw { path, .. } = &action {
                 withdrawn.push(path.clone());
+            }
+            if let Action::OpenGate { path, .. } = &action {
+                opened.push(path.clone());
             }
             self.is_for_clients_alone(&action);
             self.desk_hears(&action);
@@ -165,6 +168,9 @@ impl World {
         }
         for path in withdrawn {
             self.event(Event::Withdrawn { path });
+        }
+        for path in opened {
+            self.event(Event::Opened { path });
         }
         self.gate_must_be_true();
         self.clients_leave_no_trace();
