@@ -7,7 +7,7 @@ use qcbus_disk::{FileMark, foreign};
 use qcbus_messages::Digest;
 use sha2::{Digest as _, Sha256};
 
-/// Most bytes of such a file. A larger one is told from others by size, times and inode alone.
+/// Most bytes of such a file. A larger one, and one that cannot be read, is not compared.
 const MOST: u64 = 256 << 20;
 
 /// A file that a command runs.
