@@ -87,6 +87,24 @@ fn mistakes_are_said_with_what_to_do() {
 }
 
 #[test]
+fn parameter_that_every_checker_has_is_in_order_and_one_that_it_cannot_read_is_not() {
+    let desk = Desk::new();
+    let config = |name: &str, value: &str| {
+        format!(
+            "<Config><CheckerBundle application=\"xodrBundle\">\n\
+             <Checker checkerId=\"check_qcbus_xodr_road_linkage_ends_meet\">\n\
+             <Param name=\"{name}\" value=\"{value}\"/></Checker></CheckerBundle></Config>\n"
+        )
+    };
+    desk.write("listed.xml", config("qcbus.max_issues", "5"));
+    desk.write("comma.xml", config("gap_broken_from", "0,05"));
+    insta::assert_snapshot!(session(
+        &desk,
+        &["config check listed.xml", "config check comma.xml"]
+    ));
+}
+
+#[test]
 fn wait_knows_why_there_will_be_no_verdict() {
     use support::farm::Farm;
     let farm = Farm::new();

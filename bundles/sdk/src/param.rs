@@ -1,5 +1,6 @@
 //! Parameters of rules: declared beside the rule, set in a configuration, shown in the result.
 
+use qcbus_formats::config::{ParamType, ParamValue};
 use qcbus_formats::xqar;
 
 /// A parameter that a rule reads, with the value it has unless a configuration says otherwise.
@@ -72,13 +73,35 @@ impl Param {
         }
     }
 
+    /// What its value can be.
+    pub fn value_type(&self) -> ParamType {
+        match self.default {
+            Default::Number(_) => ParamType::Number,
+            Default::Flag(_) => ParamType::Flag,
+            Default::Text(_) => ParamType::Text,
+        }
+    }
+
     /// The default as a configuration would write it.
     pub fn default_text(&self) -> String {
+        self.default_value().to_string()
+    }
+
+    fn default_value(&self) -> ParamValue {
         match self.default {
-            Default::Number(number) => number.to_string(),
-            Default::Flag(flag) => flag.to_string(),
-            Default::Text(text) => text.to_owned(),
+            Default::Number(number) => ParamValue::Number(number),
+            Default::Flag(flag) => ParamValue::Flag(flag),
+            Default::Text(text) => ParamValue::Text(text.to_owned()),
         }
+    }
+
+    fn read(&self, text: String) -> Result<ParamValue, ParamError> {
+        let value_type = self.value_type();
+        value_type.read(&text).ok_or(ParamError {
+            name: self.name,
+            value: text,
+            expected: value_type.expected(),
+        })
     }
 
     /// Meaning and unit in one sentence.
@@ -110,14 +133,7 @@ pub struct ParamError {
 /// The values that one checker works with.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values {
-    values: Vec<(Param, Value)>,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-enum Value {
-    Number(f64),
-    Flag(bool),
-    Text(String),
+    values: Vec<(Param, ParamValue)>,
 }
 
 impl Values {
@@ -131,8 +147,8 @@ impl Values {
     ) -> Result<Values, ParamError> {
         let values = params.iter().chain([&MAX_ISSUES]).map(|param| {
             let value = match configured(param.name) {
-                Some(text) => Value::read(param, text)?,
-                None => Value::of_default(param),
+                Some(text) => param.read(text)?,
+                None => param.default_value(),
             };
             Ok((*param, value))
         });
@@ -144,14 +160,14 @@ impl Values {
     /// The values as a result file lists them: what the rule declares, and the number of listed
     /// findings when it was changed.
     pub fn listed(&self) -> Vec<xqar::Param> {
-        let says_something = |(param, value): &&(Param, Value)| {
-            param.name != MAX_ISSUES.name || *value != Value::of_default(param)
+        let says_something = |(param, value): &&(Param, ParamValue)| {
+            param.name != MAX_ISSUES.name || *value != param.default_value()
         };
         let listed = self.values.iter().filter(says_something);
         listed
             .map(|(param, value)| xqar::Param {
                 name: param.name.to_owned(),
-                value: value.to_text(),
+                value: value.to_string(),
             })
             .collect()
     }
@@ -159,7 +175,7 @@ impl Values {
     /// A number; the parameter's default when the rule did not declare it.
     pub fn number(&self, param: &Param) -> f64 {
         match (self.get(param), param.default) {
-            (Some(Value::Number(number)), _) | (_, Default::Number(number)) => number,
+            (Some(ParamValue::Number(number)), _) | (_, Default::Number(number)) => number,
             _ => f64::NAN,
         }
     }
@@ -167,7 +183,7 @@ impl Values {
     /// A flag; the parameter's default when the rule did not declare it.
     pub fn flag(&self, param: &Param) -> bool {
         match (self.get(param), param.default) {
-            (Some(Value::Flag(flag)), _) | (_, Default::Flag(flag)) => flag,
+            (Some(ParamValue::Flag(flag)), _) | (_, Default::Flag(flag)) => flag,
             _ => false,
         }
     }
@@ -175,8 +191,8 @@ impl Values {
     /// A text; the parameter's default when the rule did not declare it.
     pub fn text(&self, param: &Param) -> String {
         self.get(param)
-            .unwrap_or_else(|| Value::of_default(param))
-            .to_text()
+            .unwrap_or_else(|| param.default_value())
+            .to_string()
     }
 
     /// Puts a text in the place of what was configured.
@@ -186,61 +202,15 @@ impl Values {
             .iter_mut()
             .find(|(known, _)| known.name == param.name);
         if let Some((_, value)) = known {
-            *value = Value::Text(text);
+            *value = ParamValue::Text(text);
         }
     }
 
-    fn get(&self, param: &Param) -> Option<Value> {
+    fn get(&self, param: &Param) -> Option<ParamValue> {
         self.values
             .iter()
             .find(|(known, _)| known.name == param.name)
             .map(|(_, value)| value.clone())
-    }
-}
-
-impl Value {
-    fn of_default(param: &Param) -> Value {
-        match param.default {
-            Default::Number(number) => Value::Number(number),
-            Default::Flag(flag) => Value::Flag(flag),
-            Default::Text(text) => Value::Text(text.to_owned()),
-        }
-    }
-
-    fn read(param: &Param, text: String) -> Result<Value, ParamError> {
-        let trimmed = text.trim();
-        let (value, expected) = match param.default {
-            Default::Number(_) => {
-                let number = trimmed
-                    .parse()
-                    .ok()
-                    .filter(|number: &f64| number.is_finite());
-                (number.map(Value::Number), "a finite number")
-            }
-            Default::Flag(_) => (read_flag(trimmed).map(Value::Flag), "`true` or `false`"),
-            Default::Text(_) => (Some(Value::Text(text.clone())), "a text"),
-        };
-        value.ok_or(ParamError {
-            name: param.name,
-            value: text,
-            expected,
-        })
-    }
-
-    fn to_text(&self) -> String {
-        match self {
-            Value::Number(number) => number.to_string(),
-            Value::Flag(flag) => flag.to_string(),
-            Value::Text(text) => text.clone(),
-        }
-    }
-}
-
-fn read_flag(text: &str) -> Option<bool> {
-    match text {
-        "true" | "1" => Some(true),
-        "false" | "0" => Some(false),
-        _ => None,
     }
 }
 

@@ -9,8 +9,8 @@ mod common;
 
 use common::param;
 use qcbus_formats::config::{
-    Config, Known, KnownBundle, KnownChecker, Levels, Oddity, Parsed, Selected, Selection,
-    same_bundle, same_reporter,
+    Config, Known, KnownBundle, KnownChecker, KnownParam, Levels, Oddity, ParamType, Parsed,
+    Selected, Selection, same_bundle, same_reporter,
 };
 use qcbus_formats::xqar::Level;
 
@@ -264,11 +264,62 @@ fn applications_mean_bundles_by_name_alias_and_published_name() {
     }
 }
 
+fn number(name: &str) -> KnownParam {
+    KnownParam {
+        name: name.into(),
+        value: ParamType::Number,
+    }
+}
+
+/// A checker that cannot read its parameter checks nothing, so whoever looks at a configuration
+/// beforehand hears of it: at the checker, in the bundle and beside the bundles.
+#[test]
+fn value_that_no_checker_can_read_is_told_at_every_place() {
+    let flag = KnownParam {
+        name: "strict".into(),
+        value: ParamType::Flag,
+    };
+    let checker = KnownChecker {
+        id: "check_lanes".into(),
+        params: vec![number("tolerance"), flag],
+    };
+    let known = Known {
+        bundles: vec![KnownBundle {
+            name: "xodrBundle".into(),
+            alias: "xodr".into(),
+            checkers: Some(vec![checker]),
+        }],
+        reporters: vec![],
+    };
+    let told_of = |param: &str, value: &str| -> Vec<u64> {
+        let param = format!(r#"<Param name="{param}" value="{value}"/>"#);
+        let text = format!(
+            "<Config>\n{param}\n<CheckerBundle application='xodr'>\n{param}\n\
+             <Checker checkerId='check_lanes'>\n{param}</Checker></CheckerBundle></Config>"
+        );
+        let oddities = parse(&text).all_oddities(&known);
+        for oddity in &oddities {
+            assert_eq!(oddity.level, Level::Warning);
+            let named = oddity.text.contains(&format!("is `{value}`, but must be"));
+            assert!(named, "{oddity:?}");
+        }
+        oddities.iter().map(|oddity| oddity.row).collect()
+    };
+    for wrong in ["0,05", "abc", "", "nan", "inf", "1 m"] {
+        assert_eq!(told_of("tolerance", wrong), [2, 4, 6], "{wrong}");
+    }
+    for right in ["0.05", " 5e-2 ", "0", "-1"] {
+        assert!(told_of("tolerance", right).is_empty(), "{right}");
+    }
+    assert_eq!(told_of("strict", "yes"), [2, 4, 6]);
+    assert!(told_of("strict", "true").is_empty());
+}
+
 #[test]
 fn what_nobody_knows_is_told() {
     let checker = |id: &str, params: &[&str]| KnownChecker {
         id: id.into(),
-        params: params.iter().map(|name| (*name).into()).collect(),
+        params: params.iter().map(|name| number(name)).collect(),
     };
     let known = Known {
         bundles: vec![
@@ -355,7 +406,7 @@ fn two_names_of_one_bundle_are_told() {
 fn what_only_a_bundle_can_tell_is_said_to_be_unknown() {
     let checker = KnownChecker {
         id: "check_lanes".into(),
-        params: vec!["tolerance".into()],
+        params: vec![number("tolerance")],
     };
     let bundle = |name: &str, checkers| KnownBundle {
         name: name.into(),

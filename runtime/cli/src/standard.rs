@@ -7,10 +7,10 @@ use qcbus_broker::reload::Adapter;
 use qcbus_broker::{ChildSpec, Restart};
 use qcbus_document::FileKind;
 use qcbus_formats::Text;
-use qcbus_formats::config::{Known, KnownBundle, KnownChecker, Names};
+use qcbus_formats::config::{Known, KnownBundle, KnownChecker, KnownParam, Names};
 use qcbus_messages::Role;
 use qcbus_reporter_sdk::{Registration, RulePage, rule_name};
-use qcbus_sdk::{Bundle, Checker, UserFiles};
+use qcbus_sdk::{Bundle, Checker, MAX_ISSUES, UserFiles};
 
 /// The standard bundles.
 pub static BUNDLES: [&Bundle; 3] = [
@@ -237,12 +237,7 @@ pub const ASAM_REPORTER: &str = "asam-reporter";
 pub fn known() -> Known {
     let bundle = |bundle: &&Bundle| {
         let checker = |checker: Checker| KnownChecker {
-            params: checker
-                .facts
-                .params
-                .iter()
-                .map(|param| param.name.to_owned())
-                .collect(),
+            params: params(&checker),
             id: checker.id,
         };
         KnownBundle {
@@ -255,4 +250,13 @@ pub fn known() -> Known {
         bundles: BUNDLES.iter().map(bundle).collect(),
         reporters: REPORTERS.iter().map(|it| it.name.to_owned()).collect(),
     }
+}
+
+fn params(checker: &Checker) -> Vec<KnownParam> {
+    let declared = checker.facts.params.iter().chain([&MAX_ISSUES]);
+    let known = declared.map(|param| KnownParam {
+        name: param.name.to_owned(),
+        value: param.value_type(),
+    });
+    known.collect()
 }

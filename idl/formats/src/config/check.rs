@@ -1,11 +1,11 @@
 //! Comparing a configuration with what is really there.
 
-use std::collections::HashSet;
+use std::collections::BTreeSet;
 
 use super::lookup::canonical_bundle;
 use super::{
-    BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, LEVEL_PARAM, Oddity, Parsed,
-    ReportConfig, SCENARIO_PATH_PARAM, TextPosition, same_bundle, same_reporter,
+    BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, LEVEL_PARAM, Oddity, ParamType,
+    Parsed, ReportConfig, SCENARIO_PATH_PARAM, TextPosition, same_bundle, same_reporter,
 };
 use crate::distance::{DID_YOU_MEAN, did_you_mean};
 
@@ -34,9 +34,21 @@ pub struct KnownBundle {
 pub struct KnownChecker {
     /// Its identifier.
     pub id: String,
-    /// The names of its parameters.
-    pub params: Vec<String>,
+    /// Its parameters.
+    pub params: Vec<KnownParam>,
 }
+
+/// What is known about a parameter of a checker.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KnownParam {
+    /// Its name, such as `tolerance`.
+    pub name: String,
+    /// What its value can be.
+    pub value: ParamType,
+}
+
+/// The parameters that are read at some place, by name; a name may be read in several ways.
+type Names<'a> = BTreeSet<(&'a str, ParamType)>;
 
 /// Parameters of bundles that ASAM's framework reads, and those that reports read.
 const FRAMEWORK_PARAMS: [&str; 4] = ["resultFile", "strResultFile", "InputFile", LEVEL_PARAM];
@@ -88,14 +100,15 @@ impl Config {
 
     /// A global parameter may be meant for any bundle or report.
     fn check_global_params(&self, known: &Known, oddities: &mut Vec<Oddity>) {
-        let mut names: HashSet<&str> = FRAMEWORK_PARAMS
+        let mut names: Names<'_> = FRAMEWORK_PARAMS
             .into_iter()
             .chain(INPUT_PARAMS)
             .chain(REPORT_PARAMS)
             .chain([SCENARIO_PATH_PARAM])
+            .map(|name| (name, ParamType::Text))
             .collect();
-        names.extend(known.bundles.iter().flat_map(KnownBundle::param_names));
-        names.remove(LEVEL_PARAM);
+        names.retain(|(name, _)| *name != LEVEL_PARAM);
+        names.extend(known.bundles.iter().flat_map(KnownBundle::params));
         let what = "no bundle or report reads a global parameter";
         // A bundle whose parameters are not known may read any, but hardly one that is so near to
         // another's.
@@ -103,14 +116,22 @@ impl Config {
         let mut found = Vec::new();
         check_params(&self.params, &names, what, &mut found);
         found.retain(|oddity| all_known || oddity.text.contains(DID_YOU_MEAN));
+        check_values(&self.params, &names, &mut found);
         oddities.append(&mut found);
     }
 }
 
 impl KnownBundle {
-    fn param_names(&self) -> impl Iterator<Item = &str> {
+    fn params(&self) -> impl Iterator<Item = (&str, ParamType)> {
         let checkers = self.checkers.iter().flatten();
-        checkers.flat_map(|checker| checker.params.iter().map(String::as_str))
+        checkers.flat_map(KnownChecker::params)
+    }
+}
+
+impl KnownChecker {
+    fn params(&self) -> impl Iterator<Item = (&str, ParamType)> {
+        let params = self.params.iter();
+        params.map(|param| (param.name.as_str(), param.value))
     }
 }
 
@@ -128,11 +149,16 @@ fn check_bundle(bundle: &BundleConfig, known: &Known, oddities: &mut Vec<Oddity>
         oddities.push(unknown_catalogue(bundle));
         return;
     };
-    let mut names: HashSet<&str> = FRAMEWORK_PARAMS.into_iter().chain(INPUT_PARAMS).collect();
-    names.extend(found.param_names());
-    names.remove(LEVEL_PARAM);
+    let mut names: Names<'_> = FRAMEWORK_PARAMS
+        .into_iter()
+        .chain(INPUT_PARAMS)
+        .filter(|name| *name != LEVEL_PARAM)
+        .map(|name| (name, ParamType::Text))
+        .collect();
+    names.extend(found.params());
     let what = format!("no checker of bundle `{}` reads a parameter", found.name);
     check_params(&bundle.params, &names, &what, oddities);
+    check_values(&bundle.params, &names, oddities);
     for checker in &bundle.checkers {
         check_checker(checker, (found, checkers), known, oddities);
     }
@@ -199,10 +225,11 @@ fn check_checker(
         oddities.push(unknown_checker(checker, (bundle, checkers), known));
         return;
     };
-    let mut names: HashSet<&str> = found.params.iter().map(String::as_str).collect();
-    names.insert(LEVEL_PARAM);
+    let mut names: Names<'_> = found.params().collect();
+    names.insert((LEVEL_PARAM, ParamType::Text));
     let what = format!("checker `{}` reads no parameter", found.id);
     check_params(&checker.params, &names, &what, oddities);
+    check_values(&checker.params, &names, oddities);
 }
 
 fn unknown_checker(
@@ -225,24 +252,35 @@ fn unknown_checker(
     Oddity::warning(checker.position, text)
 }
 
-fn check_params(
-    params: &[ConfigParam],
-    names: &HashSet<&str>,
-    what: &str,
-    oddities: &mut Vec<Oddity>,
-) {
+fn check_params(params: &[ConfigParam], names: &Names<'_>, what: &str, oddities: &mut Vec<Oddity>) {
     for param in params
         .iter()
-        .filter(|param| !names.contains(param.name.as_str()))
+        .filter(|param| names.iter().all(|(name, _)| *name != param.name))
     {
         // Sorted, so that of several equally near names always the same one is offered.
-        let mut near: Vec<&str> = names.iter().copied().collect();
-        near.sort_unstable();
+        let near: BTreeSet<&str> = names.iter().map(|(name, _)| *name).collect();
         let hint = did_you_mean(&param.name, near);
         oddities.push(Oddity::warning(
             param.position,
             format!("{what} `{}`{hint}", param.name),
         ));
+    }
+}
+
+/// A checker that cannot read its parameter checks nothing.
+fn check_values(params: &[ConfigParam], names: &Names<'_>, oddities: &mut Vec<Oddity>) {
+    for param in params {
+        let unread = names
+            .iter()
+            .find(|(name, value)| *name == param.name && value.read(&param.value).is_none());
+        if let Some((name, value)) = unread {
+            let text = format!(
+                "the parameter `{name}` is `{}`, but must be {}: checkers that read it check nothing",
+                param.value,
+                value.expected()
+            );
+            oddities.push(Oddity::warning(param.position, text));
+        }
     }
 }
 

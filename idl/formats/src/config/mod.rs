@@ -10,15 +10,17 @@ mod choice;
 mod levels;
 mod lookup;
 mod parse;
+mod value;
 
 use serde::{Deserialize, Serialize};
 
 use crate::xqar::{Level, Param};
 
-pub use check::{Known, KnownBundle, KnownChecker};
+pub use check::{Known, KnownBundle, KnownChecker, KnownParam};
 pub use choice::{Choice, Names};
 pub use levels::Levels;
 pub use lookup::{Selected, Selection, published_name, same_bundle, same_reporter};
+pub use value::{ParamType, ParamValue};
 
 /// The name of the checker parameter that gives a checker's issues another level.
 pub const LEVEL_PARAM: &str = "qcbus.level";
