@@ -14,6 +14,7 @@ use qcbus_messages::Verdict;
 use qcbus_messages::control::{PeerStatus, Request, Response, Status};
 
 use super::ledger;
+use super::strain;
 use super::verdicts::JUDGE;
 use crate::support::desk::files_below;
 use crate::support::dice::Dice;
@@ -50,6 +51,8 @@ pub enum What {
     Demanded,
     /// The broker has ended a session and killed its process, and says why.
     Killed { name: String, why: String },
+    /// A little work of the watchers' own, and how long it took: how slow the machine is.
+    Worked { took: Duration },
 }
 
 /// A verdict file.
@@ -145,9 +148,11 @@ impl Watchers {
         });
         let looker = shared.clone();
         let asker = shared.clone();
+        let worker = shared.clone();
         let threads = vec![
             std::thread::spawn(move || look(&looker)),
             std::thread::spawn(move || ask(&asker, Dice::new(seed))),
+            std::thread::spawn(move || work(&worker)),
         ];
         Watchers { shared, threads }
     }
@@ -297,5 +302,15 @@ fn ask(shared: &Shared, mut dice: Dice) {
                 },
             );
         }
+    }
+}
+
+/// Does a little work again and again, which tells how slow the machine is.
+fn work(shared: &Shared) {
+    while !shared.is_over() {
+        pause(strain::PAUSE);
+        let from = shared.start.elapsed();
+        let took = strain::measure();
+        shared.saw(from, What::Worked { took });
     }
 }

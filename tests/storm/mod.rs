@@ -6,6 +6,7 @@ mod files;
 mod history;
 mod ledger;
 mod operators;
+mod strain;
 mod tally;
 mod trouble;
 mod verdicts;
@@ -16,6 +17,7 @@ use std::time::{Duration, Instant};
 
 use driver::Driver;
 use history::{Seen, Watchers};
+use strain::Strain;
 use verdicts::Removals;
 
 use crate::support::content::Content;
@@ -83,7 +85,7 @@ fn rage_under(demands: Demands, seed: u64, length: Duration) {
         Demands::Configuration => Removals::default(),
         Demands::Roster => Removals::new(&driver.removals, &history),
     };
-    at_every_moment(&driver, &history, &removals);
+    at_every_moment(&mut driver, &history, &removals);
     report(&format!("chaos: who must judge says the {demands:?}"));
     demand(driver, history.len(), start_kib, end_kib, length.as_secs());
 }
@@ -111,10 +113,25 @@ fn arguments(farm: &Farm) -> Vec<String> {
 }
 
 /// What must be so of everything that was seen while it stormed.
-fn at_every_moment(driver: &Driver, history: &[Seen], removals: &Removals) {
-    let wrong = verdicts::complaints(history, &driver.ledger, removals);
+fn at_every_moment(driver: &mut Driver, history: &[Seen], removals: &Removals) {
+    let mut all = verdicts::complaints(history, &driver.ledger, removals);
+    let strain = Strain::new(history);
     let dead = verdicts::innocent_dead(history, |name, at| driver.was_stopped(name, at));
-    let all: Vec<String> = wrong.into_iter().chain(dead).collect();
+    let mut starved = Vec::new();
+    for (at, name, why) in dead {
+        match strain.was_slow(at) {
+            true => starved.push(name.to_owned()),
+            false => all.push(format!("{:9.3} {name}: {why}", at.as_secs_f64())),
+        }
+    }
+    report(&format!(
+        "chaos: work took {:.1} times as long in the slowest ten seconds; {} bundles were ended because of it",
+        strain.slowest(),
+        starved.len()
+    ));
+    for name in starved {
+        *driver.harmed.entry(name).or_default() += 1;
+    }
     let first: Vec<&String> = all.iter().take(20).collect();
     let (deeds, log) = (driver.tally.last_lines(), tail(&driver.farm.log()));
     assert!(

@@ -66,7 +66,7 @@ pub fn complaints(history: &[Seen], ledger: &Ledger, removals: &Removals) -> Vec
                 digest,
             } => judge.wrong_answer(name, *verdict, digest),
             What::TornReport(what) => Some(what.as_str()),
-            What::Demanded | What::Killed { .. } => None,
+            What::Demanded | What::Killed { .. } | What::Worked { .. } => None,
         };
         let at = seen.at.as_secs_f64();
         complaints.extend(wrong.map(|wrong| format!("{at:9.3} {wrong}: {:?}", seen.what)));
@@ -221,14 +221,14 @@ impl Judge<'_> {
     }
 }
 
-/// Standard bundles that the broker killed and the driver had not stopped: name, when, why.
+/// Standard bundles that the broker killed and the driver had not stopped: when, name, why.
 pub fn innocent_dead<'h>(
     history: &'h [Seen],
     guilty: impl Fn(&str, Duration) -> bool + 'h,
-) -> impl Iterator<Item = String> + 'h {
+) -> impl Iterator<Item = (Duration, &'h str, &'h str)> + 'h {
     history.iter().filter_map(move |seen| match &seen.what {
         What::Killed { name, why } if name.ends_with("Bundle") && !guilty(name, seen.at) => {
-            Some(format!("{:9.3} {name}: {why}", seen.at.as_secs_f64()))
+            Some((seen.at, name.as_str(), why.as_str()))
         }
         _ => None,
     })
