@@ -199,12 +199,13 @@ fn hosted_modules_say_what_they_say_by_themselves() {
     );
     let inputs = inputs(&desk);
     let mut found = Vec::new();
+    let mut told = String::new();
     for some in inputs.chunks(IN_ONE_RUN) {
         let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
         command
             .args(["check", "--bundles-d", "bundles.d", "--out", "out"])
             .args(some);
-        desk.run(&mut command);
+        told.push_str(&desk.run(&mut command).stderr);
         for input in some {
             let theirs = modules.iter().filter(|it| it.takes(input));
             found.extend(theirs.flat_map(|it| differences(&desk, it, input)));
@@ -213,7 +214,7 @@ fn hosted_modules_say_what_they_say_by_themselves() {
     let (count, inputs) = (found.len(), inputs.len());
     assert!(
         found.is_empty(),
-        "{count} of {inputs} inputs:\n{}",
+        "{count} differences over {inputs} inputs:\n{}\n{told}",
         found.join("\n")
     );
 }

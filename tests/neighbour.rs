@@ -135,11 +135,7 @@ fn who_waits_for_what_is_no_file_is_told_so() {
         assert!(said.contains(why), "{name}: {said}");
     }
     // What is not there may come.
-    let path = at("gone.xodr");
-    let told = farm.qcbus(&["wait", "--timeout", "1s", path.to_str().unwrap()]);
-    let said = String::from_utf8_lossy(&told.stderr);
-    assert_eq!(told.status.code(), Some(3), "{said}");
-    assert!(said.contains("there is no such file"), "{said}");
+    farm.wait_in_vain(&at("gone.xodr"), &[], "there is no such file");
     assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
     assert!(broker.wait().success());
 }

@@ -256,19 +256,8 @@ fn a_deleted_file_takes_its_result_along() {
     std::fs::remove_file(farm.root().join("a.xodr")).unwrap();
     until_so("result and reports are withdrawn", || of_a().is_empty());
     farm.settle(1);
-    let said = farm.qcbus(&[
-        "wait",
-        &farm.root().join("a.xodr").to_string_lossy(),
-        "--timeout",
-        "100ms",
-    ]);
-    assert_eq!(
-        said.status.code(),
-        Some(3),
-        "it may come back, but did not in time"
-    );
-    let why = String::from_utf8_lossy(&said.stderr).into_owned();
-    assert!(why.contains("there is no such file"), "{why}");
+    // It may come back, but does not in time.
+    farm.wait_in_vain(&farm.root().join("a.xodr"), &[], "there is no such file");
     assert!(farm.out().join("stays.xodr.xqar").exists());
 }
 

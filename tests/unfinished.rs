@@ -60,12 +60,7 @@ fn is_published(farm: &Farm, names: &[&str]) -> bool {
 
 /// A client that gives up soon is told why there is no verdict.
 fn is_not_told(farm: &Farm, name: &str, why: &str) {
-    let path = farm.root().join(name);
-    let path = path.to_str().unwrap();
-    let said = farm.qcbus(&["wait", path, "--timeout", "100ms"]);
-    let text = String::from_utf8(said.stderr).unwrap();
-    assert_eq!(said.status.code(), Some(3), "{text}");
-    assert!(text.contains(why), "{text}");
+    farm.wait_in_vain(&farm.root().join(name), &[], why);
 }
 
 /// A client that waits for a verdict.

@@ -141,6 +141,23 @@ impl Farm {
         command.env("NO_COLOR", "1").output().unwrap()
     }
 
+    /// Waits for a verdict that does not come, until the broker says why. On a slow machine it may not know
+    /// so soon: the next wait is twice as long, and each must end because its time is over.
+    pub fn wait_in_vain(&self, file: &Path, further: &[&str], why: &str) -> Output {
+        let file = file.to_str().unwrap();
+        let (mut millis, mut last) = (100, String::new());
+        let look = || {
+            let limit = format!("{millis}ms");
+            let wait = ["wait", file, "--timeout", &limit];
+            let said = self.qcbus(&[&wait, further].concat());
+            millis *= 2;
+            assert_eq!(said.status.code(), Some(3), "{said:?}");
+            last = String::from_utf8_lossy(&said.stderr).into_owned();
+            last.contains(why).then_some(said)
+        };
+        watchdog::until("the broker says why there is no verdict", look)
+    }
+
     /// Asks the broker, if there is one.
     pub fn ask(&self, request: &Request) -> Option<Response> {
         ask_broker(&self.instance(), request).ok()
