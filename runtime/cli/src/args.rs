@@ -135,7 +135,8 @@ pub struct LimitArgs {
     /// A bundle with work that says nothing for this long is taken for dead
     #[arg(long, value_name = "TIME", value_parser = duration, hide_short_help = true)]
     pub silence_limit: Option<Duration>,
-    /// A bundle that must judge and is not there is waited for this long, then files are undetermined
+    /// A bundle that must judge and is not there is waited for this long, then files are undetermined; an
+    /// ASAM module that is being started for two minutes at least
     #[arg(long, value_name = "TIME", value_parser = duration, hide_short_help = true)]
     pub absence_limit: Option<Duration>,
     /// A file without room in shared memory is waited for this long while nothing moves

@@ -2,6 +2,7 @@
 //! a job comes to.
 
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 use qcbus_messages::JobId;
 
@@ -43,7 +44,7 @@ impl State {
             Some(format!(
                 "{name} keeps failing and is not started for the time being: {note}"
             ))
-        } else if away < self.settings.absence_limit {
+        } else if away < self.patience_with(name) {
             None
         } else if bundle.origin == Some(Origin::Joined) {
             Some(format!(
@@ -53,6 +54,14 @@ impl State {
         } else {
             Some(format!("{name} is not there: {note}"))
         }
+    }
+
+    /// How long a bundle that is not there is waited for: one that starts slowly as long as it may take to start.
+    fn patience_with(&self, name: &str) -> Duration {
+        let child = self.children.get(name);
+        let slow = child.filter(|it| it.spec.slow_start && self.child_is_coming(name));
+        let limit = self.settings.absence_limit;
+        slow.map_or(limit, |it| it.start_limit().max(limit))
     }
 
     fn fail_queued(&mut self, name: &str, why: &str) {

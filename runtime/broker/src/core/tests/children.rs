@@ -214,6 +214,36 @@ fn a_child_that_never_joins_is_waited_for_once() {
     assert_eq!(world.judged[&0].1, Verdict::Accepted);
 }
 
+/// A module of ASAM's framework runs over samples before it joins, which takes long on a busy machine.
+#[test]
+fn child_that_starts_slowly_is_waited_for_as_long_as_it_may_take() {
+    let starting = || {
+        let mut world = World::new();
+        world.join("First");
+        world.manifest(Some(1));
+        let child = world.state.children.get_mut(CHILD).unwrap();
+        child.spec.slow_start = true;
+        world.write(0);
+        world.prepare(0, true);
+        world.answer(0);
+        world.store(0, true);
+        world.pass(Duration::from_secs(100));
+        world.answer(0);
+        world.store(0, true);
+        assert!(world.judged.is_empty(), "it may come yet");
+        world
+    };
+    let mut world = starting();
+    world.child_joins();
+    world.settle();
+    assert_eq!(world.judged[&0].1, Verdict::Accepted);
+    let mut world = starting();
+    world.pass(Duration::from_secs(25));
+    world.answer(0);
+    world.store(0, true);
+    assert_eq!(world.judged[&0].1, Verdict::Undetermined);
+}
+
 #[test]
 fn a_bundle_that_joined_by_hand_must_judge_after_a_restart() {
     let mut world = World::new();
