@@ -57,13 +57,23 @@ pub struct Children {
     first: Launch,
     /// What was started before the state machine has asked for it, see [`Children::start_early`].
     early: BTreeMap<Launch, (ChildSpec, Started)>,
-    /// What this broker has started, by its name and with a handle on the process.
-    own: BTreeMap<Launch, (String, Option<Process>)>,
+    /// What this broker has started.
+    own: BTreeMap<Launch, Own>,
     /// What former brokers have started and has joined this one.
     adopted: BTreeMap<Launch, Process>,
     strangers: Strangers,
     last_words: LastWords,
     events: UnboundedSender<Event>,
+}
+
+/// What this broker has started, until its end was told.
+#[derive(Debug)]
+struct Own {
+    name: String,
+    /// Its id, also when it has ended and nobody has waited for it yet.
+    pid: Option<u32>,
+    /// `None` when it had ended before it was asked for.
+    process: Option<Process>,
 }
 
 /// A child that was started.
@@ -127,8 +137,13 @@ impl Children {
         match started {
             Ok(started) => {
                 // Nobody has waited for it yet, so the id is its own.
-                let process = started.child.id().and_then(|id| Process::open(id, None));
-                self.own.insert(launch, (spec.name.clone(), process));
+                let pid = started.child.id();
+                let own = Own {
+                    name: spec.name.clone(),
+                    pid,
+                    process: pid.and_then(|id| Process::open(id, None)),
+                };
+                self.own.insert(launch, own);
                 let (name, words) = (spec.name.clone(), self.last_words.clone());
                 tokio::spawn(watch(launch, name, started, words, self.events.clone()));
             }
@@ -205,7 +220,7 @@ impl Children {
         if !there || peer.state == "starting" {
             return None;
         }
-        let mut own = self.own.values().filter_map(|(_, it)| it.as_ref());
+        let mut own = self.own.values().filter_map(|it| it.process.as_ref());
         let is_ours = own.any(|it| it.id() == peer.pid || orphans::is_below(peer.pid, it.id()));
         let surrounded = self.surroundings.sandbox && is_ours;
         // One that a former broker has started has them, too; one that was started by hand confines itself to nothing.
@@ -248,11 +263,16 @@ impl Children {
     }
 
     fn sweep(&self) {
-        let id = |(launch, (_, process)): (&Launch, &(String, Option<Process>))| {
-            (*launch, process.as_ref().map(Process::id))
-        };
-        let ours = self.own.iter().map(id).collect();
-        orphans::sweep(&ours, &self.strangers, &self.launches);
+        orphans::sweep(&self.ours(), &self.strangers, &self.launches);
+    }
+
+    /// The processes that somebody watches, by their ids: one that ends at once is waited for by its watcher, and would
+    /// have no exit code if it was buried as an orphan.
+    fn ours(&self) -> BTreeMap<Launch, Option<u32>> {
+        let own = self.own.iter().map(|(launch, it)| (*launch, it.pid));
+        let early = self.early.iter();
+        let early = early.map(|(launch, (_, it))| (*launch, it.child.id()));
+        own.chain(early).collect()
     }
 
     /// A process has joined as a child: is it the one that a broker of this instance has started, under
@@ -269,9 +289,9 @@ impl Children {
     ) -> Result<(), String> {
         let proven = self.launches.proven(proof) == Some((launch, name));
         let own = self.own.get(&launch);
-        let is_it = own.is_some_and(|(own_name, own)| {
-            let id = |it: &Process| it.id();
-            own_name == name && own.is_some() && own.as_ref().map(id) == process.map(id)
+        let is_it = own.is_some_and(|it| {
+            let own = it.process.as_ref().map(Process::id);
+            it.name == name && own.is_some() && own == process.map(Process::id)
         });
         if !proven && !is_it {
             return Err(format!(
@@ -294,7 +314,7 @@ impl Children {
 
     /// Kills a child with its process group: one of this broker, or one of a former that has joined.
     pub fn kill(&self, launch: Launch) {
-        let own = self.own.get(&launch).and_then(|(_, it)| it.as_ref());
+        let own = self.own.get(&launch).and_then(|it| it.process.as_ref());
         if let Some(process) = own.or(self.adopted.get(&launch)) {
             if process.is_alive() {
                 orphans::kill_below(process);
@@ -323,9 +343,9 @@ impl Children {
     /// Waits until nobody is left of those who were killed, and of those who have come to us by that.
     pub fn bury_all(&self) {
         let until = Instant::now() + DIES_WITHIN;
-        for (_, process) in self.own.values() {
+        for own in self.own.values() {
             let left = until.saturating_duration_since(Instant::now());
-            if let Some(process) = process {
+            if let Some(process) = &own.process {
                 // One that does not is looked at below.
                 let _ = process.ends_within(left);
             }

@@ -68,6 +68,27 @@ async fn how_a_child_ends_is_told() {
     }
 }
 
+/// On a busy machine a program may have ended before its handle was opened.
+#[tokio::test]
+async fn child_that_ends_at_once_is_no_orphan() {
+    let (mut children, mut inbox) = children();
+    let spec = spec(&["sh", "-c", "exit 3", "sh"]);
+    children.start_early(std::slice::from_ref(&spec));
+    let [pid] = pids_of(&children)[..] else {
+        panic!("one child was started");
+    };
+    let launch = Launch::first_of(2).next(&spec);
+    assert_eq!(children.ours(), BTreeMap::from([(launch, Some(pid))]));
+    let process = Process::open(pid, None).into_iter();
+    for process in process {
+        assert!(process.ends_within(Duration::from_secs(60)));
+    }
+    children.spawn(launch, &spec);
+    assert_eq!(children.ours(), BTreeMap::from([(launch, Some(pid))]));
+    let (_, end) = end(&mut inbox).await;
+    assert_eq!(end.how(), "it ended with exit code 3");
+}
+
 fn pids_of(children: &Children) -> Vec<u32> {
     let early = children.early.values();
     early
@@ -96,7 +117,7 @@ async fn what_was_started_early_is_what_is_asked_for() {
     let early = pids_of(&children);
     let launch = Launch::first_of(2).next(&spec);
     children.spawn(launch, &spec);
-    let own = children.own[&launch].1.clone().unwrap();
+    let own = children.own[&launch].process.clone().unwrap();
     assert_eq!(early, [own.id()], "one process");
     assert!(children.early.is_empty());
     children.kill(launch);
@@ -203,7 +224,7 @@ async fn only_what_a_broker_has_started_is_believed_and_killed() {
     assert!(!former.wait().unwrap().success());
     // A child of this broker is known without any proof, and nobody else is taken for it.
     children.spawn(Launch(1), &spec(&["sh", "-c", "exec sleep 1000", "sh"]));
-    let own = children.own[&Launch(1)].1.clone().unwrap();
+    let own = children.own[&Launch(1)].process.clone().unwrap();
     children.joined(Launch(1), "child", Some(&own), "").unwrap();
     let refused = children.joined(Launch(1), "child", Some(&strange), "");
     assert!(refused.is_err());
