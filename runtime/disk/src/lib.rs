@@ -5,6 +5,7 @@
 //! somewhere may be believed: [`trust`].
 
 pub mod foreign;
+mod temporary;
 pub mod trust;
 
 use std::collections::HashSet;
@@ -16,7 +17,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{LazyLock, Mutex, PoisonError, RwLock};
 
 use rustix::fs::{FlockOperation, flock};
-use tempfile::{NamedTempFile, TempPath};
+use tempfile::NamedTempFile;
+
+pub use temporary::{Temporary, Unnamed, remove_left};
 
 /// Temporary names begin with this, the id of the process that writes, and when it was started. As long
 /// as it writes, it has a lock on the file: the id says nothing to whoever is in another container.
@@ -28,14 +31,12 @@ const SUFFIX: &str = ".tmp";
 /// directories are made. With `durable`, the content is on the disk before the name is.
 ///
 /// # Errors
-/// Whatever the file system says; the temporary file is removed then.
+/// Whatever the file system says; the temporary file is removed then, later if it cannot be at once
+/// ([`remove_left`]).
 pub fn write_whole(path: &Path, content: &[u8], durable: bool) -> io::Result<()> {
-    let file = write_aside(path, content)?;
-    if durable {
-        file.as_file().sync_data()?;
-    }
-    file.persist(path).map_err(|error| error.error)?;
-    Ok(())
+    write_ahead(path, content, durable)?
+        .persist(path)
+        .map_err(|unnamed| unnamed.error)
 }
 
 /// Writes `content` where a person has named a place for it: as [`write_whole`], but what a link leads to
@@ -62,12 +63,12 @@ pub fn write_named(path: &Path, content: &[u8], durable: bool) -> io::Result<()>
 ///
 /// # Errors
 /// As [`write_whole`].
-pub fn write_ahead(path: &Path, content: &[u8], durable: bool) -> io::Result<TempPath> {
-    let file = write_aside(path, content)?;
+pub fn write_ahead(path: &Path, content: &[u8], durable: bool) -> io::Result<Temporary> {
+    let (file, temporary) = write_aside(path, content)?;
     if durable {
-        file.as_file().sync_data()?;
+        file.sync_data()?;
     }
-    Ok(file.into_temp_path())
+    Ok(temporary)
 }
 
 /// What tells a file that was written from any other that comes to lie in its place: size, time of
@@ -137,22 +138,20 @@ pub fn write_both<'a>(
     durable: bool,
 ) -> Result<[FileMark; 2], (&'a Path, io::Error)> {
     let of = |path| move |error| (path, error);
-    let files = (
-        write_aside(first.0, first.1).map_err(of(first.0))?,
-        write_aside(second.0, second.1).map_err(of(second.0))?,
-    );
+    let one = write_aside(first.0, first.1).map_err(of(first.0))?;
+    let other = write_aside(second.0, second.1).map_err(of(second.0))?;
     if durable {
-        sync_both(files.0.as_file(), files.1.as_file()).map_err(of(second.0))?;
+        sync_both(&one.0, &other.0).map_err(of(second.0))?;
     }
-    let mark = |file: &NamedTempFile| file.as_file().metadata().map(|data| FileMark::of(&data));
+    let mark = |file: &File| file.metadata().map(|data| FileMark::of(&data));
     let marks = [
-        mark(&files.0).map_err(of(first.0))?,
-        mark(&files.1).map_err(of(second.0))?,
+        mark(&one.0).map_err(of(first.0))?,
+        mark(&other.0).map_err(of(second.0))?,
     ];
-    let named = files.0.persist(first.0);
-    named.map_err(|error| (first.0, error.error))?;
-    let named = files.1.persist(second.0);
-    named.map_err(|error| (second.0, error.error))?;
+    let named = one.1.persist(first.0);
+    named.map_err(|unnamed| (first.0, unnamed.error))?;
+    let named = other.1.persist(second.0);
+    named.map_err(|unnamed| (second.0, unnamed.error))?;
     Ok(marks)
 }
 
@@ -175,17 +174,20 @@ fn start_writing(file: &File) {
 }
 
 /// Writes `content` under a temporary name beside `path`.
-fn write_aside(path: &Path, content: &[u8]) -> io::Result<NamedTempFile> {
+fn write_aside(path: &Path, content: &[u8]) -> io::Result<(File, Temporary)> {
     let directory = match path.parent() {
         Some(directory) if !directory.as_os_str().is_empty() => directory,
         _ => Path::new("."),
     };
     sweep_once(directory);
-    let mut file = make_temporary_in(directory).map_err(without_path)?;
+    remove_left();
+    let made = make_temporary_in(directory).map_err(without_path)?;
+    let (mut file, path) = made.into_parts();
+    let temporary = Temporary::new(path);
     // Some file systems have no locks; there the name has to do.
-    let _ = flock(file.as_file(), FlockOperation::NonBlockingLockExclusive);
-    file.as_file_mut().write_all(content)?;
-    Ok(file)
+    let _ = flock(&file, FlockOperation::NonBlockingLockExclusive);
+    file.write_all(content)?;
+    Ok((file, temporary))
 }
 
 /// How often a directory is made again that goes as soon as it is there.
@@ -457,7 +459,10 @@ mod tests {
         assert!(!dead.exists());
         write_whole(&dir.path().join("a"), b"whole", false).unwrap();
         sweep_dead(dir.path());
-        assert!(ahead.exists(), "it is this process', and not renamed yet");
+        assert!(
+            ahead.path().exists(),
+            "it is this process', and not renamed yet"
+        );
     }
 
     #[test]

@@ -8,11 +8,10 @@ use std::sync::Arc;
 
 use qcbus_messages::Digest;
 use qcbus_messages::path_text::to_text;
-use tempfile::TempPath;
 
 use crate::outputs::Outputs;
 use crate::result_paths::ResultPaths;
-use qcbus_disk::{FileMark, remove, remove_empty_above};
+use qcbus_disk::{FileMark, Temporary, remove, remove_empty_above};
 
 /// A file that an acceptance rests on, besides the accepted one.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -83,7 +82,7 @@ pub(super) enum Standing {
 }
 
 /// Copies that have been written and have no names yet.
-pub(super) type Copies = HashMap<Arc<Path>, (Digest, TempPath)>;
+pub(super) type Copies = HashMap<Arc<Path>, (Digest, Temporary)>;
 
 /// All claims.
 #[derive(Debug)]
@@ -343,9 +342,9 @@ impl Claims {
     }
 
     /// Gives a copy its name; without one, the file lies there already.
-    fn lay(&mut self, path: &Arc<Path>, copy: Option<TempPath>) -> io::Result<()> {
+    fn lay(&mut self, path: &Arc<Path>, copy: Option<Temporary>) -> io::Result<()> {
         let place = self.place(path);
-        let mark = FileMark::at(copy.as_deref().unwrap_or(&place));
+        let mark = FileMark::at(copy.as_ref().map_or(&place, Temporary::path));
         if let Some(copy) = copy {
             self.outputs.changing(&place);
             name(copy, &place)?;
@@ -473,11 +472,11 @@ impl Claims {
 }
 
 /// Gives a copy its name. A directory that was left empty is no hindrance.
-fn name(copy: TempPath, place: &Path) -> io::Result<()> {
+fn name(copy: Temporary, place: &Path) -> io::Result<()> {
     match copy.persist(place) {
         Ok(()) => Ok(()),
         Err(refused) if std::fs::remove_dir(place).is_ok() => {
-            refused.path.persist(place).map_err(|again| again.error)
+            refused.file.persist(place).map_err(|again| again.error)
         }
         Err(refused) => Err(refused.error),
     }

@@ -153,8 +153,9 @@ impl Looker {
         }
     }
 
-    /// Looks at the few outputs whose turn it is.
+    /// Looks at the few outputs whose turn it is, and removes what could not be removed before.
     fn turn(&mut self) {
+        qcbus_disk::remove_left();
         let due: Vec<Arc<Path>> = {
             let book = self.shared.book();
             let begin = self.last.take().map_or(Bound::Unbounded, Bound::Excluded);

@@ -1,0 +1,114 @@
+//! Files under temporary names, until they get their own or go.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use tempfile::TempPath;
+
+/// A file under a temporary name. When it is dropped the file is removed, and tried again later when
+/// the disk refuses.
+#[derive(Debug)]
+pub struct Temporary(Option<TempPath>);
+
+/// Why a file could not be named, and the file.
+#[derive(Debug)]
+pub struct Unnamed {
+    /// What the file system said.
+    pub error: io::Error,
+    /// It still has its temporary name.
+    pub file: Temporary,
+}
+
+impl Temporary {
+    pub(crate) fn new(path: TempPath) -> Temporary {
+        Temporary(Some(path))
+    }
+
+    /// Where it lies now.
+    pub fn path(&self) -> &Path {
+        self.0.as_deref().unwrap_or(Path::new(""))
+    }
+
+    /// Gives the file its name; what lies there is replaced.
+    ///
+    /// # Errors
+    /// Whatever the file system says, with the file, which can be named elsewhere.
+    pub fn persist(mut self, place: &Path) -> Result<(), Unnamed> {
+        let Some(path) = self.0.take() else {
+            return Ok(());
+        };
+        path.persist(place).map_err(|refused| Unnamed {
+            error: refused.error,
+            file: Temporary(Some(refused.path)),
+        })
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        let Some(path) = self.0.take() else { return };
+        let name = path.to_path_buf();
+        if path.close().is_err_and(|error| is_left(&error)) {
+            left().push(name);
+        }
+    }
+}
+
+/// Files that this process could not remove.
+static LEFT: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn left() -> std::sync::MutexGuard<'static, Vec<PathBuf>> {
+    LEFT.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn is_left(error: &io::Error) -> bool {
+    error.kind() != io::ErrorKind::NotFound
+}
+
+/// Tries again to remove the temporary files of this process that the disk refused to remove.
+pub fn remove_left() {
+    let tried = std::mem::take(&mut *left());
+    if tried.is_empty() {
+        return;
+    }
+    let refused = |path: &PathBuf| std::fs::remove_file(path).is_err_and(|error| is_left(&error));
+    let again: Vec<PathBuf> = tried.into_iter().filter(refused).collect();
+    left().extend(again);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A directory in the place of the file stands for a disk that refuses to remove it.
+    #[test]
+    fn file_that_cannot_be_removed_is_removed_later() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = tempfile::NamedTempFile::new_in(dir.path()).unwrap();
+        let path = file.path().to_path_buf();
+        let temporary = Temporary::new(file.into_temp_path());
+        std::fs::remove_file(&path).unwrap();
+        std::fs::create_dir(&path).unwrap();
+        drop(temporary);
+        remove_left();
+        assert!(path.exists());
+        std::fs::remove_dir(&path).unwrap();
+        std::fs::write(&path, "left").unwrap();
+        remove_left();
+        assert!(!path.exists());
+        assert!(!left().contains(&path));
+    }
+
+    #[test]
+    fn file_that_cannot_be_named_keeps_its_temporary_name() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = tempfile::NamedTempFile::new_in(dir.path()).unwrap();
+        let path = file.path().to_path_buf();
+        let temporary = Temporary::new(file.into_temp_path());
+        let refused = temporary.persist(&dir.path().join("no/such")).unwrap_err();
+        assert!(path.exists());
+        refused.file.persist(&dir.path().join("named")).unwrap();
+        assert!(!path.exists() && dir.path().join("named").exists());
+    }
+}
