@@ -24,7 +24,7 @@ use crate::launches::Launches;
 use crate::orphans::{self, Strangers};
 use crate::own_program::{OwnProgram, RUNNING};
 use crate::reload::{self, ready};
-use ends::watch;
+use ends::{kill_early, watch};
 use limits::restrict;
 
 /// Looks for orphans at the end, two milliseconds apart.
@@ -390,12 +390,6 @@ fn command_of(program: &str) -> Command {
     let mut command = Command::new(RUNNING);
     command.arg0(program);
     command
-}
-
-fn kill_early(child: &Child) {
-    // Nobody has waited for it yet, so the id is its own; the runtime does.
-    let process = child.id().and_then(|id| Process::open(id, None));
-    process.iter().for_each(Process::kill);
 }
 
 #[cfg(test)]

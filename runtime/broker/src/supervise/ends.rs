@@ -1,5 +1,7 @@
 //! How children end.
 
+use qcbus_bus::Process;
+use tokio::process::Child;
 use tokio::sync::mpsc::UnboundedSender;
 
 use super::Started;
@@ -40,4 +42,11 @@ fn end_of(status: std::process::ExitStatus) -> ChildEnd {
         (None, Some(signal)) => ChildEnd::Failed(format!("it was killed by signal {signal}")),
         (None, None) => ChildEnd::Failed("it ended".to_owned()),
     }
+}
+
+/// Kills a child that is not wanted after all.
+pub(super) fn kill_early(child: &Child) {
+    // Nobody has waited for it yet, so the id is its own; the runtime does.
+    let process = child.id().and_then(|id| Process::open(id, None));
+    process.iter().for_each(Process::kill);
 }
