@@ -145,17 +145,20 @@ impl Farm {
     /// so soon: the next wait is twice as long, and each must end because its time is over.
     pub fn wait_in_vain(&self, file: &Path, further: &[&str], why: &str) -> Output {
         let file = file.to_str().unwrap();
-        let (mut millis, mut last) = (100, String::new());
+        let last = std::cell::RefCell::new(String::new());
+        let mut millis = 100;
         let look = || {
             let limit = format!("{millis}ms");
             let wait = ["wait", file, "--timeout", &limit];
             let said = self.qcbus(&[&wait, further].concat());
             millis *= 2;
             assert_eq!(said.status.code(), Some(3), "{said:?}");
-            last = String::from_utf8_lossy(&said.stderr).into_owned();
-            last.contains(why).then_some(said)
+            last.replace(String::from_utf8_lossy(&said.stderr).into_owned());
+            last.borrow().contains(why).then_some(said)
         };
-        watchdog::until("the broker says why there is no verdict", look)
+        watchdog::until_or("the broker says why there is no verdict", look, || {
+            last.borrow().clone()
+        })
     }
 
     /// Asks the broker, if there is one.

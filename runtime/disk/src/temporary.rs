@@ -81,13 +81,17 @@ pub fn remove_left() {
 mod tests {
     use super::*;
 
+    fn temporary_in(directory: &Path) -> (Temporary, PathBuf) {
+        let file = tempfile::NamedTempFile::new_in(directory).unwrap();
+        let path = file.path().to_path_buf();
+        (Temporary::new(file.into_temp_path()), path)
+    }
+
     /// A directory in the place of the file stands for a disk that refuses to remove it.
     #[test]
     fn file_that_cannot_be_removed_is_removed_later() {
         let dir = tempfile::tempdir().unwrap();
-        let file = tempfile::NamedTempFile::new_in(dir.path()).unwrap();
-        let path = file.path().to_path_buf();
-        let temporary = Temporary::new(file.into_temp_path());
+        let (temporary, path) = temporary_in(dir.path());
         std::fs::remove_file(&path).unwrap();
         std::fs::create_dir(&path).unwrap();
         drop(temporary);
@@ -103,9 +107,7 @@ mod tests {
     #[test]
     fn file_that_cannot_be_named_keeps_its_temporary_name() {
         let dir = tempfile::tempdir().unwrap();
-        let file = tempfile::NamedTempFile::new_in(dir.path()).unwrap();
-        let path = file.path().to_path_buf();
-        let temporary = Temporary::new(file.into_temp_path());
+        let (temporary, path) = temporary_in(dir.path());
         let refused = temporary.persist(&dir.path().join("no/such")).unwrap_err();
         assert!(path.exists());
         refused.file.persist(&dir.path().join("named")).unwrap();
