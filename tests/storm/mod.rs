@@ -125,7 +125,7 @@ fn at_every_moment(driver: &mut Driver, history: &[Seen], removals: &Removals) {
         }
     }
     report(&format!(
-        "chaos: work took {:.1} times as long in the slowest ten seconds; {} bundles were ended because of it",
+        "chaos: work took {:.1} times as long in the slowest ten seconds; {} bundles that were ended then are not counted",
         strain.slowest(),
         starved.len()
     ));

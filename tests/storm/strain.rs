@@ -13,8 +13,8 @@ const WORK: Duration = Duration::from_millis(5);
 /// Between two measurements: they take one part in fifty of a processor.
 pub const PAUSE: Duration = Duration::from_millis(250);
 
-/// A thread gets less than this part of a processor: at rest it gets nearly all, in a storm that has
-/// two processors for itself about a third.
+/// Work takes this many times longer than on a processor of its own: in a storm that has two processors
+/// for itself it takes about four times as long.
 const SLOW: f64 = 8.0;
 
 /// Over so long a time before something: the longest limit of a storm's broker, and the time until the
