@@ -9,6 +9,8 @@
 
 mod support;
 
+use std::fs::Permissions;
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -255,6 +257,29 @@ fn a_start_clears_the_gate_of_what_nobody_claims() {
     bring(&farm, MAP);
     publishes(&farm, &[CATALOG, MAP, SCENARIO]);
     is_sound(&farm);
+    drop(broker);
+}
+
+#[test]
+fn lost_acceptance_is_published_by_a_start_only_if_all_that_must_judge_have_judged() {
+    let farm = farm_of(&[MAP], &["--absence-limit", "1h"]);
+    let broker = farm.serve_ready();
+    publishes(&farm, &[MAP]);
+    stopped(&farm, broker, 1);
+    std::fs::remove_file(gate(&farm).join(MAP)).unwrap();
+    let sleeper = farm.base().join("sleeper");
+    std::fs::write(&sleeper, "#!/bin/sh\nexec sleep 9999\n").unwrap();
+    std::fs::set_permissions(&sleeper, Permissions::from_mode(0o755)).unwrap();
+    farm.let_in_by(&sleeper, "sleeper", "");
+    let broker = farm.serve_ready();
+    farm.wait_in_vain(&farm.root().join(MAP), &[], "in time");
+    assert_eq!(published(&farm), [""; 0]);
+    farm.send_away("sleeper");
+    publishes(&farm, &[MAP]);
+    stopped(&farm, broker, 1);
+    std::fs::remove_file(gate(&farm).join(MAP)).unwrap();
+    let broker = farm.serve_ready();
+    publishes(&farm, &[MAP]);
     drop(broker);
 }
 

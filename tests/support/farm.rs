@@ -146,12 +146,12 @@ impl Farm {
     pub fn wait_in_vain(&self, file: &Path, further: &[&str], why: &str) -> Output {
         let file = file.to_str().unwrap();
         let last = std::cell::RefCell::new(String::new());
-        let mut millis = 100;
+        let mut millis = 100_u64;
         let look = || {
             let limit = format!("{millis}ms");
             let wait = ["wait", file, "--timeout", &limit];
             let said = self.qcbus(&[&wait, further].concat());
-            millis *= 2;
+            millis = millis.saturating_mul(2);
             assert_eq!(said.status.code(), Some(3), "{said:?}");
             last.replace(String::from_utf8_lossy(&said.stderr).into_owned());
             last.borrow().contains(why).then_some(said)

@@ -218,6 +218,15 @@ impl State {
         }
     }
 
+    /// The acceptance of a file that was remembered does not lie behind the gate: it is published when it is known
+    /// that it stands.
+    pub fn remember_shut(&mut self, path: &Path) {
+        let id = self.files.id(path);
+        if let Some(entry) = id.and_then(|id| self.files.get_mut(id)) {
+            entry.shut = true;
+        }
+    }
+
     /// Takes one event and says what is to be done. `now` is the time since the start and never
     /// runs backwards.
     pub fn handle(&mut self, now: Duration, event: Event) -> Vec<Action> {

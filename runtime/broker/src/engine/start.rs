@@ -31,7 +31,6 @@ use crate::state_identity::difference_of;
 use crate::store::Reconciled;
 use crate::supervise::Surroundings;
 use crate::watch::{Seen, is_looked_at, scan_directory};
-use crate::writers::Order;
 use qcbus_disk::foreign;
 
 impl Broker {
@@ -123,8 +122,7 @@ impl Broker {
                 .remember(&file.path, file.judged, &file.delivered);
         }
         for path in found.unpublished {
-            let at = path.clone();
-            self.writers.order(&at, Order::Follow { path });
+            self.state.remember_shut(&path);
         }
         found.stamps.into_iter().collect()
     }

@@ -433,8 +433,11 @@ impl Claims {
     }
 
     /// Takes for published whatever lies behind the gate completely. `lies` says whether a file
-    /// of this size is in its place. Returns the claims that are left.
-    pub(super) fn take_over(&mut self, lies: impl Fn(&Path, u64) -> bool) -> Vec<Arc<Path>> {
+    /// of this size is in its place. Drops the other claims, and returns whose they were.
+    pub(super) fn take_over(
+        &mut self,
+        lies: impl Fn(&Path, u64) -> bool,
+    ) -> io::Result<Vec<Arc<Path>>> {
         let by_themselves = |(path, claim): (&Arc<Path>, &Claim)| {
             let fragments = claim.needs.iter().filter(|need| !self.is_judged(need));
             let mut files = fragments
@@ -462,7 +465,10 @@ impl Claims {
             // All of it lies there, so that nothing is named.
             let _ = self.put(&root, &mut Copies::new());
         }
-        left
+        for path in &left {
+            self.revoke(path)?;
+        }
+        Ok(left)
     }
 
     /// Where everything lies that belongs behind the gate.

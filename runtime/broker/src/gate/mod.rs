@@ -127,8 +127,9 @@ impl Gate {
         }
     }
 
-    /// Brings the directory in agreement with the verdicts that still stand: what belongs to none of
-    /// them is removed. Returns the accepted files that are to be published, see [`Gate::follow`].
+    /// Brings the directory in agreement with the journal: what belongs to none of its acceptances is
+    /// removed. Returns the accepted files that are not published. They have no claim, because others may
+    /// have to judge them by now: [`Gate::accept`] publishes those whose verdict stands.
     ///
     /// # Errors
     /// When the directory cannot be read, or something in it cannot be removed.
@@ -150,8 +151,7 @@ impl Gate {
             }
         }
         let there = contents::files(&self.options.directory)?;
-        let waiting =
-            { claims.take_over(|path, size| there.get(&self.place(path)) == Some(&size)) };
+        let waiting = claims.take_over(|path, size| there.get(&self.place(path)) == Some(&size))?;
         contents::remove_others(&self.options.directory, &there, &claims.places())?;
         Ok(waiting)
     }

@@ -26,7 +26,7 @@ use qcbus_disk::{FileMark, remove, remove_empty_above};
 pub struct Reconciled {
     /// Files with their verdicts.
     pub standing: Vec<Remembered>,
-    /// Accepted files that are to be published.
+    /// Accepted files that do not lie behind the gate.
     pub unpublished: Vec<Arc<Path>>,
     /// The present stamps of everything that verdicts depend on.
     pub stamps: BTreeMap<Arc<Path>, Option<Stamp>>,

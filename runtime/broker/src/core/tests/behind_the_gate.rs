@@ -45,12 +45,20 @@ impl World {
         }
     }
 
-    /// When a broker starts, what is not as it was read goes from behind the gate.
-    pub fn gate_is_taken_over(&mut self) {
+    /// When a broker starts, what is not as it was read goes from behind the gate. Returns what was accepted and
+    /// does not lie there.
+    pub fn gate_is_taken_over(&mut self) -> Vec<u8> {
         let journal = self.journal.iter();
         let accepted = journal.filter(|(_, it)| it.verdict == Verdict::Accepted);
         let stand = accepted.filter(|(file, it)| bytes(&it.inputs) == bytes(&self.inputs(**file)));
-        self.gate = stand.map(|(file, it)| (*file, it.inputs.clone())).collect();
+        let stand: Published = stand.map(|(file, it)| (*file, it.inputs.clone())).collect();
+        let as_accepted = |file: &u8, inputs: &[Input]| {
+            let accepted = stand.get(file).map(|it| bytes(it));
+            accepted == Some(bytes(inputs))
+        };
+        self.gate.retain(|file, inputs| as_accepted(file, inputs));
+        let there = |file: &u8| self.gate.contains_key(file);
+        stand.into_keys().filter(|file| !there(file)).collect()
     }
 }
 

@@ -190,7 +190,7 @@ impl World {
         self.judged.clear();
         // Every start looks at results before anything is judged.
         self.lost.clear();
-        self.gate_is_taken_over();
+        let unpublished = self.gate_is_taken_over();
         let known = self.journal.keys();
         self.watched = known
             .flat_map(|file| dependencies_of(*file).iter().copied())
@@ -204,6 +204,9 @@ impl World {
             judged.racy |= judged.inputs[1..] != self.inputs(file)[1..];
             let delivered = self.delivered(file);
             self.state.remember(&path_of(file), judged, &delivered);
+        }
+        for file in unpublished {
+            self.state.remember_shut(&path_of(file));
         }
         self.desk_restarts();
         self.children_are(self.manifest);

@@ -73,3 +73,25 @@ fn loss_of_a_file_that_has_gone_changes_nothing() {
     world.settle();
     assert_eq!(world.stored, [1]);
 }
+
+#[test]
+fn acceptance_that_a_start_does_not_find_behind_the_gate_is_published_when_it_stands() {
+    let mut world = judged_world();
+    let before = world.stored.len();
+    world.gate.remove(&1);
+    world.restart();
+    world.settle();
+    assert_eq!(world.stored.len(), before, "nothing is judged again");
+    assert!(world.gate.contains_key(&1));
+}
+
+#[test]
+fn acceptance_that_a_start_does_not_find_behind_the_gate_waits_for_all_that_must_judge() {
+    let mut world = judged_world();
+    world.gate.remove(&1);
+    world.manifest = Some(1);
+    world.restart();
+    assert!(!world.gate.contains_key(&1));
+    world.settle();
+    assert!(world.gate.contains_key(&1));
+}
