@@ -10,7 +10,7 @@
 mod support;
 
 use std::fs::Permissions;
-use std::os::unix::fs::PermissionsExt as _;
+use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -281,6 +281,34 @@ fn lost_acceptance_is_published_by_a_start_only_if_all_that_must_judge_have_judg
     let broker = farm.serve_ready();
     publishes(&farm, &[MAP]);
     drop(broker);
+}
+
+#[test]
+fn other_bytes_of_the_same_size_are_not_taken_for_published_by_a_start() {
+    let farm = farm_of(&[MAP], &[]);
+    let (source, copy) = (farm.root().join(MAP), gate(&farm).join(MAP));
+    let whole = std::fs::read(&source).unwrap();
+    let other = || {
+        let modified = std::fs::metadata(&copy).unwrap().modified().unwrap();
+        std::fs::write(&copy, vec![b' '; whole.len()]).unwrap();
+        let file = std::fs::File::options().write(true).open(&copy).unwrap();
+        file.set_modified(modified).unwrap();
+    };
+    let link = || {
+        std::fs::remove_file(&copy).unwrap();
+        std::fs::hard_link(&source, &copy).unwrap();
+    };
+    for change in [&other as &dyn Fn(), &link] {
+        let broker = farm.serve_ready();
+        publishes(&farm, &[MAP]);
+        stopped(&farm, broker, 1);
+        change();
+        let broker = farm.serve_ready();
+        publishes(&farm, &[MAP]);
+        assert!(std::fs::read(&copy).unwrap() == whole);
+        assert_eq!(std::fs::metadata(&copy).unwrap().nlink(), 1);
+        drop(broker);
+    }
 }
 
 fn refused(command: &mut Command) -> String {

@@ -432,18 +432,18 @@ impl Claims {
         Ok(())
     }
 
-    /// Takes for published whatever lies behind the gate completely. `lies` says whether a file
-    /// of this size is in its place. Drops the other claims, and returns whose they were.
+    /// Takes for published whatever lies behind the gate completely. `lies` says whether a file with these
+    /// bytes is in its place. Drops the other claims, and returns whose they were.
     pub(super) fn take_over(
         &mut self,
-        lies: impl Fn(&Path, u64) -> bool,
+        mut lies: impl FnMut(&Path, u64, Digest) -> bool,
     ) -> io::Result<Vec<Arc<Path>>> {
         let by_themselves = |(path, claim): (&Arc<Path>, &Claim)| {
             let fragments = claim.needs.iter().filter(|need| !self.is_judged(need));
             let mut files = fragments
-                .map(|need| (&need.path, need.size))
-                .chain([(path, claim.size)]);
-            (self.held(claim).is_none() && files.all(|(path, size)| lies(path, size)))
+                .map(|need| (&need.path, need.size, need.digest))
+                .chain([(path, claim.size, claim.digest)]);
+            (self.held(claim).is_none() && files.all(|(path, size, it)| lies(path, size, it)))
                 .then(|| path.clone())
         };
         let mut complete: HashSet<Arc<Path>> =

@@ -2,13 +2,16 @@
 
 use std::collections::{HashMap, HashSet};
 use std::io;
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
+use qcbus_disk::{foreign, remove};
 use qcbus_document::FileKind;
+use qcbus_messages::Digest;
 use qcbus_messages::path_text::to_text;
 
 use crate::directory_lock::{GATE_FILE, LockError};
-use qcbus_disk::remove;
+use crate::store::digest_of;
 
 /// Why a directory cannot be a gate, with the way out.
 #[derive(Debug, thiserror::Error)]
@@ -70,13 +73,20 @@ pub(super) fn files(directory: &Path) -> io::Result<HashMap<PathBuf, u64>> {
             if data.is_dir() {
                 open.push(entry.path());
             } else if entry.file_name() != GATE_FILE || next != *directory {
-                // Nothing but a file has the size of one.
-                let size = if data.is_file() { data.len() } else { u64::MAX };
+                // Nothing but a file has the size of one, and who has another name of it can change it at any time.
+                let is_ours = data.is_file() && data.nlink() == 1;
+                let size = if is_ours { data.len() } else { u64::MAX };
                 found.insert(entry.path(), size);
             }
         }
     }
     Ok(found)
+}
+
+/// The digest of a file of this size in bytes; `None` when it cannot be read.
+pub(super) fn digest_at(path: &Path, size: u64) -> Option<Digest> {
+    let bytes = foreign::read(path, size).ok()?;
+    Some(digest_of(&bytes))
 }
 
 /// Removes all files that are not kept, what refers to others before what others refer to, and the

@@ -11,7 +11,7 @@
 mod claims;
 mod contents;
 
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -151,7 +151,17 @@ impl Gate {
             }
         }
         let there = contents::files(&self.options.directory)?;
-        let waiting = claims.take_over(|path, size| there.get(&self.place(path)) == Some(&size))?;
+        let mut read = HashMap::new();
+        let waiting = claims.take_over(|path, size, digest| {
+            let place = self.place(path);
+            let is_so_long = there.get(&place) == Some(&size);
+            let now = || {
+                *read
+                    .entry(place)
+                    .or_insert_with_key(|at| contents::digest_at(at, size))
+            };
+            is_so_long && now() == Some(digest)
+        })?;
         contents::remove_others(&self.options.directory, &there, &claims.places())?;
         Ok(waiting)
     }
