@@ -25,15 +25,18 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             let file = files().find(|file| file.node().offset() == linked.referred_at);
             (file, linked.document.root())
         }
-        // What is a catalog of the scenario already is not read a second time.
+        // What is a catalog of the scenario already, or the scenario itself, is not read a second time.
         Network::Unnamed => {
             let file = files().find(|file| file.is("LogicFile"));
             let path = file.and_then(|file| file.text("filepath"));
             let read = path.and_then(|path| {
+                let own = scenario.root().node();
                 let mut linked = subject.linked().iter();
-                linked.find(|linked| is_path_of(&linked.path, &path))
+                let other = linked.find(|linked| is_path_of(&linked.path, &path));
+                let itself = || is_path_of(own.document().path(), &path).then_some(own);
+                other.map_or_else(itself, |linked| linked.document.root())
             });
-            (file, read.and_then(|linked| linked.document.root()))
+            (file, read)
         }
         Network::Simulator | Network::NotHad | Network::Map(_) => return,
     };
