@@ -200,13 +200,15 @@ impl DirectoryLock {
 
 fn lock_alone(directory: &Path, purpose: Purpose, instance: &str) -> Result<File, LockError> {
     let mut file = open(directory, purpose)?;
-    if purpose != Purpose::State {
-        is_free_above(directory, purpose)?;
-    }
     match file.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => return Err(refusal(&mut file, directory, purpose)),
         Err(TryLockError::Error(error)) => without_locks(directory, &error),
+    }
+    // Whoever starts at this moment finds this lock, or is found.
+    if purpose != Purpose::State {
+        is_free_above(directory, purpose)?;
+        is_free_below(directory)?;
     }
     // Only for whoever is refused: on a full disk the lock holds without it.
     let _ = introduce(&mut file, directory, purpose, instance);
@@ -286,19 +288,40 @@ fn open(directory: &Path, purpose: Purpose) -> Result<File, LockError> {
 fn is_free_above(directory: &Path, wanted: Purpose) -> Result<(), LockError> {
     for above in directory.ancestors() {
         for purpose in [Purpose::Results, Purpose::Gate] {
-            if above == directory && purpose == wanted {
-                continue;
-            }
-            // A lock file that cannot be opened has no living broker behind it.
-            let Ok(mut file) = File::open(locked_at(above, purpose)) else {
-                continue;
-            };
-            if let Err(TryLockError::WouldBlock) = file.try_lock_shared() {
-                return Err(refusal(&mut file, above, purpose));
+            if above != directory || purpose != wanted {
+                is_free(above, purpose)?;
             }
         }
     }
     Ok(())
+}
+
+/// No broker may have a directory below: it would be one of two that write its results, or would be cleared as a
+/// part of the gate.
+fn is_free_below(directory: &Path) -> Result<(), LockError> {
+    let mut open = vec![directory.to_path_buf()];
+    while let Some(next) = open.pop() {
+        if next != directory {
+            is_free(&next, Purpose::Results)?;
+            is_free(&next, Purpose::Gate)?;
+        }
+        // A directory that cannot be looked into holds nothing of ours either.
+        let entries = std::fs::read_dir(&next).into_iter().flatten().flatten();
+        let below = entries.filter(|it| it.file_type().is_ok_and(|it| it.is_dir()));
+        open.extend(below.map(|it| it.path()));
+    }
+    Ok(())
+}
+
+fn is_free(directory: &Path, purpose: Purpose) -> Result<(), LockError> {
+    // A lock file that cannot be opened has no living broker behind it.
+    let Ok(mut file) = File::open(locked_at(directory, purpose)) else {
+        return Ok(());
+    };
+    match file.try_lock_shared() {
+        Err(TryLockError::WouldBlock) => Err(refusal(&mut file, directory, purpose)),
+        _ => Ok(()),
+    }
 }
 
 /// A file system without locks is no reason to refuse the work.
@@ -425,7 +448,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_gets_a_directory_below_one_of_another_broker() {
+    fn nobody_gets_a_directory_below_or_above_one_of_another_broker() {
         let dir = tempfile::tempdir().unwrap();
         let below = dir.path().join("maps/new");
         for held in [Purpose::Results, Purpose::Gate] {
@@ -443,7 +466,16 @@ mod tests {
             let in_both = DirectoryLock::share(dir.path());
             assert!(in_both.is_err(), "results of a check behind a gate");
             drop(lock);
-            assert!(DirectoryLock::take(&below, held, "second").is_ok());
+            let second = DirectoryLock::take(&below, held, "second").unwrap();
+            for wanted in [Purpose::Results, Purpose::Gate] {
+                let refused = DirectoryLock::take(dir.path(), wanted, "first").unwrap_err();
+                assert!(
+                    refused.to_string().contains("instance `second`"),
+                    "{refused}"
+                );
+            }
+            drop(second);
+            assert!(DirectoryLock::take(dir.path(), held, "first").is_ok());
         }
     }
 }
