@@ -205,7 +205,7 @@ fn lock_alone(directory: &Path, purpose: Purpose, instance: &str) -> Result<File
         Err(TryLockError::WouldBlock) => return Err(refusal(&mut file, directory, purpose)),
         Err(TryLockError::Error(error)) => without_locks(directory, &error),
     }
-    // Whoever starts at this moment finds this lock, or is found.
+    // Only with the lock in hand: of two brokers that start at the same time, one at least sees the other.
     if purpose != Purpose::State {
         is_free_above(directory, purpose)?;
         is_free_below(directory)?;
