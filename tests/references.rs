@@ -133,6 +133,38 @@ fn cases() -> Vec<Case> {
         ),
         map("directory", "../maps", "rejected", "is a directory"),
         map(
+            "ends_as_directory",
+            "../maps/quay_straight.xodr/",
+            "rejected",
+            "is a directory",
+        ),
+        map(
+            "through_nothing",
+            "../gone/../maps/quay_straight.xodr",
+            "rejected",
+            NOT_THERE,
+        ),
+        map(
+            "out_of_a_file",
+            "../maps/notes.txt/../quay_straight.xodr",
+            "rejected",
+            NOT_THERE,
+        ),
+        // By its words alone it would be the map.
+        map(
+            "out_of_a_link",
+            "../maps/far/../quay_straight.xodr",
+            "rejected",
+            NOT_THERE,
+        ),
+        // Only as the system follows it.
+        map(
+            "through_a_link",
+            "../maps/far/../maps/quay_straight.xodr",
+            "accepted",
+            None,
+        ),
+        map(
             "broken",
             "../maps/broken.xodr",
             "rejected",
@@ -225,6 +257,7 @@ fn desk() -> Desk {
     }
     let at = |name: &str| desk.path().join("maps").join(name);
     symlink("gone.xodr", at("dangling.xodr")).unwrap();
+    symlink("../half", at("far")).unwrap();
     symlink("loop.xodr", at("loop.xodr")).unwrap();
     let made = Command::new("mkfifo").arg(at("pipe.xodr")).status();
     assert!(made.unwrap().success());

@@ -410,6 +410,10 @@ impl Includes<'_> {
             let text = format!("the include of {written} is not fetched; only files are included");
             return Err((FaultCode::IncludeMalformed, text));
         }
+        if names_directory(written) {
+            let text = format!("the include of {written} names a directory, not a file");
+            return Err((FaultCode::IncludeMissing, text));
+        }
         let folder = self.texts[number]
             .path
             .parent()
@@ -483,17 +487,26 @@ fn inside(path: &Path, boundary: &Path, written: &str) -> Result<(), Refusal> {
     Err((FaultCode::IncludeEscapes, text))
 }
 
-/// A path without `.` and `..`, resolved by its words alone.
+/// A path without `.`, and without the `..` that steps out of a directory. One behind a link, a file or
+/// nothing stays, for there the words alone lead elsewhere than the system, and so than a simulator.
 pub(crate) fn normal(path: &Path) -> PathBuf {
     let mut normal = PathBuf::new();
     for part in path.components() {
         match part {
             Component::CurDir => {}
-            Component::ParentDir => {
-                normal.pop();
-            }
+            Component::ParentDir if is_directory(&normal) => _ = normal.pop(),
             part => normal.push(part),
         }
     }
     normal
+}
+
+/// Whether a directory lies there itself, and no link to one.
+fn is_directory(path: &Path) -> bool {
+    foreign::symlink_metadata(path).is_ok_and(|data| data.is_dir())
+}
+
+/// Whether a path says itself that it leads to a directory: for the system, `map.xodr/` is no file.
+pub(crate) fn names_directory(text: &str) -> bool {
+    matches!(text.rsplit(['/', '\\']).next(), Some("" | "." | ".."))
 }

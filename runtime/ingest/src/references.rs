@@ -11,7 +11,7 @@ use qcbus_messages::path_text::from_text;
 use qcbus_messages::{Absence, DocumentRole};
 
 use crate::modular::{SearchPath, libraries};
-use crate::prepare::{normal, split_members};
+use crate::prepare::{names_directory, normal, split_members};
 
 /// A reference from a document to another file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -130,6 +130,9 @@ fn check(role: DocumentRole, text: &str) -> Result<(), Absence> {
     if text.contains("://") && !text.starts_with("file://") {
         return Err(Absence::Remote);
     }
+    if role != DocumentRole::Catalog && names_directory(text) {
+        return Err(Absence::Directory);
+    }
     let has_extension = Path::new(text.rsplit(['/', '\\']).next().unwrap_or(text))
         .extension()
         .is_some();
@@ -141,8 +144,9 @@ fn check(role: DocumentRole, text: &str) -> Result<(), Absence> {
 }
 
 fn locate(reference: &mut Reference, from: &Path, text: &str) {
+    let text = text.trim();
     let mut candidates: Vec<PathBuf> = Vec::new();
-    for spelling in spellings(text.trim()) {
+    for spelling in spellings(text) {
         for candidate in places(from, &spelling) {
             if !candidates.contains(&candidate) {
                 candidates.push(candidate);
@@ -155,6 +159,9 @@ fn locate(reference: &mut Reference, from: &Path, text: &str) {
     }
     let mut why = Absence::NotThere;
     for folder in &candidates {
+        if names_directory(text) && foreign::metadata(folder).is_ok_and(|data| data.is_file()) {
+            continue;
+        }
         match catalogs(folder) {
             Ok((catalogs, left_out)) => {
                 reference.directory = Some(folder.clone());

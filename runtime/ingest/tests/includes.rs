@@ -174,6 +174,7 @@ fn nothing_outside_of_the_boundary_is_read() {
     for written in ["../secret.xml", "/etc/hostname", "sub/../../secret.xml"] {
         let built = built(&[
             ("maps/root.xodr", &files(written)),
+            ("maps/sub/part.xml", "<OpenDRIVE/>"),
             ("secret.xml", "<OpenDRIVE><road/></OpenDRIVE>"),
         ]);
         assert_eq!(
@@ -181,6 +182,29 @@ fn nothing_outside_of_the_boundary_is_read() {
             [(FaultCode::IncludeEscapes, "root.xodr:1:12".to_string())]
         );
         assert_eq!(built.files.len(), 1);
+        assert_eq!(built.document().elements("road").count(), 0);
+    }
+}
+
+/// A simulator that opens such a path gets nothing, though its words alone would lead to a file.
+#[test]
+fn include_is_missing_where_the_system_cannot_follow_it() {
+    let files = |written: &str| format!("<OpenDRIVE><include file='{written}'/></OpenDRIVE>");
+    for written in [
+        "gone/../part.xml",
+        "part.xml/../part.xml",
+        "part.xml/",
+        "part.xml/.",
+    ] {
+        let built = built(&[
+            ("maps/root.xodr", &files(written)),
+            ("maps/part.xml", "<OpenDRIVE><road/></OpenDRIVE>"),
+        ]);
+        assert_eq!(
+            built.faults(),
+            [(FaultCode::IncludeMissing, "root.xodr:1:12".to_string())],
+            "{written}"
+        );
         assert_eq!(built.document().elements("road").count(), 0);
     }
 }

@@ -36,13 +36,10 @@ fn map(filepath: &str) -> Reference {
 #[test]
 fn maps_are_relative_to_the_scenario() {
     for (filepath, expected) in [
-        ("../m/a.xodr", &["/farm/m/a.xodr"][..]),
+        ("m/./a.xodr", &["/farm/s/m/a.xodr"][..]),
         ("/abs/a.xodr", &["/abs/a.xodr"]),
         ("a%20b.xodr", &["/farm/s/a%20b.xodr", "/farm/s/a b.xodr"]),
-        (
-            "..\\m\\a.xodr",
-            &["/farm/s/..\\m\\a.xodr", "/farm/m/a.xodr"],
-        ),
+        ("m\\a.xodr", &["/farm/s/m\\a.xodr", "/farm/s/m/a.xodr"]),
         ("file:///abs/a.xodr", &["/abs/a.xodr"]),
         ("$map", &["/farm/s/maps/a.xodr"]),
         ("a.$ext", &["/farm/s/a.xodr"]),
@@ -52,6 +49,52 @@ fn maps_are_relative_to_the_scenario() {
         let expected: Vec<PathBuf> = expected.iter().map(PathBuf::from).collect();
         assert_eq!(reference.candidates, expected, "{filepath}");
         assert_eq!(reference.unresolved, None);
+    }
+}
+
+/// A directory with `s/x.xosc` to refer from, `maps/deep/`, a link to it, and `maps/a.xodr`.
+fn directories() -> (tempfile::TempDir, PathBuf) {
+    let directory = tempfile::tempdir().unwrap();
+    let root = directory.path().canonicalize().unwrap();
+    fs::create_dir_all(root.join("maps/deep")).unwrap();
+    fs::create_dir(root.join("s")).unwrap();
+    fs::write(root.join("maps/a.xodr"), "<OpenDRIVE/>").unwrap();
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("../maps/deep", root.join("s/link")).unwrap();
+    (directory, root)
+}
+
+#[test]
+fn path_leads_where_the_system_follows_it() {
+    let (_directory, root) = directories();
+    let from = root.join("s/x.xosc");
+    for (filepath, expected) in [
+        ("../maps/a.xodr", "maps/a.xodr"),
+        ("./../maps/deep/../a.xodr", "maps/a.xodr"),
+        ("../maps/gone.xodr", "maps/gone.xodr"),
+        #[cfg(unix)]
+        ("link/../a.xodr", "s/link/../a.xodr"),
+        #[cfg(unix)]
+        ("link/a.xodr", "s/link/a.xodr"),
+        // Nothing can be opened through what is not there, or is a file.
+        ("../gone/../maps/a.xodr", "gone/../maps/a.xodr"),
+        ("../gone/../../maps/a.xodr", "gone/../../maps/a.xodr"),
+        ("../maps/a.xodr/../a.xodr", "maps/a.xodr/../a.xodr"),
+    ] {
+        let text = format!(
+            "<OpenSCENARIO><RoadNetwork><LogicFile filepath='{filepath}'/></RoadNetwork></OpenSCENARIO>"
+        );
+        let found = of(&from, &text);
+        assert_eq!(found[0].candidates, [root.join(expected)], "{filepath}");
+    }
+}
+
+#[test]
+fn path_that_ends_as_a_directory_names_no_map() {
+    for filepath in ["a.xodr/", "a.xodr/.", "maps/..", "a.xodr\\", "..", "."] {
+        let reference = map(filepath);
+        assert_eq!(reference.candidates, Vec::<PathBuf>::new(), "{filepath}");
+        assert_eq!(reference.unresolved, Some(Absence::Directory), "{filepath}");
     }
 }
 
@@ -109,13 +152,13 @@ fn catalog_directories_are_listed() {
 fn other_roles() {
     let text = "<OpenSCENARIO xmlns:xsi='http://www.w3.org/2001/XMLSchema-instance' \
                 xsi:noNamespaceSchemaLocation='http://x/OpenSCENARIO.xsd'>\
-                <ParameterValueDistribution><ScenarioFile filepath='../a.xosc'/>\
+                <ParameterValueDistribution><ScenarioFile filepath='b/a.xosc'/>\
                 </ParameterValueDistribution></OpenSCENARIO>";
     let found = of(Path::new("/farm/d/x.xosc"), text);
     assert_eq!(found.len(), 1, "schemas are never fetched");
     assert_eq!(
         (found[0].role, &found[0].candidates[0]),
-        (DocumentRole::Scenario, &PathBuf::from("/farm/a.xosc"))
+        (DocumentRole::Scenario, &PathBuf::from("/farm/d/b/a.xosc"))
     );
 }
 
