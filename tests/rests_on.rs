@@ -134,6 +134,29 @@ fn map_in_a_directory_that_becomes_a_link_is_named_as_not_watched() {
     );
 }
 
+/// The same words lead to another map, and the verdict on that one counts.
+#[test]
+fn map_behind_a_link_that_leads_elsewhere_by_now_is_another_one() {
+    let (farm, _broker) = served();
+    let root = farm.root();
+    for directory in ["first/deep", "second/deep"] {
+        std::fs::create_dir_all(root.join(directory)).unwrap();
+    }
+    farm.write("first/m.xodr", &Content::Good(1).bytes());
+    farm.write("second/m.xodr", &Content::NoHeader(1).bytes());
+    symlink("first/deep", root.join("link")).unwrap();
+    let scenario = Content::Scenario(1, "link/../m.xodr".to_owned());
+    farm.write("b.xosc", &scenario.bytes());
+    assert_eq!(farm.verdict("b.xosc").verdict, Verdict::Accepted);
+
+    symlink("second/deep", root.join("other")).unwrap();
+    std::fs::rename(root.join("other"), root.join("link")).unwrap();
+    assert_eq!(farm.verdict("b.xosc").verdict, Verdict::Rejected);
+    let results = farm.result("b.xosc");
+    let mut said = issues(&results).filter(|(it, _)| it.id.ends_with("qcbus_rests_on"));
+    assert!(said.any(|(_, it)| it.description.contains("second/m.xodr")));
+}
+
 /// No event tells of what is written to a file under a name that nobody watches.
 #[test]
 fn map_changed_under_another_name_is_judged_for_who_waits_for_its_scenario() {
