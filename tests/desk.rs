@@ -79,7 +79,10 @@ fn without_a_broker_a_bundle_is_added_and_removed_only_by_saying_so() {
     assert!(!desk.path().join("d").exists());
     let said = desk.qcbus(&[&add[..], &["--offline"]].concat());
     assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-    assert!(said.stderr.contains("no broker watches it now"));
+    assert!(
+        said.stderr
+            .contains("no broker of this instance watches it now")
+    );
     assert!(desk.path().join("d/mine.json").exists());
 
     let remove = ["bundle", "remove", "mine", "--bundles-d", "d"];

@@ -51,12 +51,12 @@ fn config_differences(old: &Config, new: &Config, lines: &mut Vec<String>) {
             Some(before) => bundle_differences(before, bundle, lines),
         }
     }
+    if new.bundles.is_empty() && !old.bundles.is_empty() {
+        lines.push("every bundle is demanded, because none is named".to_owned());
+    }
     for bundle in &old.bundles {
-        if new
-            .bundles
-            .iter()
-            .all(|it| it.application != bundle.application)
-        {
+        let is_named = |it: &BundleConfig| it.application == bundle.application;
+        if !new.bundles.is_empty() && !new.bundles.iter().any(is_named) {
             lines.push(format!("{} is no longer demanded", bundle.application));
         }
     }
@@ -98,8 +98,13 @@ fn bundle_differences(old: &BundleConfig, new: &BundleConfig, lines: &mut Vec<St
             Some(_) => {}
         }
     }
+    if new.checkers.is_empty() && !old.checkers.is_empty() {
+        lines.push(format!(
+            "{name}: every checker is demanded, because none is named"
+        ));
+    }
     for checker in &old.checkers {
-        if new.checkers.iter().all(|it| it.id != checker.id) {
+        if !new.checkers.is_empty() && new.checkers.iter().all(|it| it.id != checker.id) {
             lines.push(format!("{name}: {} is no longer demanded", checker.id));
         }
     }

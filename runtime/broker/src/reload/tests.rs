@@ -107,6 +107,30 @@ fn what_has_changed_is_told_line_by_line() {
 }
 
 #[test]
+fn who_names_nothing_any_more_demands_everything() {
+    let dir = tempfile::tempdir().unwrap();
+    let sources = sources(dir.path());
+    let chosen = "<Config>\n  <CheckerBundle application=\"xodrBundle\">\n    \
+                  <Checker checkerId=\"a\" maxLevel=\"1\" minLevel=\"3\"/>\n  \
+                  </CheckerBundle>\n</Config>\n";
+    put(dir.path(), chosen, &[]);
+    let old = sources.load().unwrap();
+    for (config, expected) in [
+        (
+            CONFIG,
+            "xodrBundle: every checker is demanded, because none is named",
+        ),
+        (
+            "<Config>\n</Config>\n",
+            "every bundle is demanded, because none is named",
+        ),
+    ] {
+        put(dir.path(), config, &[]);
+        assert_eq!(differences(&old, &sources.load().unwrap()), [expected]);
+    }
+}
+
+#[test]
 fn a_manifest_that_another_lists_is_looked_at_too() {
     let dir = tempfile::tempdir().unwrap();
     let sources = sources(dir.path());

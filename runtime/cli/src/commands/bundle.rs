@@ -2,6 +2,7 @@
 
 use std::os::unix::process::CommandExt;
 
+use qcbus_broker::control::{AskError, ask_broker};
 use qcbus_messages::control::{Request, Response};
 use qcbus_messages::{Exit, shown};
 use qcbus_sdk::run::Mode;
@@ -19,16 +20,24 @@ pub fn list(args: &StatusArgs) -> Exit {
         }
     };
     // The list is of use without a broker, too.
-    let running = match qcbus_broker::control::ask_broker(instance.dir(), &Request::Status) {
-        Ok(Response::Status(status)) => status.peers,
-        _ => Vec::new(),
+    let (running, absent) = match ask_broker(instance.dir(), &Request::Status) {
+        Ok(Response::Status(status)) => (status.peers, "not running"),
+        Err(AskError::NoBroker { .. }) => (Vec::new(), "not running"),
+        Ok(other) => {
+            talk::fail(&format!("unexpected answer: {other:?}"));
+            (Vec::new(), "unknown")
+        }
+        Err(error) => {
+            talk::fail(&format!("what runs is not known: {error}"));
+            (Vec::new(), "unknown")
+        }
     };
     let mut rows: Vec<[String; 5]> = Vec::new();
     for bundle in standard::BUNDLES {
         let state = running
             .iter()
             .find(|peer| peer.name == bundle.name)
-            .map_or("not running", |peer| &peer.state);
+            .map_or(absent, |peer| &peer.state);
         let checkers = bundle.checkers().len().to_string();
         rows.push([
             bundle.name.into(),

@@ -166,7 +166,7 @@ impl Home {
             return Ok(Home {
                 directory: given.unwrap_or_else(|| absolute(Path::new(OFFLINE))),
                 broker: None,
-                unwatched: format!("no broker watches it now: {why}"),
+                unwatched: format!("no broker of this instance watches it now: {why}"),
             });
         }
         let advice = if exit == Exit::NoBroker {
