@@ -220,6 +220,12 @@ fn cases() -> Vec<Case> {
             "undetermined",
             "notes.txt:1:",
         ),
+        catalogs(
+            "catalog_as_directory",
+            "../catalogs/vehicles.xosc/",
+            "rejected",
+            NOT_THERE,
+        ),
         catalogs("broken_catalog", "../half", "undetermined", "half.xosc:1:"),
         catalogs(
             "many_catalogs",
