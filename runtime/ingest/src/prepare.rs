@@ -419,13 +419,13 @@ impl Includes<'_> {
             .parent()
             .unwrap_or(Path::new(""))
             .to_path_buf();
-        let path = normal(&folder.join(written));
+        let path = normal(&folder, &folder.join(written));
         let path = if !is_there(&path) && written.contains('\\') {
-            normal(&folder.join(written.replace('\\', "/")))
+            normal(&folder, &folder.join(written.replace('\\', "/")))
         } else {
             path
         };
-        inside(&path, &normal(boundary), written)?;
+        inside(&path, &normal(boundary, boundary), written)?;
         if self.texts.len() > self.limits.max_includes as usize {
             let limit = self.limits.max_includes;
             let text = format!(
@@ -489,21 +489,27 @@ fn inside(path: &Path, boundary: &Path, written: &str) -> Result<(), Refusal> {
 
 /// A path without `.`, and without the `..` that steps out of a directory. One behind a link, a file or
 /// nothing stays, for there the words alone lead elsewhere than the system, and so than a simulator.
-pub(crate) fn normal(path: &Path) -> PathBuf {
+/// `base` is the directory of a file that was read, which may have been moved away meanwhile.
+pub(crate) fn normal(base: &Path, path: &Path) -> PathBuf {
+    let is_left = |normal: &Path| {
+        let data = foreign::symlink_metadata(normal);
+        data.map_or_else(|_| base.starts_with(normal), |data| data.is_dir())
+    };
     let mut normal = PathBuf::new();
     for part in path.components() {
         match part {
             Component::CurDir => {}
-            Component::ParentDir if is_directory(&normal) => _ = normal.pop(),
+            Component::ParentDir if is_left(&normal) => _ = normal.pop(),
             part => normal.push(part),
         }
     }
     normal
 }
 
-/// Whether a directory lies there itself, and no link to one.
-fn is_directory(path: &Path) -> bool {
-    foreign::symlink_metadata(path).is_ok_and(|data| data.is_dir())
+/// The [`normal`] path from the root of the file system.
+pub(crate) fn absolute(base: &Path, path: &Path) -> PathBuf {
+    let from_root = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    normal(&from_root(base), &from_root(path))
 }
 
 /// Whether a path says itself that it leads to a directory: for the system, `map.xodr/` is no file.

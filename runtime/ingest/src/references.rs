@@ -11,7 +11,7 @@ use qcbus_messages::path_text::from_text;
 use qcbus_messages::{Absence, DocumentRole};
 
 use crate::modular::{SearchPath, libraries};
-use crate::prepare::{names_directory, normal, split_members};
+use crate::prepare::{absolute, names_directory, split_members};
 
 /// A reference from a document to another file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -220,7 +220,7 @@ fn places(from: &Path, text: &str) -> Vec<PathBuf> {
     let (file, _) = split_members(from);
     let folder = file.parent().unwrap_or(Path::new(""));
     let joined = folder.join(text);
-    vec![normal(&std::path::absolute(&joined).unwrap_or(joined))]
+    vec![absolute(folder, &joined)]
 }
 
 /// The `.xosc` files of a folder by name, and what is said of those that are too many.

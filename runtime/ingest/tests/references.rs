@@ -89,6 +89,15 @@ fn path_leads_where_the_system_follows_it() {
     }
 }
 
+/// It was there when the scenario was read, and may be there again when the map is opened.
+#[test]
+fn directory_of_the_scenario_is_one_though_it_is_moved_away() {
+    let (_directory, root) = directories();
+    let text = "<OpenSCENARIO><RoadNetwork><LogicFile filepath='../../maps/a.xodr'/></RoadNetwork></OpenSCENARIO>";
+    let found = of(&root.join("moved/away/x.xosc"), text);
+    assert_eq!(found[0].candidates, [root.join("maps/a.xodr")]);
+}
+
 #[test]
 fn path_that_ends_as_a_directory_names_no_map() {
     for filepath in ["a.xodr/", "a.xodr/.", "maps/..", "a.xodr\\", "..", "."] {

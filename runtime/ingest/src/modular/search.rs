@@ -8,7 +8,7 @@ use qcbus_document::Document;
 use qcbus_messages::path_text::{from_text, split_archive};
 use qcbus_messages::{Absence, DocumentRole};
 
-use crate::prepare::{normal, split_members};
+use crate::prepare::{absolute, split_members};
 use crate::references::Reference;
 
 /// The variable that names the directories of a search path.
@@ -32,15 +32,11 @@ impl SearchPath {
             };
             directories.extend(parts);
         }
-        let absolute = |directory: PathBuf| {
-            let joined = base.join(directory);
-            normal(&std::path::absolute(&joined).unwrap_or(joined))
-        };
         let mut seen = HashSet::new();
         let directories = directories
             .into_iter()
             .filter(|directory| !directory.as_os_str().is_empty())
-            .map(absolute)
+            .map(|directory| absolute(base, &base.join(directory)))
             .filter(|directory| seen.insert(directory.clone()));
         SearchPath(directories.collect())
     }
@@ -164,7 +160,7 @@ fn places(from: &Path, text: &str, search: &SearchPath) -> Vec<PathBuf> {
     for directory in directories {
         for text in spellings(text) {
             let joined = directory.join(text);
-            places.push(normal(&std::path::absolute(&joined).unwrap_or(joined)));
+            places.push(absolute(directory, &joined));
         }
     }
     places
