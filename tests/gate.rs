@@ -16,7 +16,7 @@ use std::process::Command;
 
 use qcbus_messages::Verdict;
 use support::broker::Broker;
-use support::content::Content;
+use support::content::{self, Content, Mark};
 use support::desk::{Desk, files_below, sample_farm};
 use support::farm::{Farm, tail};
 use support::watchdog::{until_or, until_so};
@@ -104,6 +104,31 @@ fn all_that_is_accepted_is_published_with_what_it_needs() {
     is_sound(&farm);
     let gate = farm.status().unwrap().gate.unwrap();
     assert_eq!((gate.published, gate.held_back), (15, 0), "{gate:?}");
+}
+
+/// Behind the gate there are no symbolic links, so the same words lead to another map there.
+#[test]
+fn scenario_whose_map_is_reached_by_the_parent_of_a_link_is_held_back() {
+    let farm = farm_of(&[], &[]);
+    let far = farm.base().join("far");
+    std::fs::create_dir_all(far.join("deep")).unwrap();
+    std::fs::write(far.join("m.xodr"), Content::Good(1).bytes()).unwrap();
+    std::os::unix::fs::symlink(far.join("deep"), farm.root().join("link")).unwrap();
+    put(&farm, "m.xodr", &Content::Good(2).bytes());
+    put(
+        &farm,
+        content::CATALOG,
+        &Content::Catalog(1, Mark::Clean).bytes(),
+    );
+    let _broker = farm.serve_ready();
+    let scenario = Content::Scenario(1, "link/../m.xodr".to_owned());
+    put(&farm, "a.xosc", &scenario.bytes());
+    assert_eq!(farm.verdict("a.xosc").verdict, Verdict::Accepted);
+    publishes(&farm, &[content::CATALOG, "m.xodr"]);
+    let held_back = || farm.status()?.gate.filter(|it| it.held_back == 1);
+    until_or("it is told", held_back, || farm.log());
+    let said = farm.log();
+    assert!(said.contains("link/../m.xodr"), "{said}");
 }
 
 /// Scripts wait for the verdict, and then run what lies behind the gate.

@@ -74,7 +74,8 @@ impl ResultPaths {
 
     /// Whether the file is among those given or watched.
     pub fn contains(&self, path: &Path) -> bool {
-        self.files.contains(path) || self.roots.iter().any(|root| path.starts_with(root))
+        let is_below = |root: &PathBuf| path.starts_with(root) && !leads_upwards(path);
+        self.files.contains(path) || self.roots.iter().any(is_below)
     }
 
     /// Whether a result lies where this broker writes, so that it may remove it. No part of the path leads
@@ -119,6 +120,12 @@ pub fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(suffix);
     PathBuf::from(name)
+}
+
+/// Whether a path has a `..`. References keep it only behind a symbolic link, or where there is nothing, so
+/// its words do not tell where it leads.
+pub fn leads_upwards(path: &Path) -> bool {
+    path.components().any(|part| part == Component::ParentDir)
 }
 
 fn below(path: &Path, ancestor: &Path) -> PathBuf {
@@ -172,6 +179,7 @@ mod tests {
         let shown = places.shown_at(Path::new("/out/maps/a.xodr.xqar"));
         assert_eq!(shown.as_deref(), Some(Path::new("maps/a.xodr")));
         assert_eq!(places.shown_at(Path::new("/elsewhere/a.xodr.xqar")), None);
+        assert!(!places.contains(Path::new("/farm/link/../a.xodr")));
     }
 
     #[test]

@@ -25,7 +25,7 @@ use crate::core::{Input, Judged, Reading, RestsOn};
 use crate::directory_lock::{DirectoryLock, Purpose};
 use crate::journal::Remembered;
 use crate::outputs::Outputs;
-use crate::result_paths::ResultPaths;
+use crate::result_paths::{ResultPaths, leads_upwards};
 use crate::scouts::Scouts;
 use crate::seams::step;
 use crate::stamp::is_listing;
@@ -433,6 +433,14 @@ impl Gate {
         if let Some(unread) = unread.find(|it| self.options.paths.contains(&it.path)) {
             let shown = to_text(&unread.path);
             return Some(format!("it depends on {shown}, which could not be read"));
+        }
+        let mut files = judged.inputs.iter().filter(|input| is_file(input));
+        if let Some(upwards) = files.find(|it| leads_upwards(&it.path)) {
+            let shown = to_text(&upwards.path);
+            return Some(format!(
+                "it depends on {shown}; a published copy has no symbolic links, so .. would lead \
+                 elsewhere there: refer to the file by a path without the link"
+            ));
         }
         let outside = self.outside(&judged.inputs);
         let first = outside.first().map(|path| to_text(path));

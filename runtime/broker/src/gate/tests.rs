@@ -246,6 +246,22 @@ fn what_lies_outside_is_named_or_refused() {
     }
 }
 
+/// Behind the gate there are no links: the same words lead to another file there, or to none.
+#[test]
+fn what_is_found_by_the_parent_of_a_link_is_not_published() {
+    let bench = Bench::new(Outside::Name);
+    let far = bench.dir.path().join("far");
+    std::fs::create_dir_all(far.join("deep")).unwrap();
+    std::fs::write(far.join("a.xodr"), "another map").unwrap();
+    std::os::unix::fs::symlink(far.join("deep"), bench.path("link")).unwrap();
+    let inputs = vec![bench.input("s.xosc"), bench.input("link/../a.xodr")];
+    let judged = accepted(inputs);
+    bench.gate.accept(&bench.path("s.xosc"), &judged).unwrap();
+    assert_eq!(bench.behind(), names(&[]));
+    let said = bench.said();
+    assert!(said[0].contains("link/../a.xodr"), "{said:?}");
+}
+
 #[test]
 fn an_ignored_file_comes_along_until_it_gets_a_verdict() {
     let bench = Bench::new(Outside::Name);

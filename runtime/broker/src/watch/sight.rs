@@ -10,6 +10,7 @@ use rustix::io::Errno;
 
 use super::ignore::hidden_above;
 use crate::core::Stamp;
+use crate::result_paths::leads_upwards;
 use crate::stamp::from_metadata;
 
 /// What lies at a path.
@@ -127,6 +128,9 @@ fn is_looked_into(roots: &[PathBuf], directory: &Path) -> bool {
 /// Whether a path below a root leads through a symbolic link to a directory. What lies there is not
 /// looked at under this path.
 pub fn is_behind_a_link(path: &Path, roots: &[PathBuf]) -> bool {
+    if leads_upwards(path) {
+        return true;
+    }
     let Some(directory) = path.parent() else {
         return false;
     };
@@ -237,7 +241,12 @@ mod tests {
             look_at(&root.join("maps/c.xodr"), &roots),
             Sight::File(_)
         ));
-        for link in ["inner/c.xodr", "outer/a.xodr"] {
+        for link in [
+            "inner/c.xodr",
+            "outer/a.xodr",
+            "inner/../a.xodr",
+            "maps/../a.xodr",
+        ] {
             assert_eq!(look_at(&root.join(link), &roots), Sight::Nothing);
             assert!(is_behind_a_link(&root.join(link), &roots));
         }
