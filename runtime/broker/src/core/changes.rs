@@ -32,9 +32,20 @@ enum Dependence {
 impl State {
     /// A file is there and may still be written to.
     pub(super) fn present(&mut self, path: &Arc<Path>) {
-        let known = self.files.id(path).and_then(|id| self.files.get_mut(id));
-        if let Some(entry) = known {
-            entry.present = true;
+        if let Some(id) = self.files.id(path) {
+            self.is_there(id);
+        }
+    }
+
+    /// A file is there. When it has a verdict from before a restart, a shadow that was ready sooner than the watcher
+    /// does not know of it yet.
+    fn is_there(&mut self, id: FileId) {
+        let Some(entry) = self.files.get_mut(id) else {
+            return;
+        };
+        let was_there = std::mem::replace(&mut entry.present, true);
+        if !was_there && entry.judged.is_some() {
+            self.let_shadows_try(id);
         }
     }
 
@@ -158,9 +169,9 @@ impl State {
         let at_work = !matches!(entry.stage(), Stage::Idle);
         let same = entry.present && entry.stamp == stamp && (as_judged || at_work);
         let is_doubted = entry.doubted && !at_work;
-        entry.present = true;
         entry.stamp = stamp;
         entry.asked = self.now;
+        self.is_there(id);
         if !as_judged {
             self.shut(id, actions);
         }

@@ -6,6 +6,8 @@ use super::super::*;
 use super::things::*;
 use super::world::World;
 use qcbus_messages::Verdict;
+use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 impl World {
@@ -273,6 +275,36 @@ fn a_shadow_that_comes_has_no_other_try_anything_again() {
         .shadow_is_ready("Another", Mark(1), &mut actions);
     let waiting = |name: &str| world.state.trial_counts(name).unwrap().waiting;
     assert_eq!((waiting("Another"), world.trials().0), (1, before));
+}
+
+/// After a restart a shadow may be ready before the watcher has seen the files whose verdicts the journal knows.
+#[test]
+fn shadow_that_is_ready_before_the_files_are_seen_tries_them() {
+    let seen: [fn(Arc<Path>, Stamp) -> Event; 2] = [
+        |path, stamp| Event::Settled { path, stamp },
+        |path, _| Event::Present { path },
+    ];
+    for seen in seen {
+        let mut world = world_with_a_shadow();
+        world.write(0);
+        world.comes_to_rest();
+        let path = path_of(0);
+        let id = world.state.files.id(&path).unwrap();
+        let entry = world.state.files.get_mut(id).unwrap();
+        entry.present = false;
+        let stamp = entry.stamp;
+        let mut actions = Vec::new();
+        world
+            .state
+            .shadow_is_ready("Another", Mark(1), &mut actions);
+        let waiting = |world: &World| world.state.trial_counts("Another").unwrap().waiting;
+        assert_eq!(waiting(&world), 0);
+        for _ in 0..2 {
+            let path = path.clone();
+            world.event(seen(path, stamp));
+            assert_eq!(waiting(&world), 1);
+        }
+    }
 }
 
 #[test]
