@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::ffi::OsStr;
+use std::io::ErrorKind;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Component, Path, PathBuf};
 
@@ -491,9 +492,9 @@ fn inside(path: &Path, boundary: &Path, written: &str) -> Result<(), Refusal> {
 /// nothing stays, for there the words alone lead elsewhere than the system, and so than a simulator.
 /// `base` is the directory of a file that was read, which may have been moved away meanwhile.
 pub(crate) fn normal(base: &Path, path: &Path) -> PathBuf {
-    let is_left = |normal: &Path| {
-        let data = foreign::symlink_metadata(normal);
-        data.map_or_else(|_| base.starts_with(normal), |data| data.is_dir())
+    let is_left = |normal: &Path| match foreign::symlink_metadata(normal) {
+        Ok(data) => data.is_dir(),
+        Err(error) => error.kind() == ErrorKind::NotFound && base.starts_with(normal),
     };
     let mut normal = PathBuf::new();
     for part in path.components() {
