@@ -438,7 +438,7 @@ impl Gate {
         if let Some(upwards) = files.find(|it| leads_upwards(&it.path)) {
             let shown = to_text(&upwards.path);
             return Some(format!(
-                "it depends on {shown}; a published copy has no symbolic links, so .. would lead \
+                "it depends on {shown}; a published copy has no symbolic links, so `..` would lead \
                  elsewhere there: refer to the file by a path without the link"
             ));
         }

@@ -125,8 +125,8 @@ fn is_looked_into(roots: &[PathBuf], directory: &Path) -> bool {
     is_inside && hidden_above(roots, directory).is_none()
 }
 
-/// Whether a path below a root leads through a symbolic link to a directory. What lies there is not
-/// looked at under this path.
+/// Whether a path below a root leads through a symbolic link to a directory, or has a `..`, which is there only
+/// behind one. What lies there is not looked at under this path.
 pub fn is_behind_a_link(path: &Path, roots: &[PathBuf]) -> bool {
     if leads_upwards(path) {
         return true;
