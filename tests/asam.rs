@@ -14,7 +14,7 @@ use std::process::{Command, Stdio};
 
 use qcbus_formats::xqar::Results;
 use support::asam;
-use support::desk::{Desk, checkers, files_below, issues, sample_farm};
+use support::cli::{Cli, checkers, files_below, issues, sample_farm};
 use support::inside::skip;
 
 const IDS: &str = "check_asam_xodr_ids_id_unique_in_class";
@@ -41,11 +41,11 @@ const ALL: &str = "maxLevel=\"1\" minLevel=\"3\"";
 
 #[test]
 fn a_configuration_runs_what_it_names_and_nothing_else() {
-    let desk = Desk::new();
-    desk.write("config.xml", config(&header_faults(), ALL, ""));
-    let said = desk.qcbus(&["check", "-c", "config.xml"]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
-    let results = desk.result("Result.xqar");
+    let cli = Cli::new();
+    cli.write("config.xml", config(&header_faults(), ALL, ""));
+    let said = cli.qcbus(&["check", "-c", "config.xml"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
+    let results = cli.result("Result.xqar");
     let bundles: Vec<&str> = results.bundles.iter().map(|it| it.name.as_str()).collect();
     assert_eq!(bundles.first(), Some(&"xodrBundle"), "{bundles:?}");
     let configured: Vec<&str> = results.bundles[0]
@@ -62,7 +62,7 @@ fn a_configuration_runs_what_it_names_and_nothing_else() {
         bundles[1..].iter().all(|name| *name == "qcbus"),
         "{bundles:?}"
     );
-    let written: Vec<PathBuf> = files_below(desk.path());
+    let written: Vec<PathBuf> = files_below(cli.path());
     assert!(
         written.iter().all(|it| it.starts_with(".run")
             || it.ends_with("Result.xqar")
@@ -70,8 +70,8 @@ fn a_configuration_runs_what_it_names_and_nothing_else() {
         "{written:?}"
     );
 
-    desk.qcbus(&["check", "-c", "config.xml", "--out", "elsewhere"]);
-    let read = |name: &str| std::fs::read(desk.path().join(name)).unwrap();
+    cli.qcbus(&["check", "-c", "config.xml", "--out", "elsewhere"]);
+    let read = |name: &str| std::fs::read(cli.path().join(name)).unwrap();
     assert_eq!(read("Result.xqar"), read("elsewhere/Result.xqar"));
 }
 
@@ -85,10 +85,10 @@ fn levels_kept(results: &Results) -> Vec<u8> {
 #[test]
 fn levels_are_an_interval_in_both_orders() {
     let kept = |levels: &str| {
-        let desk = Desk::new();
-        desk.write("config.xml", config(&header_faults(), levels, ""));
-        desk.qcbus(&["check", "-c", "config.xml"]);
-        let results = desk.result("Result.xqar");
+        let cli = Cli::new();
+        cli.write("config.xml", config(&header_faults(), levels, ""));
+        cli.qcbus(&["check", "-c", "config.xml"]);
+        let results = cli.result("Result.xqar");
         let old = checkers(&results).filter(|it| *it.id != *IDS && *it.id != *HEADER);
         let remarks = old
             .flat_map(|it| &it.issues)
@@ -116,10 +116,10 @@ fn levels_are_an_interval_in_both_orders() {
 
 #[test]
 fn report_modules_run_afterwards_with_their_params() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     let (text, json) = (
-        desk.path().join("r/report.txt"),
-        desk.path().join("r/report.json"),
+        cli.path().join("r/report.txt"),
+        cli.path().join("r/report.json"),
     );
     let modules = format!(
         "<ReportModule application=\"TextReport\"><Param name=\"OutputFile\" value=\"{}\"/></ReportModule>\n\
@@ -128,11 +128,11 @@ fn report_modules_run_afterwards_with_their_params() {
         text.display(),
         json.display()
     );
-    desk.write("config.xml", config(&header_faults(), ALL, &modules));
-    let said = desk.qcbus(&["check", "-c", "config.xml"]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    cli.write("config.xml", config(&header_faults(), ALL, &modules));
+    let said = cli.qcbus(&["check", "-c", "config.xml"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
     let text =
-        std::fs::read_to_string(text).unwrap_or_else(|it| panic!("{it}\n{}", said.whole(&desk)));
+        std::fs::read_to_string(text).unwrap_or_else(|it| panic!("{it}\n{}", said.whole(&cli)));
     assert!(text.contains("there is a second `header`"), "{text}");
     let json = std::fs::read_to_string(json).unwrap();
     assert!(
@@ -144,32 +144,32 @@ fn report_modules_run_afterwards_with_their_params() {
 
 #[test]
 fn a_malformed_configuration_is_refused_with_its_place() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     // The slip in an example of 2023: a letter outside the quotes.
     let broken = config(&header_faults(), ALL, "").replace("value=\"", "value=\"e\"");
-    desk.write("config.xml", broken);
+    cli.write("config.xml", broken);
     for command in [
         &["check", "-c", "config.xml"][..],
         &["config", "check", "config.xml"],
     ] {
-        let said = desk.qcbus(command);
-        assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+        let said = cli.qcbus(command);
+        assert_eq!(said.code, Some(2), "{}", said.whole(&cli));
         assert!(said.stderr.contains("config.xml:3:"), "{}", said.stderr);
     }
-    assert!(!desk.path().join("Result.xqar").exists());
+    assert!(!cli.path().join("Result.xqar").exists());
 }
 
 #[test]
 fn unknown_names_are_warned_about_with_their_place() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     let more = "<CheckerBundle application=\"xodrBundel\"><Checker checkerId=\"c\" maxLevel=\"1\" minLevel=\"3\"/></CheckerBundle>\n\
                 <ReportModule application=\"GitforgeReport\"/>\n";
-    desk.write(
+    cli.write(
         "config.xml",
         config(&header_faults(), ALL, more).replace(HEADER, "check_qcbus_xodr_header_atributes"),
     );
-    let said = desk.qcbus(&["config", "check", "config.xml"]);
-    assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+    let said = cli.qcbus(&["config", "check", "config.xml"]);
+    assert_eq!(said.code, Some(2), "{}", said.whole(&cli));
     for (name, row) in [
         ("check_qcbus_xodr_header_atributes", 6),
         ("xodrBundel", 8),
@@ -186,17 +186,17 @@ fn unknown_names_are_warned_about_with_their_place() {
 
 #[test]
 fn a_bundle_is_a_module_of_the_framework() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     let with_file = config(&header_faults(), ALL, "").replace(
         "<Checker checkerId=\"check_asam",
         "<Param name=\"resultFile\" value=\"xodr.xqar\"/>\n<Checker checkerId=\"check_asam",
     );
-    desk.write("config.xml", with_file);
-    let said = desk.qcbus(&["bundle", "run", "xodr", "-c", "config.xml"]);
-    assert!(said.code.is_some_and(|it| it <= 1), "{}", said.whole(&desk));
-    let written = std::fs::read_to_string(desk.path().join("xodr.xqar")).unwrap();
+    cli.write("config.xml", with_file);
+    let said = cli.qcbus(&["bundle", "run", "xodr", "-c", "config.xml"]);
+    assert!(said.code.is_some_and(|it| it <= 1), "{}", said.whole(&cli));
+    let written = std::fs::read_to_string(cli.path().join("xodr.xqar")).unwrap();
     assert_eq!(asam::complaints(&written), [""; 0]);
-    assert!(issues(&desk.result("xodr.xqar")).any(|(checker, _)| *checker.id == *HEADER));
+    assert!(issues(&cli.result("xodr.xqar")).any(|(checker, _)| *checker.id == *HEADER));
 }
 
 /// A Python with ASAM's library, or why there is none.
@@ -249,19 +249,19 @@ fn asams_own_library_reads_every_result() {
         Ok(python) => python,
         Err(why) => return skip("asams_own_library_reads_every_result", &why),
     };
-    let desk = Desk::new();
-    desk.check_in(&sample_farm(), &["."], "out");
-    desk.write("config.xml", config(&header_faults(), ALL, ""));
-    desk.qcbus(&["check", "-c", "config.xml"]);
-    let files = files_below(&desk.path().join("out"));
+    let cli = Cli::new();
+    cli.check_in(&sample_farm(), &["."], "out");
+    cli.write("config.xml", config(&header_faults(), ALL, ""));
+    cli.qcbus(&["check", "-c", "config.xml"]);
+    let files = files_below(&cli.path().join("out"));
     let mut files: Vec<PathBuf> = files
         .iter()
-        .map(|file| desk.path().join("out").join(file))
+        .map(|file| cli.path().join("out").join(file))
         .collect();
-    files.push(desk.path().join("Result.xqar"));
+    files.push(cli.path().join("Result.xqar"));
     let mut expected = String::new();
     for file in &files {
-        for bundle in &support::desk::read_result(file).bundles {
+        for bundle in &support::cli::read_result(file).bundles {
             for checker in &bundle.checkers {
                 let status = checker.status.unwrap().as_str();
                 expected.push_str(&format!(
@@ -273,7 +273,7 @@ fn asams_own_library_reads_every_result() {
             }
         }
     }
-    let said = desk.run(Command::new(python).arg("-c").arg(READ).args(&files));
+    let said = cli.run(Command::new(python).arg("-c").arg(READ).args(&files));
     assert_eq!(said.code, Some(0), "{}", said.stderr);
     assert_eq!(said.stdout, expected);
 }

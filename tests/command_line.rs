@@ -8,17 +8,17 @@
 
 mod support;
 
+use support::cli::Cli;
 use support::content::Content;
-use support::desk::Desk;
 
 /// Types several commands and shows what was said.
-fn session(desk: &Desk, commands: &[&str]) -> String {
+fn session(cli: &Cli, commands: &[&str]) -> String {
     let mut text = String::new();
     for command in commands {
         let words: Vec<&str> = command.split_whitespace().collect();
         text.push_str(&format!(
             "$ qcbus {command}\n{}\n",
-            desk.qcbus(&words).whole(desk)
+            cli.qcbus(&words).whole(cli)
         ));
     }
     text
@@ -26,9 +26,9 @@ fn session(desk: &Desk, commands: &[&str]) -> String {
 
 #[test]
 fn help_of_every_command() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     insta::assert_snapshot!(session(
-        &desk,
+        &cli,
         &[
             "--help",
             "check --help",
@@ -52,11 +52,11 @@ fn help_of_every_command() {
 
 #[test]
 fn mistakes_are_said_with_what_to_do() {
-    let desk = Desk::new();
-    desk.write("notes.txt", "nothing");
-    std::fs::create_dir(desk.path().join("empty")).unwrap();
+    let cli = Cli::new();
+    cli.write("notes.txt", "nothing");
+    std::fs::create_dir(cli.path().join("empty")).unwrap();
     insta::assert_snapshot!(session(
-        &desk,
+        &cli,
         &[
             "chekc",
             "check",
@@ -88,7 +88,7 @@ fn mistakes_are_said_with_what_to_do() {
 
 #[test]
 fn parameter_that_every_checker_has_is_in_order_and_one_that_it_cannot_read_is_not() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     let config = |name: &str, value: &str| {
         format!(
             "<Config><CheckerBundle application=\"xodrBundle\">\n\
@@ -96,10 +96,10 @@ fn parameter_that_every_checker_has_is_in_order_and_one_that_it_cannot_read_is_n
              <Param name=\"{name}\" value=\"{value}\"/></Checker></CheckerBundle></Config>\n"
         )
     };
-    desk.write("listed.xml", config("qcbus.max_issues", "5"));
-    desk.write("comma.xml", config("gap_broken_from", "0,05"));
+    cli.write("listed.xml", config("qcbus.max_issues", "5"));
+    cli.write("comma.xml", config("gap_broken_from", "0,05"));
     insta::assert_snapshot!(session(
-        &desk,
+        &cli,
         &["config check listed.xml", "config check comma.xml"]
     ));
 }
@@ -131,28 +131,28 @@ fn wait_knows_why_there_will_be_no_verdict() {
 
 #[test]
 fn a_rule_explains_itself() {
-    let desk = Desk::new();
-    let said = desk.qcbus(&["rule", "check_asam_xodr_xml_fileheader_is_present"]);
-    insta::assert_snapshot!(said.whole(&desk));
-    let listed = desk.qcbus(&["rule"]);
+    let cli = Cli::new();
+    let said = cli.qcbus(&["rule", "check_asam_xodr_xml_fileheader_is_present"]);
+    insta::assert_snapshot!(said.whole(&cli));
+    let listed = cli.qcbus(&["rule"]);
     assert!(listed.stdout.lines().count() > 10);
     for line in listed.stdout.lines() {
         let id = line.split_whitespace().next().unwrap();
-        assert_eq!(desk.qcbus(&["rule", id]).code, Some(0), "{id}");
+        assert_eq!(cli.qcbus(&["rule", id]).code, Some(0), "{id}");
     }
 }
 
 #[test]
 fn doctor_and_bundle_list_work_without_a_broker() {
-    let desk = Desk::new();
-    let said = desk.qcbus(&["doctor"]);
+    let cli = Cli::new();
+    let said = cli.qcbus(&["doctor"]);
     assert!(
         said.stdout
             .lines()
             .all(|it| it.starts_with("ok") || it.starts_with("FIX") || it.starts_with("  "))
     );
     assert!(said.stdout.contains("shared memory") && said.stdout.contains("journal"));
-    let said = desk.qcbus(&["bundle", "list"]);
+    let said = cli.qcbus(&["bundle", "list"]);
     assert_eq!(said.code, Some(0));
     let names: Vec<&str> = said
         .stdout
@@ -164,19 +164,19 @@ fn doctor_and_bundle_list_work_without_a_broker() {
 
 #[test]
 fn quiet_and_json_say_no_more_than_asked() {
-    let desk = Desk::new();
-    desk.write("in/a.xodr", Content::Good(1).bytes());
-    desk.write("in/b.xodr", Content::NoHeader(1).bytes());
-    let quiet = desk.qcbus(&["check", "in", "--quiet"]);
+    let cli = Cli::new();
+    cli.write("in/a.xodr", Content::Good(1).bytes());
+    cli.write("in/b.xodr", Content::NoHeader(1).bytes());
+    let quiet = cli.qcbus(&["check", "in", "--quiet"]);
     let lines: Vec<&str> = quiet.stdout.lines().collect();
-    assert_eq!(lines.len(), 1, "{}", quiet.whole(&desk));
+    assert_eq!(lines.len(), 1, "{}", quiet.whole(&cli));
     assert!(
         lines[0].starts_with("in/b.xodr:2:1: error: "),
         "{}",
         lines[0]
     );
     assert_eq!((quiet.code, quiet.stderr.as_str()), (Some(1), ""));
-    let json = desk.qcbus(&["check", "in", "--format", "json"]);
+    let json = cli.qcbus(&["check", "in", "--format", "json"]);
     assert_eq!(
         (json.code, json.stdout.lines().count()),
         (Some(1), 2),
@@ -190,35 +190,35 @@ fn quiet_and_json_say_no_more_than_asked() {
 
 #[test]
 fn a_bundle_is_added_where_the_options_say_and_gets_what_follows_two_dashes() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     let add = |name: &str, further: &[&str]| {
         let mut arguments = vec!["bundle", "add", name, "/bin/sh", "--offline"];
         arguments.extend(further);
-        desk.qcbus(&arguments)
+        cli.qcbus(&arguments)
     };
     let said = add("mine", &["--bundles-d", "bundles"]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-    assert_eq!(desk.command_in("bundles/mine.json"), "/bin/sh");
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
+    assert_eq!(cli.command_in("bundles/mine.json"), "/bin/sh");
     let own = ["a", "--bundles-d", "bundles", "--", "--bundles-d", "x"];
     assert_eq!(add("other", &own).code, Some(0));
     let command = "/bin/sh a --bundles-d x";
-    assert_eq!(desk.command_in("bundles/other.json"), command);
+    assert_eq!(cli.command_in("bundles/other.json"), command);
     let unclear = add("third", &["--bundles-d", "bundles", "--its-own-flag"]);
     assert_eq!(unclear.code, Some(2));
     assert!(
         unclear.stderr.contains("'-- --its-own-flag'"),
         "{}",
-        unclear.whole(&desk)
+        unclear.whole(&cli)
     );
-    assert!(!desk.path().join("bundles/third.json").exists());
-    assert!(!desk.path().join("qcbus-out").exists());
+    assert!(!cli.path().join("bundles/third.json").exists());
+    assert!(!cli.path().join("qcbus-out").exists());
 }
 
 #[test]
 fn a_gate_that_is_watched_is_refused_whatever_the_way_to_it() {
-    let desk = Desk::new();
-    desk.write("in/a.xodr", "");
-    std::os::unix::fs::symlink("in", desk.path().join("farm")).unwrap();
+    let cli = Cli::new();
+    cli.write("in/a.xodr", "");
+    std::os::unix::fs::symlink("in", cli.path().join("farm")).unwrap();
     for (gate, words) in [
         ("farm/accepted", "lies inside the watched directory"),
         ("in/new/accepted", "lies inside the watched directory"),
@@ -229,31 +229,31 @@ fn a_gate_that_is_watched_is_refused_whatever_the_way_to_it() {
         ("farm", "lies inside the watched directory"),
         (".", "lies inside the gate"),
     ] {
-        let said = desk.qcbus(&["serve", "farm", "--gate", gate]);
-        assert_eq!(said.code, Some(2), "{gate}: {}", said.whole(&desk));
-        assert!(said.stderr.contains(words), "{gate}: {}", said.whole(&desk));
+        let said = cli.qcbus(&["serve", "farm", "--gate", gate]);
+        assert_eq!(said.code, Some(2), "{gate}: {}", said.whole(&cli));
+        assert!(said.stderr.contains(words), "{gate}: {}", said.whole(&cli));
     }
-    assert!(!desk.path().join("in/accepted").exists());
+    assert!(!cli.path().join("in/accepted").exists());
 }
 
 /// A check that asks nobody is in need of no instance.
 #[test]
 fn a_check_is_made_where_no_instance_can_be() {
-    let desk = Desk::new();
-    let map = desk.write("map.xodr", Content::Good(1).bytes());
+    let cli = Cli::new();
+    let map = cli.write("map.xodr", Content::Good(1).bytes());
     let map = map.to_str().unwrap();
-    let there = desk.qcbus(&["check", map, "--cold"]);
-    assert_eq!(there.code, Some(0), "{}", there.whole(&desk));
-    let instance = desk.path().join(".run/qcbus/default");
+    let there = cli.qcbus(&["check", map, "--cold"]);
+    assert_eq!(there.code, Some(0), "{}", there.whole(&cli));
+    let instance = cli.path().join(".run/qcbus/default");
     // An earlier command may have made it.
     let _ = std::fs::remove_dir(&instance);
     std::fs::write(&instance, "no directory").unwrap();
     for more in [&[][..], &["--cold"]] {
-        let said = desk.qcbus(&[&["check", map], more].concat());
-        assert_eq!(said.whole(&desk), there.whole(&desk), "{more:?}");
+        let said = cli.qcbus(&[&["check", map], more].concat());
+        assert_eq!(said.whole(&cli), there.whole(&cli), "{more:?}");
     }
     // One that is named is not passed over.
-    let said = desk.qcbus(&["check", map, "--instance", "../other"]);
-    assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
-    assert!(said.stderr.contains("../other"), "{}", said.whole(&desk));
+    let said = cli.qcbus(&["check", map, "--instance", "../other"]);
+    assert_eq!(said.code, Some(2), "{}", said.whole(&cli));
+    assert!(said.stderr.contains("../other"), "{}", said.whole(&cli));
 }

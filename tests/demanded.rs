@@ -11,34 +11,34 @@ mod support;
 
 use std::path::Path;
 
-use support::desk::{Desk, Said, sample_farm};
+use support::cli::{Cli, Said, sample_farm};
 
-fn check_with(desk: &Desk, bundle: &str, checkers: &[&str], file: &Path) -> Said {
+fn check_with(cli: &Cli, bundle: &str, checkers: &[&str], file: &Path) -> Said {
     let checkers: String = checkers
         .iter()
         .map(|id| format!("<Checker checkerId=\"{id}\"/>"))
         .collect();
-    desk.write(
+    cli.write(
         "config.xml",
         format!(
             "<Config><CheckerBundle application=\"{bundle}\">{checkers}</CheckerBundle></Config>"
         ),
     );
     let file = file.to_string_lossy();
-    desk.qcbus(&["check", "-c", "config.xml", &file])
+    cli.qcbus(&["check", "-c", "config.xml", &file])
 }
 
 const IDS: &str = "check_asam_xodr_ids_id_unique_in_class";
 
 #[test]
 fn what_a_demanded_checker_rests_on_counts_whoever_demanded_it() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     let broken = sample_farm().join("faulty/not_well_formed.xodr");
-    let said = check_with(&desk, "xodrBundle", &[IDS], &broken);
-    let whole = said.whole(&desk);
+    let said = check_with(&cli, "xodrBundle", &[IDS], &broken);
+    let whole = said.whole(&cli);
     assert_eq!(said.code, Some(1), "{whole}");
     assert!(said.stdout.contains("not_well_formed.xodr:40:5"), "{whole}");
-    let results = desk.result("Result.xqar");
+    let results = cli.result("Result.xqar");
     let ids: Vec<&str> = results.bundles[0]
         .checkers
         .iter()
@@ -53,9 +53,9 @@ fn what_a_demanded_checker_rests_on_counts_whoever_demanded_it() {
 
 #[test]
 fn a_module_tells_what_kept_a_demanded_checker_from_looking() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     let broken = sample_farm().join("faulty/not_well_formed.xodr");
-    desk.write(
+    cli.write(
         "config.xml",
         format!(
             "<Config><Param name=\"InputFile\" value=\"{}\"/><CheckerBundle \
@@ -63,9 +63,9 @@ fn a_module_tells_what_kept_a_demanded_checker_from_looking() {
             broken.display()
         ),
     );
-    let said = desk.qcbus(&["bundle", "run", "xodr", "-c", "config.xml"]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-    let results = desk.result("xodrBundle.xqar");
+    let said = cli.qcbus(&["bundle", "run", "xodr", "-c", "config.xml"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
+    let results = cli.result("xodrBundle.xqar");
     let found = results.bundles[0]
         .checkers
         .iter()
@@ -75,9 +75,9 @@ fn a_module_tells_what_kept_a_demanded_checker_from_looking() {
 
 #[test]
 fn a_filter_on_what_a_checker_rests_on_makes_no_acceptance() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     let broken = sample_farm().join("faulty/not_well_formed.xodr");
-    desk.write(
+    cli.write(
         "config.xml",
         format!(
             "<Config><CheckerBundle application=\"xodrBundle\"><Checker checkerId=\"{IDS}\"/>\
@@ -85,33 +85,33 @@ fn a_filter_on_what_a_checker_rests_on_makes_no_acceptance() {
              minLevel=\"3\"/></CheckerBundle></Config>"
         ),
     );
-    let said = desk.qcbus(&["check", "-c", "config.xml", &broken.to_string_lossy()]);
-    assert_eq!(said.code, Some(3), "{}", said.whole(&desk));
+    let said = cli.qcbus(&["check", "-c", "config.xml", &broken.to_string_lossy()]);
+    assert_eq!(said.code, Some(3), "{}", said.whole(&cli));
 }
 
 #[test]
 fn where_no_demanded_checker_applies_nobody_looked() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     // Of a later version than the file.
     let later = "check_asam_xodr_road_lane_layer_lane_group_width_temporary";
     let plain = sample_farm().join("maps/ring.xodr");
-    let said = check_with(&desk, "xodrBundle", &[later], &plain);
-    let whole = said.whole(&desk);
+    let said = check_with(&cli, "xodrBundle", &[later], &plain);
+    let whole = said.whole(&cli);
     assert_eq!(said.code, Some(3), "{whole}");
     assert!(
         said.stdout.contains("does not apply to this file"),
         "{whole}"
     );
-    let both = check_with(&desk, "xodrBundle", &[later, IDS], &plain);
-    assert_eq!(both.code, Some(0), "{}", both.whole(&desk));
+    let both = check_with(&cli, "xodrBundle", &[later, IDS], &plain);
+    assert_eq!(both.code, Some(0), "{}", both.whole(&cli));
 }
 
 #[test]
 fn how_little_was_asked_is_said_in_one_line() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     let good = sample_farm().join("maps/ring.xodr");
-    let said = check_with(&desk, "xodrBundle", &[IDS], &good);
-    let whole = said.whole(&desk);
+    let said = check_with(&cli, "xodrBundle", &[IDS], &good);
+    let whole = said.whole(&cli);
     assert_eq!(said.code, Some(0), "{whole}");
     let line = said.stdout.lines().find(|line| line.contains("not asked"));
     let line = line.unwrap_or_else(|| panic!("{whole}")).trim();
@@ -125,6 +125,6 @@ fn how_little_was_asked_is_said_in_one_line() {
     let (out, all): (usize, usize) = (out.parse().unwrap(), all.parse().unwrap());
     assert!(out + 1 == all && all > 200, "{line}");
 
-    let plain = desk.qcbus(&["check", &good.to_string_lossy()]);
+    let plain = cli.qcbus(&["check", &good.to_string_lossy()]);
     assert!(!plain.stdout.contains("not asked"), "{}", plain.stdout);
 }

@@ -19,7 +19,7 @@ use support::content::{CATALOG, Content, Mark};
 use support::farm::{Farm, copy_program, tail, zoo};
 use support::inside::skip;
 use support::judge::{Files, judge};
-use support::tracer::{Answer, Kind, Traced, Trouble, no_other_answers};
+use support::tracer::{Answer, Kind, Traced, Failure, no_other_answers};
 use support::watchdog::{pause, until_or};
 
 /// A farm whose broker gets other answers.
@@ -119,8 +119,8 @@ impl Victim {
     }
 
     /// While this goes wrong, files come and change.
-    fn through(&mut self, what: &str, trouble: &Trouble, enough: usize, lasts: Duration) {
-        self.broker.trouble(Some(trouble.clone()));
+    fn through(&mut self, what: &str, failure: &Failure, enough: usize, lasts: Duration) {
+        self.broker.failure(Some(failure.clone()));
         let begun = Instant::now();
         let mut round = 0;
         while self.broker.troubled() < enough || begun.elapsed() < lasts {
@@ -135,7 +135,7 @@ impl Victim {
                 self.explain()
             );
         }
-        let times = self.broker.trouble(None);
+        let times = self.broker.failure(None);
         assert!(times >= enough, "{what}: {times} times");
         self.settles(what);
     }
@@ -149,8 +149,8 @@ fn error(
     kinds: &'static [Kind],
     error: Errno,
     one_in: usize,
-) -> Trouble {
-    Trouble {
+) -> Failure {
+    Failure {
         below,
         kinds,
         answer: Answer::Error(error),
@@ -171,8 +171,8 @@ fn errors_of_a_moment_pass_when_the_moment_does() {
         (Errno::ESTALE, 1),
         (Errno::ENOMEM, 3),
     ] {
-        let trouble = error(root.clone(), ANY_READING, code, one_in);
-        victim.through(&format!("{code} for a while"), &trouble, 20, lasts);
+        let failure = error(root.clone(), ANY_READING, code, one_in);
+        victim.through(&format!("{code} for a while"), &failure, 20, lasts);
     }
 }
 
@@ -184,7 +184,7 @@ fn interruptions_and_short_reads_change_nothing() {
     let base = victim.farm.base().to_path_buf();
     let interrupted = error(base.clone(), &[Kind::Look, Kind::Read], Errno::EINTR, 3);
     victim.through("interruptions", &interrupted, 50, Duration::ZERO);
-    let short = Trouble {
+    let short = Failure {
         below: victim.farm.root(),
         kinds: &[Kind::Read],
         answer: Answer::Short,
@@ -230,7 +230,7 @@ fn a_file_that_never_answers_is_named_and_holds_up_nobody() {
     for (round, (kind, one_in)) in looks.chain([(Kind::Read, 1)]).enumerate() {
         let round = u64::try_from(round).unwrap();
         let map = victim.farm.root().join("map.xodr");
-        victim.broker.trouble(Some(Trouble {
+        victim.broker.failure(Some(Failure {
             below: map.clone(),
             kinds: if kind == Kind::Look {
                 &[Kind::Look]
@@ -273,7 +273,7 @@ fn a_file_that_never_answers_is_named_and_holds_up_nobody() {
         };
         assert!(is_no_verdict, "{said:?}");
         victim.says_nothing_false("a file does not answer");
-        victim.broker.trouble(None);
+        victim.broker.failure(None);
         victim.settles("it answers again");
         let unseen = victim.farm.status().unwrap().unseen;
         assert!(unseen.is_empty(), "{unseen:?}");
@@ -298,7 +298,7 @@ fn a_program_that_never_answers_holds_up_nobody() {
             .find(|it| it.name == "polite" && it.state == "ready")
     };
     let pid = until_or("it judges", || peer(&victim), || victim.explain()).pid;
-    victim.broker.trouble(Some(Trouble {
+    victim.broker.failure(Some(Failure {
         below: program.clone(),
         kinds: &[Kind::Look],
         answer: Answer::Never,
@@ -323,7 +323,7 @@ fn a_program_that_never_answers_holds_up_nobody() {
             "{name}"
         );
     }
-    victim.broker.trouble(None);
+    victim.broker.failure(None);
     until_or(
         "it answers again",
         || victim.farm.status()?.unseen.is_empty().then_some(()),
@@ -346,7 +346,7 @@ fn a_broker_ends_though_a_file_never_answers() {
     let Some(mut victim) = Victim::new("a_broker_ends_though_a_file_never_answers") else {
         return;
     };
-    victim.broker.trouble(Some(Trouble {
+    victim.broker.failure(Some(Failure {
         below: victim.farm.root().join("map.xodr"),
         kinds: ANY_READING,
         answer: Answer::Never,

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 use qcbus_formats::xqar::{Level, Status};
 use support::asam;
-use support::desk::{Desk, files_below, issues, places, read_result, sample_farm};
+use support::cli::{Cli, files_below, issues, places, read_result, sample_farm};
 
 /// A row of the README's table of faulty files.
 #[derive(Debug)]
@@ -85,9 +85,9 @@ fn checkable() -> Vec<PathBuf> {
 
 #[test]
 fn every_promised_issue_is_found_at_its_place() {
-    let desk = Desk::new();
-    let said = desk.check_in(&sample_farm(), &["."], "out");
-    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    let cli = Cli::new();
+    let said = cli.check_in(&sample_farm(), &["."], "out");
+    assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
     let promises = promises();
     assert_eq!(promises.len(), 24, "the table is read");
     for Promise {
@@ -96,7 +96,7 @@ fn every_promised_issue_is_found_at_its_place() {
         places: promised,
     } in promises
     {
-        let results = desk.result(&format!("out/{file}.xqar"));
+        let results = cli.result(&format!("out/{file}.xqar"));
         let found: Vec<(u64, u64)> = issues(&results)
             .filter(|(checker, issue)| {
                 checker.id.ends_with(&rule) || issue.rule_uid.ends_with(&rule)
@@ -119,8 +119,8 @@ fn every_promised_issue_is_found_at_its_place() {
 
 #[test]
 fn good_files_are_accepted_without_a_word_of_blame() {
-    let desk = Desk::new();
-    let said = desk.check_in(&sample_farm(), &["."], "out");
+    let cli = Cli::new();
+    let said = cli.check_in(&sample_farm(), &["."], "out");
     let good = table("Accepted");
     let faulty: BTreeSet<String> = promises().into_iter().map(|it| it.file).collect();
     assert_eq!(
@@ -131,7 +131,7 @@ fn good_files_are_accepted_without_a_word_of_blame() {
     for row in good {
         let file = quoted(&row[0]);
         assert!(!has_error(&said.stdout, &file), "{}", said.stdout);
-        let results = desk.result(&format!("out/{file}.xqar"));
+        let results = cli.result(&format!("out/{file}.xqar"));
         let is_warned_of = row[1].contains("warned of");
         let worst = if is_warned_of {
             Level::Error
@@ -147,12 +147,12 @@ fn good_files_are_accepted_without_a_word_of_blame() {
 
 #[test]
 fn every_issue_is_printed_with_row_and_column() {
-    let desk = Desk::new();
-    let said = desk.check_in(&sample_farm(), &["."], "out");
+    let cli = Cli::new();
+    let said = cli.check_in(&sample_farm(), &["."], "out");
     let mut count = 0;
     for file in checkable() {
         let file = file.to_string_lossy();
-        let results = desk.result(&format!("out/{file}.xqar"));
+        let results = cli.result(&format!("out/{file}.xqar"));
         for (_, issue) in issues(&results) {
             let (row, column) = places(issue)[0];
             let place = format!("{file}:{row}:{column}: {}: ", issue.level.as_str());
@@ -170,11 +170,11 @@ fn every_issue_is_printed_with_row_and_column() {
 
 #[test]
 fn only_valid_xml_is_judged_on_its_meaning() {
-    let desk = Desk::new();
-    let said = desk.check_in(&sample_farm(), &["faulty/not_well_formed.xodr"], "out");
+    let cli = Cli::new();
+    let said = cli.check_in(&sample_farm(), &["faulty/not_well_formed.xodr"], "out");
     assert_eq!(said.code, Some(1));
-    let results = desk.result("out/faulty/not_well_formed.xodr.xqar");
-    for checker in support::desk::checkers(&results) {
+    let results = cli.result("out/faulty/not_well_formed.xodr.xqar");
+    for checker in support::cli::checkers(&results) {
         let expected = match &*checker.id {
             "check_asam_xodr_xml_valid_xml_document" => Status::Completed,
             _ => Status::Skipped,
@@ -191,29 +191,29 @@ fn only_valid_xml_is_judged_on_its_meaning() {
 
 #[test]
 fn results_lie_where_they_are_looked_for() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     let farm = sample_farm();
-    desk.check_in(&farm, &["."], "tree");
+    cli.check_in(&farm, &["."], "tree");
     let expected: Vec<PathBuf> = checkable()
         .iter()
         .map(|file| format!("{}.xqar", file.display()).into())
         .collect();
     assert_eq!(
-        files_below(&desk.path().join("tree")),
+        files_below(&cli.path().join("tree")),
         expected,
         "one each, and nothing else"
     );
 
     // A file that lies elsewhere has its place by its path from the root.
     let ring = farm.join("maps/ring.xodr");
-    desk.qcbus(&["check", &ring.to_string_lossy()]);
+    cli.qcbus(&["check", &ring.to_string_lossy()]);
     let from_root = ring.strip_prefix("/").unwrap().to_string_lossy();
     let result = format!("qcbus-out/{from_root}.xqar");
-    assert!(desk.path().join(&result).exists(), "{result}");
+    assert!(cli.path().join(&result).exists(), "{result}");
 
     // Whatever else is given, here or in another run.
     for file in ["a/x/m.xodr", "a/y/m.xodr", "b/m.xodr"] {
-        desk.write(file, "<OpenDRIVE/>");
+        cli.write(file, "<OpenDRIVE/>");
     }
     for paths in [
         &["a/x/m.xodr", "a/y/m.xodr"][..],
@@ -222,26 +222,26 @@ fn results_lie_where_they_are_looked_for() {
         &["a"],
         &["b"],
     ] {
-        desk.qcbus(&[&["check", "--out", "all"], paths].concat());
+        cli.qcbus(&[&["check", "--out", "all"], paths].concat());
     }
     let expected = ["a/x/m.xodr.xqar", "a/y/m.xodr.xqar", "b/m.xodr.xqar"].map(PathBuf::from);
-    assert_eq!(files_below(&desk.path().join("all")), expected);
+    assert_eq!(files_below(&cli.path().join("all")), expected);
 }
 
 #[test]
 fn two_runs_write_the_same_bytes() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     let farm = sample_farm();
-    let one = desk.check_in(&farm, &["."], "one");
-    let two = desk.check_in(&farm, &["."], "two");
+    let one = cli.check_in(&farm, &["."], "one");
+    let two = cli.check_in(&farm, &["."], "two");
     // Only where the results lie differs, which the last words say.
     assert_eq!(one.stdout.replace("/one\n", "/two\n"), two.stdout);
-    for file in files_below(&desk.path().join("one")) {
-        let read = |run: &str| std::fs::read_to_string(desk.path().join(run).join(&file)).unwrap();
+    for file in files_below(&cli.path().join("one")) {
+        let read = |run: &str| std::fs::read_to_string(cli.path().join(run).join(&file)).unwrap();
         let text = read("one");
         assert!(text == read("two"), "{} differs", file.display());
         assert!(
-            !text.contains(&*desk.path().to_string_lossy()),
+            !text.contains(&*cli.path().to_string_lossy()),
             "it names where it was run"
         );
     }
@@ -249,12 +249,12 @@ fn two_runs_write_the_same_bytes() {
 
 #[test]
 fn every_result_is_as_asam_describes_it() {
-    let desk = Desk::new();
-    desk.check_in(&sample_farm(), &["."], "out");
-    let files = files_below(&desk.path().join("out"));
+    let cli = Cli::new();
+    cli.check_in(&sample_farm(), &["."], "out");
+    let files = files_below(&cli.path().join("out"));
     assert_eq!(files.len(), checkable().len());
     for file in files {
-        let path = desk.path().join("out").join(&file);
+        let path = cli.path().join("out").join(&file);
         let complaints = asam::complaints(&std::fs::read_to_string(&path).unwrap());
         assert!(complaints.is_empty(), "{}: {complaints:#?}", file.display());
         assert!(!read_result(&path).bundles.is_empty());
@@ -263,10 +263,10 @@ fn every_result_is_as_asam_describes_it() {
 
 #[test]
 fn the_whole_farm_is_told_on_one_screen() {
-    let desk = Desk::new();
-    let said = desk.check_in(&sample_farm(), &["."], "out");
+    let cli = Cli::new();
+    let said = cli.check_in(&sample_farm(), &["."], "out");
     assert_eq!((said.code, said.stderr.as_str()), (Some(1), ""));
-    let place = desk.path().canonicalize().unwrap();
+    let place = cli.path().canonicalize().unwrap();
     let text = said.stdout.replace(&*place.to_string_lossy(), "DESK");
     let text = text.replace(&*sample_farm().to_string_lossy(), "FARM");
     assert!(text.lines().count() <= 60, "{text}");

@@ -16,8 +16,8 @@ use std::process::Command;
 
 use qcbus_messages::Verdict;
 use support::broker::Broker;
+use support::cli::{Cli, files_below, sample_farm};
 use support::content::{self, Content, Mark};
-use support::desk::{Desk, files_below, sample_farm};
 use support::farm::{Farm, tail};
 use support::watchdog::{until_or, until_so};
 
@@ -81,9 +81,9 @@ fn publishes(farm: &Farm, expected: &[&str]) {
 
 /// A single run accepts everything that lies behind the gate, as it lies there.
 fn is_sound(farm: &Farm) {
-    let desk = Desk::new();
-    let said = desk.check_in(&gate(farm), &["."], "out");
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    let cli = Cli::new();
+    let said = cli.check_in(&gate(farm), &["."], "out");
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
 }
 
 #[test]
@@ -409,11 +409,11 @@ fn gate_results_and_state_are_held_by_one_broker() {
         }
     }
     // Nor does a single run write among them.
-    let desk = Desk::new();
-    desk.write("a.xodr", Content::Good(1).bytes());
+    let cli = Cli::new();
+    cli.write("a.xodr", Content::Good(1).bytes());
     let out = farm.out().to_string_lossy().into_owned();
-    let said = desk.qcbus(&["check", "a.xodr", "--out", &out]);
-    assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+    let said = cli.qcbus(&["check", "a.xodr", "--out", &out]);
+    assert_eq!(said.code, Some(2), "{}", said.whole(&cli));
     assert!(said.stderr.contains(&holder), "{}", said.stderr);
     assert!(!farm.out().join("a.xodr.xqar").exists());
     assert_eq!(published(&farm), [MAP]);
@@ -428,16 +428,16 @@ fn results(out: &Path) -> Vec<String> {
 
 #[test]
 fn earlier_results_of_a_run_do_not_look_current() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     for name in ["in/a.xodr", "in/b.xodr", "else/c.xodr"] {
-        desk.write(name, Content::Good(1).bytes());
+        cli.write(name, Content::Good(1).bytes());
     }
-    let out = desk.path().join("qcbus-out");
-    let foreign = desk.write(
+    let out = cli.path().join("qcbus-out");
+    let foreign = cli.write(
         "qcbus-out/in/Result.xqar",
         "<CheckerResults version=\"1\"/>",
     );
-    desk.qcbus(&["check", "in", "else"]);
+    cli.qcbus(&["check", "in", "else"]);
     let all = [
         "else/c.xodr.xqar",
         "in/Result.xqar",
@@ -445,17 +445,17 @@ fn earlier_results_of_a_run_do_not_look_current() {
         "in/b.xodr.xqar",
     ];
     assert_eq!(results(&out), all);
-    std::fs::remove_file(desk.path().join("in/a.xodr")).unwrap();
-    desk.write("else/.qcignore", "*.xodr\n");
-    let said = desk.qcbus(&["check", "in"]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    std::fs::remove_file(cli.path().join("in/a.xodr")).unwrap();
+    cli.write("else/.qcignore", "*.xodr\n");
+    let said = cli.qcbus(&["check", "in"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
     assert_eq!(
         results(&out),
         ["else/c.xodr.xqar", "in/Result.xqar", "in/b.xodr.xqar"]
     );
     // A run that never comes to a verdict leaves none of an earlier one.
-    desk.write("config.xml", "<Config/>");
-    let said = desk.qcbus(&[
+    cli.write("config.xml", "<Config/>");
+    let said = cli.qcbus(&[
         "check",
         "in/b.xodr",
         "--job-deadline",
@@ -463,14 +463,14 @@ fn earlier_results_of_a_run_do_not_look_current() {
         "--max-file",
         "0",
     ]);
-    assert_ne!(said.code, Some(0), "{}", said.whole(&desk));
+    assert_ne!(said.code, Some(0), "{}", said.whole(&cli));
     let left = results(&out);
     let read = || std::fs::read_to_string(out.join("in/b.xodr.xqar")).unwrap();
     assert!(
         !left.contains(&"in/b.xodr.xqar".to_owned()) || read().contains("status=\"error\""),
         "{left:?}"
     );
-    desk.qcbus(&["check", "else"]);
+    cli.qcbus(&["check", "else"]);
     assert_eq!(
         results(&out).first().unwrap(),
         "in/Result.xqar",

@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 use qcbus_messages::Verdict;
 use qcbus_messages::control::{FileVerdict, Request, Response};
 use support::broker::Broker;
+use support::cli::{Cli, files_below};
 use support::content::{CATALOG, Content, Mark};
-use support::desk::{Desk, files_below};
 use support::farm::{Farm, tail};
 use support::judge::verdicts_in_journal;
 use support::watchdog::{until_or, until_so};
@@ -249,17 +249,17 @@ fn results_of_hidden_directories_are_withdrawn_at_the_start() {
 
 #[test]
 fn check_looks_into_a_hidden_directory_only_when_it_is_named() {
-    let desk = Desk::new();
-    desk.write("maps/a.xodr", Content::Good(1).bytes());
-    desk.write("maps/.work/b.xodr", Content::Good(2).bytes());
-    desk.write("maps/.work/.deeper/c.xodr", Content::Good(3).bytes());
+    let cli = Cli::new();
+    cli.write("maps/a.xodr", Content::Good(1).bytes());
+    cli.write("maps/.work/b.xodr", Content::Good(2).bytes());
+    cli.write("maps/.work/.deeper/c.xodr", Content::Good(3).bytes());
     let checks = |directory: &str, paths: &[&str], files: &str| {
-        let said = desk.check_in(&desk.path().join(directory), paths, "out");
+        let said = cli.check_in(&cli.path().join(directory), paths, "out");
         let counted = format!("of {files};");
         assert!(
             said.stdout.contains(&counted),
             "{paths:?}: {}",
-            said.whole(&desk)
+            said.whole(&cli)
         );
         assert_eq!(said.code, Some(0));
     };
@@ -269,7 +269,7 @@ fn check_looks_into_a_hidden_directory_only_when_it_is_named() {
     checks("maps", &[".work/b.xodr"], "1 file");
     checks("maps", &[".", ".work"], "2 files");
     checks("maps", &[".", ".work/b.xodr", "a.xodr"], "2 files");
-    desk.write("maps/.qcignore", "!.work/\n!.deeper/\n");
+    cli.write("maps/.qcignore", "!.work/\n!.deeper/\n");
     checks("maps", &["."], "3 files");
     checks("maps", &[".", ".work", ".work/b.xodr"], "3 files");
 }

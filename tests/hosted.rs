@@ -16,8 +16,8 @@ use std::process::{Command, Output};
 use qcbus_formats::xqar::{CheckerBundle, Results, Status};
 use qcbus_messages::Verdict;
 use support::broker::Broker;
+use support::cli::Cli;
 use support::content::Content;
-use support::desk::Desk;
 use support::farm::Farm;
 use support::watchdog::{until, until_or};
 
@@ -75,31 +75,31 @@ fn found_one() -> Vec<(String, Option<Status>, usize)> {
 
 /// A desk with a guest and its manifest.
 struct Table {
-    desk: Desk,
+    cli: Cli,
     program: PathBuf,
 }
 
 impl Table {
     fn with(script: &str, name: &str, more: &serde_json::Value) -> Table {
-        let desk = Desk::new();
-        let program = desk.path().join("qc_guest");
+        let cli = Cli::new();
+        let program = cli.path().join("qc_guest");
         install(&program, script);
         let text = manifest(name, &program.to_string_lossy(), more);
-        desk.write("bundles.d/guest.json", text);
-        desk.write("a.xodr", Content::Good(1).bytes());
-        desk.write("tmp/x", "");
-        Table { desk, program }
+        cli.write("bundles.d/guest.json", text);
+        cli.write("a.xodr", Content::Good(1).bytes());
+        cli.write("tmp/x", "");
+        Table { cli, program }
     }
 
-    fn check(&self, arguments: &[&str]) -> support::desk::Said {
+    fn check(&self, arguments: &[&str]) -> support::cli::Said {
         let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
         command.arg("check").args(arguments).args(["--out", "out"]);
         let path = std::env::var_os("PATH").unwrap_or_default();
-        let own = std::iter::once(self.desk.path().to_path_buf());
+        let own = std::iter::once(self.cli.path().to_path_buf());
         let path: OsString = std::env::join_paths(own.chain(std::env::split_paths(&path))).unwrap();
         command.env("PATH", path);
-        command.env("TMPDIR", self.desk.path().join("tmp"));
-        self.desk.run(&mut command)
+        command.env("TMPDIR", self.cli.path().join("tmp"));
+        self.cli.run(&mut command)
     }
 }
 
@@ -107,8 +107,8 @@ impl Table {
 fn a_manifest_of_asams_framework_is_all_that_is_needed() {
     let table = Table::with(FINDS, "guest", &serde_json::Value::Null);
     let said = table.check(&["a.xodr", "--bundles-d", "bundles.d"]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(&table.desk));
-    let results = table.desk.result("out/a.xodr.xqar");
+    assert_eq!(said.code, Some(1), "{}", said.whole(&table.cli));
+    let results = table.cli.result("out/a.xodr.xqar");
     let guest = bundle(&results, "guest");
     assert_eq!(endings(guest), found_one());
     assert_eq!(
@@ -116,26 +116,26 @@ fn a_manifest_of_asams_framework_is_all_that_is_needed() {
         ("7.1", "a guest")
     );
     let issue = &guest.checkers[0].issues[0];
-    let real = table.desk.path().join("a.xodr");
+    let real = table.cli.path().join("a.xodr");
     assert_eq!(issue.description, format!("wrong in {}", real.display()));
     assert_eq!(issue.rule_uid, "guest.example:xodr:1.0.0:rule");
     assert_eq!(*guest.checkers[0].description, *"what one checks");
     assert!(said.stdout.contains("wrong in"), "{}", said.stdout);
     // Nothing of it is left.
-    assert_eq!(rooms(&table.desk.path().join("tmp")), Vec::<PathBuf>::new());
+    assert_eq!(rooms(&table.cli.path().join("tmp")), Vec::<PathBuf>::new());
 }
 
 #[test]
 fn one_with_the_name_of_a_bundle_of_ours_joins_beside_it() {
     let table = Table::with(FINDS, "xodrBundle", &serde_json::Value::Null);
     let said = table.check(&["a.xodr", "--bundles-d", "bundles.d"]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(&table.desk));
+    assert_eq!(said.code, Some(1), "{}", said.whole(&table.cli));
     assert!(
         said.stderr.contains("joins as `asam.xodrBundle`"),
         "{}",
         said.stderr
     );
-    let results = table.desk.result("out/a.xodr.xqar");
+    let results = table.cli.result("out/a.xodr.xqar");
     assert_eq!(endings(bundle(&results, "asam.xodrBundle")), found_one());
     assert!(bundle(&results, "xodrBundle").checkers.len() > 100);
 }
@@ -147,14 +147,14 @@ fn a_configuration_names_it_and_its_parameters_reach_it() {
         polite"#
         .replace("\"a & b\"", "\"a &amp; b\"");
     let table = Table::with(&script, "mine", &serde_json::Value::Null);
-    table.desk.write(
+    table.cli.write(
         "config.xml",
         r#"<Config><CheckerBundle application="mine"><Param name="limit" value="a &amp; b"/>
            <Checker checkerId="one" maxLevel="1" minLevel="3"/></CheckerBundle></Config>"#,
     );
     let said = table.check(&["a.xodr", "-c", "config.xml", "--bundles-d", "bundles.d"]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&table.desk));
-    let results = table.desk.result("out/Result.xqar");
+    assert_eq!(said.code, Some(0), "{}", said.whole(&table.cli));
+    let results = table.cli.result("out/Result.xqar");
     let one = ("one".to_owned(), Some(Status::Completed), 0);
     assert_eq!(endings(bundle(&results, "mine")), [one]);
 }
@@ -166,17 +166,17 @@ fn a_configuration_alone_brings_what_is_on_the_path() {
     let table = Table::with(script, "unused", &serde_json::Value::Null);
     let named = |name: &str| {
         let text = format!("<Config><CheckerBundle application=\"{name}\"/></Config>");
-        table.desk.write("config.xml", text);
+        table.cli.write("config.xml", text);
         table.check(&["a.xodr", "-c", "config.xml"])
     };
     let said = named("qc_guest");
-    assert_eq!(said.code, Some(0), "{}", said.whole(&table.desk));
-    let results = table.desk.result("out/Result.xqar");
+    assert_eq!(said.code, Some(0), "{}", said.whole(&table.cli));
+    let results = table.cli.result("out/Result.xqar");
     assert!(endings(bundle(&results, "qc_guest")).len() == 3);
     // What does not look like a module is not run, whatever a configuration says.
-    std::fs::rename(&table.program, table.desk.path().join("guest")).unwrap();
+    std::fs::rename(&table.program, table.cli.path().join("guest")).unwrap();
     let said = named("guest");
-    assert_eq!(said.code, Some(3), "{}", said.whole(&table.desk));
+    assert_eq!(said.code, Some(3), "{}", said.whole(&table.cli));
 }
 
 #[test]
@@ -187,8 +187,8 @@ fn a_module_that_fails_leaves_the_file_undetermined_and_says_why() {
         &serde_json::Value::Null,
     );
     let said = table.check(&["a.xodr", "--bundles-d", "bundles.d"]);
-    assert_eq!(said.code, Some(3), "{}", said.whole(&table.desk));
-    let results = table.desk.result("out/a.xodr.xqar");
+    assert_eq!(said.code, Some(3), "{}", said.whole(&table.cli));
+    let results = table.cli.result("out/a.xodr.xqar");
     for checker in &bundle(&results, "guest").checkers {
         assert_eq!(checker.status, Some(Status::Error), "{}", checker.id);
         let summary = &*checker.summary;
@@ -211,12 +211,12 @@ fn it_writes_nowhere_else_and_reaches_nobody() {
         ( kill -0 $OUTER ) 2>/dev/null && exit 7
         polite"#;
     let table = Table::with(script, "guest", &serde_json::Value::Null);
-    let outside = table.desk.path().join("outside");
+    let outside = table.cli.path().join("outside");
     let own = std::process::id().to_string();
     let script = script.replace("OUTSIDE", &outside.to_string_lossy());
     install(&table.program, &script.replace("$OUTER", &own));
     let said = table.check(&["a.xodr", "--bundles-d", "bundles.d"]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&table.desk));
+    assert_eq!(said.code, Some(0), "{}", said.whole(&table.cli));
     assert!(!outside.exists());
 }
 
@@ -234,7 +234,7 @@ fn what_a_manifest_says_of_its_run_counts() {
     });
     let table = Table::with(script, "guest", &more);
     let said = table.check(&["a.xodr", "--bundles-d", "bundles.d"]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&table.desk));
+    assert_eq!(said.code, Some(0), "{}", said.whole(&table.cli));
     let wrong = [
         (
             serde_json::json!({"limits": {"secnds": 1}}),
@@ -464,23 +464,23 @@ fn a_scenario_comes_with_what_it_refers_to() {
         polite"#;
     let more = serde_json::json!({"kinds": ["xosc"]});
     let table = Table::with(script, "guest", &more);
-    let real = table.desk.path();
+    let real = table.cli.path();
     install(
         &table.program,
         &script.replace("REAL", &real.to_string_lossy()),
     );
-    table.desk.write("maps/m.xodr", Content::Good(1).bytes());
+    table.cli.write("maps/m.xodr", Content::Good(1).bytes());
     let scenario = include_str!("../bundles/asam-adapter/src/samples/sample.xosc").replace(
         "<RoadNetwork/>",
         "<RoadNetwork><LogicFile filepath=\"../../maps/m.xodr\"/></RoadNetwork>",
     );
-    table.desk.write("scenarios/deep/a.xosc", scenario);
+    table.cli.write("scenarios/deep/a.xosc", scenario);
     table.check(&["scenarios/deep/a.xosc", "--bundles-d", "bundles.d"]);
     let out = real.join("out");
-    let found = support::desk::files_below(&out);
+    let found = support::cli::files_below(&out);
     let result = found.iter().find(|it| it.ends_with("a.xosc.xqar"));
     let result = result.unwrap_or_else(|| panic!("{found:?}"));
-    let results = support::desk::read_result(&out.join(result));
+    let results = support::cli::read_result(&out.join(result));
     let guest = bundle(&results, "guest");
     for checker in &guest.checkers {
         assert_eq!(
@@ -532,14 +532,14 @@ fn a_packed_map_is_handed_over_unpacked_and_its_findings_name_it() {
         { begin; checker one completed "$(issue 2 "odd in $input")"; checker two completed; end; } > "$result""#;
     let table = Table::with(script, "guest", &serde_json::Value::Null);
     for name in ["b.xodrz", "c.xodr.gz"] {
-        let path = table.desk.path().join(name);
+        let path = table.cli.path().join(name);
         let mut gzip = Command::new("gzip");
-        gzip.arg("-c").arg(table.desk.path().join("a.xodr"));
+        gzip.arg("-c").arg(table.cli.path().join("a.xodr"));
         let packed = gzip.output().unwrap();
         assert!(packed.status.success(), "{packed:?}");
         std::fs::write(&path, packed.stdout).unwrap();
         table.check(&[name, "--bundles-d", "bundles.d"]);
-        let results = table.desk.result(&format!("out/{name}.xqar"));
+        let results = table.cli.result(&format!("out/{name}.xqar"));
         let guest = bundle(&results, "guest");
         assert_eq!(endings(guest), found_one(), "{name}");
         let issue = &guest.checkers[0].issues[0];

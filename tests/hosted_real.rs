@@ -14,7 +14,7 @@ use std::process::Command;
 
 use qcbus_formats::xqar::{CheckerBundle, Location, Locations, Status};
 use support::asam_venv;
-use support::desk::{Desk, files_below, read_result};
+use support::cli::{Cli, files_below, read_result};
 use support::inside::skip;
 
 /// Of all cases so many are tried, evenly spread, unless `QCBUS_ALL_CASES` is set.
@@ -118,8 +118,8 @@ fn without_addresses(text: &str) -> String {
 }
 
 /// What a module says of a file when it is run by hand; `None` when it fails.
-fn alone(desk: &Desk, module: &Module, file: &Path) -> Option<Said> {
-    let directory = desk.path().join("alone");
+fn alone(cli: &Cli, module: &Module, file: &Path) -> Option<Said> {
+    let directory = cli.path().join("alone");
     std::fs::create_dir_all(&directory).unwrap();
     let config = directory.join("config.xml");
     let text = format!(
@@ -139,8 +139,8 @@ fn alone(desk: &Desk, module: &Module, file: &Path) -> Option<Said> {
 }
 
 /// What a module said hosted, without the checker that is ours.
-fn hosted(desk: &Desk, module: &Module, input: &Path) -> Said {
-    let result = desk.path().join("out");
+fn hosted(cli: &Cli, module: &Module, input: &Path) -> Said {
+    let result = cli.path().join("out");
     let results = read_result(&result.join(format!("{}.xqar", input.display())));
     let name = module.joined_as();
     let bundle = results.bundles.iter().find(|it| it.name == name);
@@ -157,9 +157,9 @@ fn hosted(desk: &Desk, module: &Module, input: &Path) -> Said {
 }
 
 /// In what a module is different hosted.
-fn differences(desk: &Desk, module: &Module, input: &Path) -> Vec<String> {
-    let hosted = hosted(desk, module, input);
-    let Some(alone) = alone(desk, module, &desk.path().join(input)) else {
+fn differences(cli: &Cli, module: &Module, input: &Path) -> Vec<String> {
+    let hosted = hosted(cli, module, input);
+    let Some(alone) = alone(cli, module, &cli.path().join(input)) else {
         // What gives no result alone must not have one here.
         let silent = hosted.iter().all(|(_, what, _)| what == "Some(Error)");
         let differs = (!silent).then(|| format!("{}: it fails alone: {hosted:?}", input.display()));
@@ -185,10 +185,10 @@ fn hosted_modules_say_what_they_say_by_themselves() {
         Err(why) => return skip(test, &format!("ASAM's modules cannot be installed: {why}")),
     };
     let modules = modules(&programs);
-    let desk = Desk::new();
+    let cli = Cli::new();
     for file in files_below(&cases) {
         let bytes = std::fs::read(cases.join(&file)).unwrap();
-        desk.write(&format!("cases/{}", file.display()), bytes);
+        cli.write(&format!("cases/{}", file.display()), bytes);
     }
     let manifests = modules.iter().map(|module| {
         let command = module.program.display();
@@ -200,21 +200,21 @@ fn hosted_modules_say_what_they_say_by_themselves() {
         })
     });
     let manifests: Vec<serde_json::Value> = manifests.collect();
-    desk.write(
+    cli.write(
         "bundles.d/asam.json",
         serde_json::json!({ "module": manifests }).to_string(),
     );
-    let inputs = inputs(&desk);
+    let inputs = inputs(&cli);
     let mut found = Vec::new();
     for some in inputs.chunks(IN_ONE_RUN) {
         let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
         command
             .args(["check", "--bundles-d", "bundles.d", "--out", "out"])
             .args(some);
-        desk.run(&mut command);
+        cli.run(&mut command);
         for input in some {
             let theirs = modules.iter().filter(|it| it.takes(input));
-            found.extend(theirs.flat_map(|it| differences(&desk, it, input)));
+            found.extend(theirs.flat_map(|it| differences(&cli, it, input)));
         }
     }
     let (count, inputs) = (found.len(), inputs.len());
@@ -226,8 +226,8 @@ fn hosted_modules_say_what_they_say_by_themselves() {
 }
 
 /// The files that are tried.
-fn inputs(desk: &Desk) -> Vec<PathBuf> {
-    let root = desk.path().join("cases");
+fn inputs(cli: &Cli) -> Vec<PathBuf> {
+    let root = cli.path().join("cases");
     let mut all: Vec<PathBuf> = files_below(&root)
         .into_iter()
         .map(|it| Path::new("cases").join(it))

@@ -17,30 +17,30 @@ use flate2::write::GzEncoder;
 use qcbus_formats::xqar::Status;
 use qcbus_messages::Verdict;
 use support::asam;
+use support::cli::{Cli, checkers, files_below, issues, places};
 use support::content::Content;
-use support::desk::{Desk, checkers, files_below, issues, places};
 use support::farm::{Farm, tail};
 use support::inside::skip;
 use support::watchdog::until_or;
 
 /// Checks a directory with a hostile file and a good one. The hostile one must be rejected with an
 /// issue that says `text` and lies at `place`; the other must be accepted.
-fn is_rejected(desk: &Desk, name: &str, text: &str, place: (u64, u64)) {
-    desk.write("in/good.xodr", Content::Good(1).bytes());
-    let said = desk.qcbus(&["check", "in", "-v", "--out", "out"]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(desk));
+fn is_rejected(cli: &Cli, name: &str, text: &str, place: (u64, u64)) {
+    cli.write("in/good.xodr", Content::Good(1).bytes());
+    let said = cli.qcbus(&["check", "in", "-v", "--out", "out"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(cli));
     assert!(
         said.stdout.contains("accepted: in/good.xodr: "),
         "{}",
-        said.whole(desk)
+        said.whole(cli)
     );
     assert!(
         said.stdout.contains(&format!("rejected: in/{name}: ")),
         "{}",
-        said.whole(desk)
+        said.whole(cli)
     );
     assert_eq!(said.stderr, "", "nothing is to be said besides");
-    let results = desk.result(&format!("out/in/{name}.xqar"));
+    let results = cli.result(&format!("out/in/{name}.xqar"));
     let found: Vec<_> = issues(&results)
         .map(|(_, issue)| (issue.description.as_str(), places(issue)))
         .collect();
@@ -49,14 +49,14 @@ fn is_rejected(desk: &Desk, name: &str, text: &str, place: (u64, u64)) {
         .any(|(said, at)| said.contains(text) && at.contains(&place));
     assert!(hit, "no issue says `{text}` at {place:?}: {found:#?}");
     assert!(checkers(&results).all(|it| it.status != Some(Status::Error)));
-    let written = std::fs::read_to_string(desk.path().join(format!("out/in/{name}.xqar"))).unwrap();
+    let written = std::fs::read_to_string(cli.path().join(format!("out/in/{name}.xqar"))).unwrap();
     assert_eq!(asam::complaints(&written), [""; 0]);
 }
 
 fn hostile(name: &str, bytes: impl AsRef<[u8]>, text: &str, place: (u64, u64)) {
-    let desk = Desk::new();
-    desk.write(&format!("in/{name}"), bytes);
-    is_rejected(&desk, name, text, place);
+    let cli = Cli::new();
+    cli.write(&format!("in/{name}"), bytes);
+    is_rejected(&cli, name, text, place);
 }
 
 const XML: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
@@ -74,19 +74,19 @@ fn empty_file() {
 
 #[test]
 fn a_directory_named_like_a_file() {
-    let desk = Desk::new();
-    desk.write("in/good.xodr", Content::Good(1).bytes());
-    desk.write("in/x.xodr/inner.xodr", Content::NoHeader(2).bytes());
-    let said = desk.qcbus(&["check", "in", "-v", "--out", "out"]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    let cli = Cli::new();
+    cli.write("in/good.xodr", Content::Good(1).bytes());
+    cli.write("in/x.xodr/inner.xodr", Content::NoHeader(2).bytes());
+    let said = cli.qcbus(&["check", "in", "-v", "--out", "out"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
     assert!(
         said.stdout
             .contains("rejected: in/x.xodr/inner.xodr: 1 error"),
         "{}",
-        said.whole(&desk)
+        said.whole(&cli)
     );
     assert_eq!(
-        files_below(&desk.path().join("out")).len(),
+        files_below(&cli.path().join("out")).len(),
         2,
         "the directory has no result"
     );
@@ -120,10 +120,10 @@ fn external_entity() {
         "{XML}<!DOCTYPE x [<!ENTITY secret SYSTEM \"file:///etc/passwd\">]>\n\
          <OpenDRIVE><header name=\"&secret;\"/></OpenDRIVE>\n"
     );
-    let desk = Desk::new();
-    desk.write("in/x.xodr", text);
-    is_rejected(&desk, "x.xodr", "DOCTYPE", (2, 1));
-    let written = std::fs::read_to_string(desk.path().join("out/in/x.xodr.xqar")).unwrap();
+    let cli = Cli::new();
+    cli.write("in/x.xodr", text);
+    is_rejected(&cli, "x.xodr", "DOCTYPE", (2, 1));
+    let written = std::fs::read_to_string(cli.path().join("out/in/x.xodr.xqar")).unwrap();
     assert!(!written.contains("root:"), "what it points to is not read");
 }
 
@@ -201,61 +201,61 @@ fn text_after_the_root() {
 
 #[test]
 fn include_cycle() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     let include = |file: &str| format!("<OpenDRIVE>\n<include file=\"{file}\"/>\n</OpenDRIVE>\n");
-    desk.write("in/x.xodr", include("one.xml"));
-    desk.write("in/one.xml", include("two.xml"));
-    desk.write("in/two.xml", include("one.xml"));
+    cli.write("in/x.xodr", include("one.xml"));
+    cli.write("in/one.xml", include("two.xml"));
+    cli.write("in/two.xml", include("one.xml"));
     // FIXME: the place in the root file should be its `include`, 2:1.
-    is_rejected(&desk, "x.xodr", "leads back to", (1, 1));
+    is_rejected(&cli, "x.xodr", "leads back to", (1, 1));
 }
 
 #[test]
 fn include_outside_the_root() {
-    let desk = Desk::new();
-    desk.write("secret.xml", "<OpenDRIVE><road id=\"secret\"/></OpenDRIVE>");
-    desk.write(
+    let cli = Cli::new();
+    cli.write("secret.xml", "<OpenDRIVE><road id=\"secret\"/></OpenDRIVE>");
+    cli.write(
         "in/x.xodr",
         "<OpenDRIVE>\n  <include file=\"../secret.xml\"/>\n</OpenDRIVE>\n",
     );
-    is_rejected(&desk, "x.xodr", "leads out of", (2, 3));
+    is_rejected(&cli, "x.xodr", "leads out of", (2, 3));
 }
 
 #[test]
 fn something_that_never_ends_its_answer() {
     // A pipe that nobody writes to: opening it waits for ever.
-    let desk = Desk::new();
-    desk.write("in/good.xodr", Content::Good(1).bytes());
+    let cli = Cli::new();
+    cli.write("in/good.xodr", Content::Good(1).bytes());
     let status = std::process::Command::new("mkfifo")
-        .arg(desk.path().join("in/x.xodr"))
+        .arg(cli.path().join("in/x.xodr"))
         .status();
     if !status.is_ok_and(|it| it.success()) {
         return skip("something_that_never_ends_its_answer", "there is no mkfifo");
     }
-    let said = desk.qcbus(&["check", "in", "-v", "--out", "out"]);
-    assert_eq!(said.code, Some(3), "{}", said.whole(&desk));
+    let said = cli.qcbus(&["check", "in", "-v", "--out", "out"]);
+    assert_eq!(said.code, Some(3), "{}", said.whole(&cli));
     assert!(said.stderr.contains("it is a pipe"), "{}", said.stderr);
-    let said = desk.qcbus(&["check", "in/x.xodr", "in/good.xodr", "--out", "out"]);
-    assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+    let said = cli.qcbus(&["check", "in/x.xodr", "in/good.xodr", "--out", "out"]);
+    assert_eq!(said.code, Some(2), "{}", said.whole(&cli));
     assert!(said.stderr.contains("no regular file"), "{}", said.stderr);
 }
 
 #[test]
 fn unreadable_file() {
     use std::os::unix::fs::PermissionsExt as _;
-    let desk = Desk::new();
-    let file = desk.write("in/x.xodr", Content::Good(2).bytes());
-    desk.write("in/good.xodr", Content::Good(1).bytes());
+    let cli = Cli::new();
+    let file = cli.write("in/x.xodr", Content::Good(2).bytes());
+    cli.write("in/good.xodr", Content::Good(1).bytes());
     std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o000)).unwrap();
     if std::fs::read(&file).is_ok() {
         return skip("unreadable_file", "this user may read everything");
     }
-    let said = desk.qcbus(&["check", "in", "-v", "--out", "out"]);
-    assert!(said.code.is_some_and(|it| it != 0), "{}", said.whole(&desk));
+    let said = cli.qcbus(&["check", "in", "-v", "--out", "out"]);
+    assert!(said.code.is_some_and(|it| it != 0), "{}", said.whole(&cli));
     assert!(
         said.stdout.contains("accepted: in/good.xodr: "),
         "{}",
-        said.whole(&desk)
+        said.whole(&cli)
     );
 }
 
@@ -435,32 +435,32 @@ fn a_directory_where_the_result_belongs_holds_up_nobody() {
 
 #[test]
 fn a_check_ends_when_its_result_cannot_be_written() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     let long = long_name(251);
-    desk.write(&format!("in/{long}"), Content::Good(1).bytes());
-    desk.write("in/a.xodr", Content::NoHeader(1).bytes());
-    let said = desk.qcbus(&["check", "in", "-v", "--out", "out"]);
-    assert_eq!(said.code, Some(5), "{}", said.whole(&desk));
+    cli.write(&format!("in/{long}"), Content::Good(1).bytes());
+    cli.write("in/a.xodr", Content::NoHeader(1).bytes());
+    let said = cli.qcbus(&["check", "in", "-v", "--out", "out"]);
+    assert_eq!(said.code, Some(5), "{}", said.whole(&cli));
     let told = format!("error: in/{long} has no result: cannot write ");
-    assert!(said.stderr.contains(&told), "{}", said.whole(&desk));
+    assert!(said.stderr.contains(&told), "{}", said.whole(&cli));
     assert!(
         said.stdout.contains("1 rejected, 1 undetermined"),
         "{}",
-        said.whole(&desk)
+        said.whole(&cli)
     );
     assert!(said.stdout.contains("rejected: in/a.xodr: "));
-    assert!(desk.path().join("out/in/a.xodr.xqar").exists());
+    assert!(cli.path().join("out/in/a.xodr.xqar").exists());
 }
 
 #[test]
 fn a_check_begins_nothing_where_no_result_can_be_written() {
-    let desk = Desk::new();
-    desk.write("file", "");
-    desk.write("in/a.xodr", Content::Good(1).bytes());
-    let said = desk.qcbus(&["check", "in/a.xodr", "--out", "file/x"]);
-    assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+    let cli = Cli::new();
+    cli.write("file", "");
+    cli.write("in/a.xodr", Content::Good(1).bytes());
+    let said = cli.qcbus(&["check", "in/a.xodr", "--out", "file/x"]);
+    assert_eq!(said.code, Some(2), "{}", said.whole(&cli));
     assert_eq!(
-        desk.tidy(&said.stderr),
+        cli.tidy(&said.stderr),
         "error: cannot write results into [DESK]/file/x: [DESK]/file: Not a directory (os error \
          20); choose another directory with --out\n"
     );

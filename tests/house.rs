@@ -84,7 +84,7 @@ const INSIDE_IDL: &[(&str, &[&str])] = &[
 const ONLY_DOCUMENT: &[&str] = &["qcbus-opendrive", "qcbus-schema"];
 
 /// Foreign crates that few may name, so that they can be exchanged. Benches compare with them.
-const FENCED: &[(&str, &[&str])] = &[
+const SANDBOXED: &[(&str, &[&str])] = &[
     ("iceoryx2", &["qcbus-bus", "qcbus-benches"]),
     ("iceoryx2-cal", &["qcbus-bus"]),
     ("iceoryx2-bb-elementary-traits", &["qcbus-bus"]),
@@ -173,14 +173,14 @@ fn every_crate_of_the_table_is_there() {
 fn fenced_crates_are_linked_and_named_by_few() {
     let metadata = metadata();
     let mut wrong = Vec::new();
-    for (fenced, friends) in FENCED {
-        let path = format!("{}::", fenced.replace('-', "_"));
+    for (sandboxed, friends) in SANDBOXED {
+        let path = format!("{}::", sandboxed.replace('-', "_"));
         for package in &metadata.packages {
             if friends.contains(&package.name.as_str()) {
                 continue;
             }
-            if package.dependencies.iter().any(|d| d.name == *fenced) {
-                wrong.push(format!("{} depends on {fenced}", package.name));
+            if package.dependencies.iter().any(|d| d.name == *sandboxed) {
+                wrong.push(format!("{} depends on {sandboxed}", package.name));
             }
             let directory = package.manifest_path.parent().unwrap();
             for (file, text) in sources(directory.as_std_path()) {

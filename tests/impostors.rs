@@ -176,7 +176,7 @@ fn who_proves_nothing_does_not_judge() {
 }
 
 /// The process that the broker has started: it starts the one that joins.
-fn keeper_of(bundle: &PeerStatus) -> u32 {
+fn launcher_of(bundle: &PeerStatus) -> u32 {
     let stat = std::fs::read_to_string(format!("/proc/{}/stat", bundle.pid)).unwrap();
     let (_, rest) = stat.rsplit_once(')').unwrap();
     rest.split_whitespace().nth(1).unwrap().parse().unwrap()
@@ -186,13 +186,13 @@ fn keeper_of(bundle: &PeerStatus) -> u32 {
 fn children_prove_themselves_to_the_next_broker() {
     let farm = Farm::new();
     let mut broker = farm.serve_ready();
-    let keeper = keeper_of(&bundle_of(&farm));
+    let launcher = launcher_of(&bundle_of(&farm));
     broker.kill();
     let _next = farm.serve_ready();
     let now = bundle_of(&farm);
     // A confined process joins nobody else, so its keeper has started another one.
-    let found = (keeper_of(&now), now.restarts);
-    assert_eq!(found, (keeper, 0), "{}", farm.log());
+    let found = (launcher_of(&now), now.restarts);
+    assert_eq!(found, (launcher, 0), "{}", farm.log());
     let status = farm.status().unwrap();
     assert!(
         status.notices.iter().all(|it| it.kind != "turned-away"),

@@ -104,10 +104,10 @@ fn a_slow_bundle_is_killed_again_and_again_and_every_job_is_complete() {
 }
 
 /// A bundle that nobody supervises; killed with the test.
-struct ByHand(Child);
+struct StartedManually(Child);
 
-impl ByHand {
-    fn start(farm: &Farm, millis: &str) -> ByHand {
+impl StartedManually {
+    fn start(farm: &Farm, millis: &str) -> StartedManually {
         let mut command = Command::new(zoo());
         command
             .args(["slow", "--millis", millis, "--instance-dir"])
@@ -116,11 +116,11 @@ impl ByHand {
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::null());
-        ByHand(quiet.spawn().unwrap())
+        StartedManually(quiet.spawn().unwrap())
     }
 }
 
-impl Drop for ByHand {
+impl Drop for StartedManually {
     fn drop(&mut self) {
         let _ = self.0.kill();
         let _ = self.0.wait();
@@ -132,7 +132,7 @@ fn a_bundle_that_nobody_starts_again_leaves_errors_behind_until_it_is_back() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     // Never through with a job, so the kill comes in the middle of one.
-    let bundle = ByHand::start(&farm, "600000");
+    let bundle = StartedManually::start(&farm, "600000");
     peer(&farm, "slow", |it| it.state == "ready");
     farm.write("a.xodr", &Content::Good(1).bytes());
     farm.write("bad.xodr", &Content::NoHeader(2).bytes());
@@ -167,7 +167,7 @@ fn a_bundle_that_nobody_starts_again_leaves_errors_behind_until_it_is_back() {
     farm.write("next.xodr", &Content::Good(3).bytes());
     assert_eq!(farm.verdict("next.xodr").verdict, Verdict::Undetermined);
     // It comes back: all becomes complete, also what was judged without it.
-    let _bundle = ByHand::start(&farm, "1");
+    let _bundle = StartedManually::start(&farm, "1");
     farm.write("after.xodr", &Content::Good(4).bytes());
     for name in ["after.xodr", "next.xodr", "a.xodr", "bad.xodr"] {
         until_or(
@@ -196,9 +196,9 @@ fn frozen(farm: &Farm) -> (PeerStatus, u32) {
     );
     let stat = std::fs::read_to_string(format!("/proc/{}/stat", frozen.pid)).unwrap();
     let (_, rest) = stat.rsplit_once(')').unwrap();
-    let keeper = rest.split_whitespace().nth(1).unwrap().parse().unwrap();
+    let launcher = rest.split_whitespace().nth(1).unwrap().parse().unwrap();
     broker.kill();
-    (frozen, keeper)
+    (frozen, launcher)
 }
 
 fn has_gone(farm: &Farm, frozen: &PeerStatus) {
@@ -218,12 +218,12 @@ fn has_gone(farm: &Farm, frozen: &PeerStatus) {
 #[test]
 fn what_hung_when_its_broker_was_killed_is_killed_by_the_next() {
     let farm = Farm::new();
-    let (frozen, keeper) = frozen(&farm);
+    let (frozen, launcher) = frozen(&farm);
     farm.send_away("hangs_after_hello");
     let _broker = farm.serve_ready();
     has_gone(&farm, &frozen);
     // Whichever of the two comes first takes the other along.
-    let words = [frozen.pid, keeper]
+    let words = [frozen.pid, launcher]
         .map(|pid| format!("process {pid}, which an earlier broker had started"));
     let is_said = || words.iter().any(|it| farm.log().contains(it));
     until_or("it is said", || is_said().then_some(()), || farm.log());

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use qcbus_formats::Verdict;
-use support::desk::{Desk, files_below, issues, sample_farm};
+use support::cli::{Cli, files_below, issues, sample_farm};
 use support::farm::{Farm, tail};
 use support::inside::skip;
 use support::watchdog::until_or;
@@ -32,25 +32,25 @@ fn text(name: &str) -> String {
 }
 
 /// The sample's modular scenario, its library and its map.
-fn desk() -> Desk {
-    let desk = Desk::new();
+fn cli() -> Cli {
+    let cli = Cli::new();
     for name in [MAIN, LIBRARY, MAP] {
-        desk.write(name, sample(name));
+        cli.write(name, sample(name));
     }
-    desk
+    cli
 }
 
-fn files(desk: &Desk) -> Vec<PathBuf> {
-    let mut files = files_below(desk.path());
+fn files(cli: &Cli) -> Vec<PathBuf> {
+    let mut files = files_below(cli.path());
     files.sort();
     files
 }
 
 #[test]
 fn what_is_packed_expands_to_the_same() {
-    let desk = desk();
-    let said = desk.qcbus(&["expand", MAIN]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    let cli = cli();
+    let said = cli.qcbus(&["expand", MAIN]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
     assert_eq!(said.stderr, "");
     let plain = said.stdout;
     assert!(
@@ -59,12 +59,12 @@ fn what_is_packed_expands_to_the_same() {
     );
     assert!(!plain.contains("ScenarioReference") && !plain.contains("parameterAttributes"));
 
-    let said = desk.qcbus(&["pack", MAIN, LIBRARY, "-o", "modular/x.mosc"]);
+    let said = cli.qcbus(&["pack", MAIN, LIBRARY, "-o", "modular/x.mosc"]);
     assert_eq!((said.code, &*said.stderr), (Some(0), ""));
-    let first = std::fs::read(desk.path().join("modular/x.mosc")).unwrap();
-    assert_eq!(desk.qcbus(&["expand", "modular/x.mosc"]).stdout, plain);
-    desk.qcbus(&["pack", MAIN, LIBRARY, "-o", "modular/x.mosc"]);
-    let again = std::fs::read(desk.path().join("modular/x.mosc")).unwrap();
+    let first = std::fs::read(cli.path().join("modular/x.mosc")).unwrap();
+    assert_eq!(cli.qcbus(&["expand", "modular/x.mosc"]).stdout, plain);
+    cli.qcbus(&["pack", MAIN, LIBRARY, "-o", "modular/x.mosc"]);
+    let again = std::fs::read(cli.path().join("modular/x.mosc")).unwrap();
     assert!(first == again, "the same files make the same archive");
     assert!(
         first == sample(PACKED),
@@ -72,66 +72,66 @@ fn what_is_packed_expands_to_the_same() {
     );
 
     // What it is expanded to is a plain scenario, and expanding that changes nothing.
-    desk.write("modular/plain.xosc", &plain);
-    assert_eq!(desk.qcbus(&["expand", "modular/plain.xosc"]).stdout, plain);
-    let said = desk.qcbus(&["check", "modular/plain.xosc"]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    cli.write("modular/plain.xosc", &plain);
+    assert_eq!(cli.qcbus(&["expand", "modular/plain.xosc"]).stdout, plain);
+    let said = cli.qcbus(&["check", "modular/plain.xosc"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
 }
 
 #[test]
 fn nothing_is_written_but_what_was_asked_for() {
-    let desk = desk();
-    let before = files(&desk);
-    let said = desk.qcbus(&["expand", MAIN, "-o", "plain.xosc"]);
+    let cli = cli();
+    let before = files(&cli);
+    let said = cli.qcbus(&["expand", MAIN, "-o", "plain.xosc"]);
     assert_eq!((said.code, &*said.stdout), (Some(0), ""));
     let mut after = before.clone();
     after.push("plain.xosc".into());
     after.sort();
-    assert_eq!(files(&desk), after);
+    assert_eq!(files(&cli), after);
 
     // A reference that leads nowhere: no output, and an older one stays as it is.
-    desk.write(
+    cli.write(
         "modular/lost.xosc",
         text(MAIN).replace("moves.xosc", "mooves.xosc"),
     );
-    desk.write("old.xosc", "as it was");
-    let said = desk.qcbus(&["expand", "modular/lost.xosc", "-o", "old.xosc"]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    cli.write("old.xosc", "as it was");
+    let said = cli.qcbus(&["expand", "modular/lost.xosc", "-o", "old.xosc"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
     assert!(
         said.stderr.contains("modular/lost.xosc:88:"),
         "{}",
         said.stderr
     );
-    let said = desk.qcbus(&["expand", "modular/lost.xosc", "-o", "new.xosc"]);
+    let said = cli.qcbus(&["expand", "modular/lost.xosc", "-o", "new.xosc"]);
     assert_eq!(said.code, Some(1));
     assert_eq!(
-        std::fs::read(desk.path().join("old.xosc")).unwrap(),
+        std::fs::read(cli.path().join("old.xosc")).unwrap(),
         b"as it was"
     );
-    assert!(!desk.path().join("new.xosc").exists());
+    assert!(!cli.path().join("new.xosc").exists());
 }
 
 #[test]
 fn what_a_scenario_is_made_of_is_not_overwritten() {
-    let desk = desk();
-    desk.write(PACKED, sample(PACKED));
+    let cli = cli();
+    cli.write(PACKED, sample(PACKED));
     for (file, output) in [(MAIN, MAIN), (MAIN, LIBRARY), (PACKED, PACKED)] {
-        let said = desk.qcbus(&["expand", file, "-o", output]);
-        assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+        let said = cli.qcbus(&["expand", file, "-o", output]);
+        assert_eq!(said.code, Some(2), "{}", said.whole(&cli));
         assert!(said.stderr.contains("made of it"), "{}", said.stderr);
-        let now = std::fs::read(desk.path().join(output)).unwrap();
+        let now = std::fs::read(cli.path().join(output)).unwrap();
         assert!(now == sample(output), "{output}");
     }
-    let said = desk.qcbus(&["pack", MAIN, PACKED, "-o", PACKED]);
-    assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
-    assert!(std::fs::read(desk.path().join(PACKED)).unwrap() == sample(PACKED));
+    let said = cli.qcbus(&["pack", MAIN, PACKED, "-o", PACKED]);
+    assert_eq!(said.code, Some(2), "{}", said.whole(&cli));
+    assert!(std::fs::read(cli.path().join(PACKED)).unwrap() == sample(PACKED));
 }
 
 #[test]
 fn what_cannot_be_packed_leaves_nothing_behind() {
-    let desk = desk();
-    desk.write("other/moves.xosc", sample(LIBRARY));
-    let before = files(&desk);
+    let cli = cli();
+    cli.write("other/moves.xosc", sample(LIBRARY));
+    let before = files(&cli);
     let cases: [(&[&str], &str); 5] = [
         (
             &["pack", MAIN, LIBRARY, "other/moves.xosc", "-o", "x.mosc"],
@@ -146,21 +146,21 @@ fn what_cannot_be_packed_leaves_nothing_behind() {
         (&["expand", "gone.mosc", "-o", "x.xosc"], "no such file"),
     ];
     for (arguments, part) in cases {
-        let said = desk.qcbus(arguments);
-        assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
-        assert!(said.stderr.contains(part), "{}", said.whole(&desk));
-        assert_eq!(files(&desk), before);
+        let said = cli.qcbus(arguments);
+        assert_eq!(said.code, Some(2), "{}", said.whole(&cli));
+        assert!(said.stderr.contains(part), "{}", said.whole(&cli));
+        assert_eq!(files(&cli), before);
     }
 }
 
 #[test]
 fn many_at_once_do_not_disturb_each_other() {
-    let desk = desk();
-    desk.write(PACKED, sample(PACKED));
+    let cli = cli();
+    cli.write(PACKED, sample(PACKED));
     let start = |number: usize| {
         let output = format!("out{number}.xosc");
         let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
-        command.current_dir(desk.path());
+        command.current_dir(cli.path());
         command
             .args(["expand", PACKED, "-o", &output])
             .spawn()
@@ -170,8 +170,7 @@ fn many_at_once_do_not_disturb_each_other() {
     for mut child in children {
         assert!(child.wait().unwrap().success());
     }
-    let read =
-        |number: usize| std::fs::read(desk.path().join(format!("out{number}.xosc"))).unwrap();
+    let read = |number: usize| std::fs::read(cli.path().join(format!("out{number}.xosc"))).unwrap();
     assert!((1..8).all(|number| read(number) == read(0)));
 }
 
@@ -260,17 +259,17 @@ fn findings_name_the_file_that_has_the_fault() {
     assert!(said.iter().any(|it| it.contains(&of_library)), "{said:#?}");
     // Both groups take it: one finding, and both references.
     let found = issues(&results).filter(|(_, it)| it.description.contains("tiem"));
-    let places: Vec<Vec<(u64, u64)>> = found.map(|(_, it)| support::desk::places(it)).collect();
+    let places: Vec<Vec<(u64, u64)>> = found.map(|(_, it)| support::cli::places(it)).collect();
     assert_eq!(places.len(), 1, "{places:?}");
     assert_eq!(places[0].len(), 2, "{places:?}");
 
-    let desk = Desk::new();
-    desk.write("main.xosc", sample(MAIN));
-    desk.write("moves.xosc", &faulty);
-    desk.qcbus(&["pack", "main.xosc", "moves.xosc", "-o", "x.mosc"]);
+    let cli = Cli::new();
+    cli.write("main.xosc", sample(MAIN));
+    cli.write("moves.xosc", &faulty);
+    cli.qcbus(&["pack", "main.xosc", "moves.xosc", "-o", "x.mosc"]);
     farm.write(
         "modular/x.mosc",
-        &std::fs::read(desk.path().join("x.mosc")).unwrap(),
+        &std::fs::read(cli.path().join("x.mosc")).unwrap(),
     );
     farm.verdict("modular/x.mosc");
     becomes(&farm, "modular/x.mosc", "rejected", "tiem");
@@ -339,15 +338,15 @@ fn the_search_path_of_the_configuration_is_taken_up_by_a_reload() {
 
 #[test]
 fn a_scenario_that_cannot_be_expanded_is_not_accepted_whoever_is_asked() {
-    let desk = desk();
+    let cli = cli();
     let tied = "<ParameterReference key=\"AbsoluteTargetSpeed.value\" value=\"8\"/>";
     let two = format!("{tied}{}", tied.replace("\"8\"", "\"9\""));
-    desk.write("modular/tied.xosc", text(MAIN).replace(tied, &two));
+    cli.write("modular/tied.xosc", text(MAIN).replace(tied, &two));
     let config = "<Config><CheckerBundle application=\"xoscBundle\">\
                   <Checker checkerId=\"check_asam_xosc_xml_valid_schema\"/></CheckerBundle></Config>";
-    desk.write("config.xml", config);
-    let said = desk.qcbus(&["check", "-c", "config.xml", "modular/tied.xosc"]);
-    let whole = said.whole(&desk);
+    cli.write("config.xml", config);
+    let said = cli.qcbus(&["check", "-c", "config.xml", "modular/tied.xosc"]);
+    let whole = said.whole(&cli);
     assert_eq!(said.code, Some(1), "{whole}");
     assert!(said.stdout.contains("cannot be expanded"), "{whole}");
     assert!(said.stdout.contains("says `8` and `9`"), "{whole}");
@@ -355,23 +354,23 @@ fn a_scenario_that_cannot_be_expanded_is_not_accepted_whoever_is_asked() {
 
 #[test]
 fn a_library_that_cannot_be_read_is_not_passed_over() {
-    let desk = desk();
-    std::fs::remove_file(desk.path().join(LIBRARY)).unwrap();
-    std::fs::create_dir(desk.path().join(LIBRARY)).unwrap();
-    desk.write("far/moves.xosc", sample(LIBRARY));
+    let cli = cli();
+    std::fs::remove_file(cli.path().join(LIBRARY)).unwrap();
+    std::fs::create_dir(cli.path().join(LIBRARY)).unwrap();
+    cli.write("far/moves.xosc", sample(LIBRARY));
     let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
-    let far = desk.path().join("far");
-    let said = desk.run(command.args(["check", MAIN]).env("SCENARIO_PATH", &far));
-    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
-    std::fs::remove_dir(desk.path().join(LIBRARY)).unwrap();
+    let far = cli.path().join("far");
+    let said = cli.run(command.args(["check", MAIN]).env("SCENARIO_PATH", &far));
+    assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
+    std::fs::remove_dir(cli.path().join(LIBRARY)).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
-    let said = desk.run(command.args(["check", MAIN]).env("SCENARIO_PATH", &far));
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    let said = cli.run(command.args(["check", MAIN]).env("SCENARIO_PATH", &far));
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
 }
 
 #[test]
 fn a_scenario_that_is_lost_on_its_way_out_is_no_success() {
-    let desk = desk();
+    let cli = cli();
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full");
     let Ok(full) = full else {
         let test = "a_scenario_that_is_lost_on_its_way_out_is_no_success";
@@ -379,11 +378,11 @@ fn a_scenario_that_is_lost_on_its_way_out_is_no_success() {
     };
     let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
     command
-        .current_dir(desk.path())
+        .current_dir(cli.path())
         .args(["expand", MAIN])
         .stdout(full);
     assert_eq!(command.status().unwrap().code(), Some(5));
-    let said = desk.qcbus(&["pack", MAIN, "/dev/zero", "-o", "x.mosc"]);
-    assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+    let said = cli.qcbus(&["pack", MAIN, "/dev/zero", "-o", "x.mosc"]);
+    assert_eq!(said.code, Some(2), "{}", said.whole(&cli));
     assert!(said.stderr.contains("it is no file"), "{}", said.stderr);
 }

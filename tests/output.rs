@@ -8,18 +8,18 @@
 
 mod support;
 
+use support::cli::{Cli, Said, files_below, issues, sample_farm};
 use support::content::Content;
-use support::desk::{Desk, Said, files_below, issues, sample_farm};
 
-fn desk() -> Desk {
-    let desk = Desk::new();
-    desk.write("in/good.xodr", Content::Good(1).bytes());
-    desk.write("in/bad.xodr", Content::NoHeader(1).bytes());
-    desk
+fn cli() -> Cli {
+    let cli = Cli::new();
+    cli.write("in/good.xodr", Content::Good(1).bytes());
+    cli.write("in/bad.xodr", Content::NoHeader(1).bytes());
+    cli
 }
 
-fn read(desk: &Desk, name: &str) -> String {
-    let path = desk.path().join(name);
+fn read(cli: &Cli, name: &str) -> String {
+    let path = cli.path().join(name);
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
@@ -29,8 +29,8 @@ fn last_line(said: &Said) -> &str {
 
 #[test]
 fn of_one_file_everything_is_shown_and_of_several_a_line_each() {
-    let desk = desk();
-    let one = desk.qcbus(&["check", "in/bad.xodr"]);
+    let cli = cli();
+    let one = cli.qcbus(&["check", "in/bad.xodr"]);
     assert!(
         one.stdout.starts_with("error[xml.fileheader_is_present]: "),
         "{}",
@@ -41,19 +41,19 @@ fn of_one_file_everything_is_shown_and_of_several_a_line_each() {
         "{}",
         one.stdout
     );
-    let two = desk.qcbus(&["check", "in"]);
+    let two = cli.qcbus(&["check", "in"]);
     assert!(
         two.stdout.starts_with("in/bad.xodr:2:1: error: "),
         "{}",
         two.stdout
     );
-    let full = desk.qcbus(&["check", "in", "--output-format", "full"]);
+    let full = cli.qcbus(&["check", "in", "--output-format", "full"]);
     assert!(
         full.stdout.contains(" --> in/bad.xodr:2:1\n"),
         "{}",
         full.stdout
     );
-    let good = desk.qcbus(&["check", "in/good.xodr"]);
+    let good = cli.qcbus(&["check", "in/good.xodr"]);
     assert_eq!(
         good.stdout,
         "0 errors, 0 warnings in 0 of 1 file; 1 accepted; results in qcbus-out\n"
@@ -62,8 +62,8 @@ fn of_one_file_everything_is_shown_and_of_several_a_line_each() {
 
 #[test]
 fn a_line_for_programs_is_found_by_a_problem_matcher() {
-    let desk = desk();
-    let said = desk.qcbus(&["check", "in", "--output-format", "concise", "-q"]);
+    let cli = cli();
+    let said = cli.qcbus(&["check", "in", "--output-format", "concise", "-q"]);
     for line in said.stdout.lines() {
         // What docs/ci.md gives to editors: PATH:ROW:COLUMN: LEVEL: TEXT [RULE]
         let (place, rest) = line.split_once(": ").unwrap();
@@ -73,7 +73,7 @@ fn a_line_for_programs_is_found_by_a_problem_matcher() {
             "{line}"
         );
         assert!(
-            desk.path().join(parts[2]).is_file(),
+            cli.path().join(parts[2]).is_file(),
             "a click opens it: {line}"
         );
         let (level, text) = rest.split_once(": ").unwrap();
@@ -88,9 +88,9 @@ fn a_line_for_programs_is_found_by_a_problem_matcher() {
 
 #[test]
 fn paths_are_those_from_here() {
-    let desk = desk();
-    let absolute = desk.path().canonicalize().unwrap().join("in/bad.xodr");
-    let said = desk.qcbus(&["check", &absolute.to_string_lossy(), "--format", "concise"]);
+    let cli = cli();
+    let absolute = cli.path().canonicalize().unwrap().join("in/bad.xodr");
+    let said = cli.qcbus(&["check", &absolute.to_string_lossy(), "--format", "concise"]);
     assert!(
         said.stdout.starts_with("in/bad.xodr:2:1: "),
         "{}",
@@ -100,32 +100,30 @@ fn paths_are_those_from_here() {
 
 #[test]
 fn several_formats_go_to_a_file_each() {
-    let desk = desk();
+    let cli = cli();
     let formats = "sarif=r/all.sarif,junit=r/all.xml,gitlab=r/all.json,json=r/lines.json,\
                    concise=r/all.txt,html=r/all.html,github";
-    let said = desk.qcbus(&["check", "in", "--output-format", formats]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    let said = cli.qcbus(&["check", "in", "--output-format", formats]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
     assert!(
         said.stdout.contains("::error file=in/bad.xodr,line=2"),
         "{}",
         said.stdout
     );
-    assert!(said.stderr.contains("1 rejected"), "{}", said.whole(&desk));
-    let sarif: serde_json::Value = serde_json::from_str(&read(&desk, "r/all.sarif")).unwrap();
+    assert!(said.stderr.contains("1 rejected"), "{}", said.whole(&cli));
+    let sarif: serde_json::Value = serde_json::from_str(&read(&cli, "r/all.sarif")).unwrap();
     assert_eq!(sarif["runs"].as_array().unwrap().len(), 1);
     assert!(!sarif["runs"][0]["results"].as_array().unwrap().is_empty());
-    let issues: serde_json::Value = serde_json::from_str(&read(&desk, "r/all.json")).unwrap();
+    let issues: serde_json::Value = serde_json::from_str(&read(&cli, "r/all.json")).unwrap();
     assert_eq!(issues[0]["location"]["path"], "in/bad.xodr");
-    assert!(read(&desk, "r/all.xml").contains("<failure"));
+    assert!(read(&cli, "r/all.xml").contains("<failure"));
     assert_eq!(
-        read(&desk, "r/lines.json")
-            .matches("\"resultFile\"")
-            .count(),
+        read(&cli, "r/lines.json").matches("\"resultFile\"").count(),
         2
     );
-    assert!(read(&desk, "r/all.txt").starts_with("in/bad.xodr:2:1: error: "));
-    assert!(read(&desk, "r/all.html").contains("Content-Security-Policy"));
-    let mut pages = files_below(&desk.path().join("r/all-files"));
+    assert!(read(&cli, "r/all.txt").starts_with("in/bad.xodr:2:1: error: "));
+    assert!(read(&cli, "r/all.html").contains("Content-Security-Policy"));
+    let mut pages = files_below(&cli.path().join("r/all-files"));
     pages.sort();
     let expected = ["in/bad.xodr.html", "in/good.xodr.html"].map(std::path::PathBuf::from);
     assert_eq!(pages, expected);
@@ -133,22 +131,22 @@ fn several_formats_go_to_a_file_each() {
 
 #[test]
 fn a_page_of_one_file_stands_alone() {
-    let desk = desk();
-    let said = desk.qcbus(&["check", "in/bad.xodr", "--output-format", "html"]);
+    let cli = cli();
+    let said = cli.qcbus(&["check", "in/bad.xodr", "--output-format", "html"]);
     assert_eq!(said.code, Some(1));
     assert!(
         last_line(&said).ends_with("report in qcbus-out/report.html"),
         "{}",
         said.stdout
     );
-    assert!(read(&desk, "qcbus-out/report.html").contains("bad.xodr"));
-    assert!(!desk.path().join("qcbus-out/report-files").exists());
+    assert!(read(&cli, "qcbus-out/report.html").contains("bad.xodr"));
+    assert!(!cli.path().join("qcbus-out/report-files").exists());
 }
 
 #[test]
 fn what_cannot_be_written_is_said_before_anything_is_checked() {
-    let desk = desk();
-    desk.write("file", "");
+    let cli = cli();
+    cli.write("file", "");
     for (format, words) in [
         ("sarif,junit", "cannot both be printed"),
         ("sarif=file/x.sarif", "file"),
@@ -156,28 +154,28 @@ fn what_cannot_be_written_is_said_before_anything_is_checked() {
         ("sarif=", "name a file"),
         ("serif=x", "serif"),
     ] {
-        let said = desk.qcbus(&["check", "in", "--output-format", format]);
-        assert_eq!(said.code, Some(2), "{format}: {}", said.whole(&desk));
+        let said = cli.qcbus(&["check", "in", "--output-format", format]);
+        assert_eq!(said.code, Some(2), "{format}: {}", said.whole(&cli));
         assert!(said.stderr.contains(words), "{format}: {}", said.stderr);
         assert!(said.stdout.is_empty(), "{format}: {}", said.stdout);
-        assert!(!desk.path().join("qcbus-out").exists(), "{format}");
+        assert!(!cli.path().join("qcbus-out").exists(), "{format}");
     }
 }
 
 #[test]
 fn what_is_left_out_is_said_and_the_result_says_so() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     let (farm, file) = (sample_farm(), "faulty/dangling_links.xodr");
     let rule = "ids.only_ref_defined_ids";
-    let said = desk.check_in(&farm, &[file, "--ignore", rule], "out");
-    let whole = said.whole(&desk);
+    let said = cli.check_in(&farm, &[file, "--ignore", rule], "out");
+    let whole = said.whole(&cli);
     assert!(!said.stdout.contains("elementId"), "{whole}");
     assert!(
         said.stdout
             .contains("not asked, so the verdicts say nothing about it: 1 of"),
         "{whole}"
     );
-    let results = desk.result(&format!("out/{file}.xqar"));
+    let results = cli.result(&format!("out/{file}.xqar"));
     let said = issues(&results).find(|(checker, _)| &*checker.id == "qcbus_choice");
     let text = &said.unwrap().1.description;
     assert!(
@@ -188,11 +186,11 @@ fn what_is_left_out_is_said_and_the_result_says_so() {
 
 #[test]
 fn to_select_asks_nobody_else() {
-    let desk = desk();
-    let said = desk.qcbus(&["check", "in/good.xodr", "--select", "ids"]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-    let results = desk.result("qcbus-out/in/good.xodr.xqar");
-    let asked = support::desk::checkers(&results).map(|checker| &*checker.id);
+    let cli = cli();
+    let said = cli.qcbus(&["check", "in/good.xodr", "--select", "ids"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
+    let results = cli.result("qcbus-out/in/good.xodr.xqar");
+    let asked = support::cli::checkers(&results).map(|checker| &*checker.id);
     let asked: Vec<&str> = asked.filter(|id| *id != "qcbus_choice").collect();
     let only = asked.iter().all(|id| id.contains("_ids_"));
     assert!(!asked.is_empty() && only, "{asked:?}");
@@ -200,25 +198,25 @@ fn to_select_asks_nobody_else() {
 
 #[test]
 fn where_nobody_is_asked_nothing_is_accepted() {
-    let desk = desk();
-    let said = desk.qcbus(&["check", "in/good.xodr", "--select", "xosc"]);
-    assert_eq!(said.code, Some(3), "{}", said.whole(&desk));
+    let cli = cli();
+    let said = cli.qcbus(&["check", "in/good.xodr", "--select", "xosc"]);
+    assert_eq!(said.code, Some(3), "{}", said.whole(&cli));
 }
 
 #[test]
 fn what_something_rests_on_cannot_be_ignored_away() {
-    let desk = desk();
-    desk.write("torn.xodr", "<OpenDRIVE><road>");
-    let said = desk.qcbus(&["check", "torn.xodr", "--ignore", "xml.valid_xml_document"]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    let cli = cli();
+    cli.write("torn.xodr", "<OpenDRIVE><road>");
+    let said = cli.qcbus(&["check", "torn.xodr", "--ignore", "xml.valid_xml_document"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
 }
 
 #[test]
 fn a_name_that_fits_nothing_is_a_mistake() {
-    let desk = desk();
+    let cli = cli();
     for flag in ["--select", "--ignore"] {
-        let said = desk.qcbus(&["check", "in", flag, "ids,xml.fileheader_is_presnt"]);
-        assert_eq!(said.code, Some(2), "{}", said.whole(&desk));
+        let said = cli.qcbus(&["check", "in", flag, "ids,xml.fileheader_is_presnt"]);
+        assert_eq!(said.code, Some(2), "{}", said.whole(&cli));
         assert!(
             said.stderr
                 .contains("did you mean `xml.fileheader_is_present`?"),
@@ -230,43 +228,43 @@ fn a_name_that_fits_nothing_is_a_mistake() {
 
 #[test]
 fn the_exit_code_is_what_somebody_wants_of_it() {
-    let desk = desk();
+    let cli = cli();
     let farm = sample_farm();
     let convoy = "modular/convoy.xosc";
     let code = |arguments: &[&str]| {
         let mut all = vec![convoy];
         all.extend(arguments);
-        desk.check_in(&farm, &all, "out").code
+        cli.check_in(&farm, &all, "out").code
     };
     assert_eq!(code(&[]), Some(0));
     assert_eq!(code(&["--fail-level", "warning"]), Some(1));
     assert_eq!(code(&["--fail-level", "warning", "--exit-zero"]), Some(0));
-    let bad = desk.qcbus(&["check", "in/bad.xodr", "--exit-zero"]);
+    let bad = cli.qcbus(&["check", "in/bad.xodr", "--exit-zero"]);
     assert_eq!(bad.code, Some(0));
     assert!(
         last_line(&bad).contains("1 rejected"),
         "the verdict stays: {}",
         bad.stdout
     );
-    let nobody = desk.qcbus(&["check", "in/good.xodr", "--exit-zero", "--select", "xosc"]);
+    let nobody = cli.qcbus(&["check", "in/good.xodr", "--exit-zero", "--select", "xosc"]);
     assert_eq!(nobody.code, Some(3), "that nobody looked is no finding");
 }
 
 #[test]
 fn quiet_loses_no_finding() {
-    let desk = desk();
-    let loud = desk.qcbus(&["check", "in", "--format", "concise"]);
-    let quiet = desk.qcbus(&["check", "in", "--format", "concise", "-q"]);
+    let cli = cli();
+    let loud = cli.qcbus(&["check", "in", "--format", "concise"]);
+    let quiet = cli.qcbus(&["check", "in", "--format", "concise", "-q"]);
     assert!(loud.stdout.starts_with(&quiet.stdout) && !quiet.stdout.is_empty());
     assert_eq!(quiet.stderr, "");
-    let good = desk.qcbus(&["check", "in/good.xodr", "-q"]);
+    let good = cli.qcbus(&["check", "in/good.xodr", "-q"]);
     assert_eq!((good.stdout.as_str(), good.stderr.as_str()), ("", ""));
 }
 
 #[test]
 fn verbose_says_what_was_skipped_and_why() {
-    let desk = desk();
-    let said = desk.qcbus(&["check", "in", "-v"]);
+    let cli = cli();
+    let said = cli.qcbus(&["check", "in", "-v"]);
     for words in [
         "accepted: in/good.xodr",
         "skipped",
@@ -275,15 +273,15 @@ fn verbose_says_what_was_skipped_and_why() {
     ] {
         assert!(said.stdout.contains(words), "{words}: {}", said.stdout);
     }
-    let plain = desk.qcbus(&["check", "in"]);
+    let plain = cli.qcbus(&["check", "in"]);
     assert!(!plain.stdout.contains("skipped"), "{}", plain.stdout);
 }
 
 #[test]
 fn colours_are_there_when_they_are_wanted() {
-    let desk = desk();
+    let cli = cli();
     let coloured = |when: &str| {
-        let said = desk.qcbus(&["check", "in", "--color", when]);
+        let said = cli.qcbus(&["check", "in", "--color", when]);
         said.stdout.contains("\u{1b}[")
     };
     assert!(coloured("always"));
@@ -293,12 +291,12 @@ fn colours_are_there_when_they_are_wanted() {
 
 #[test]
 fn two_inputs_of_one_name_have_a_result_each() {
-    let desk = desk();
-    desk.write("a/m.xodr", Content::Good(1).bytes());
-    desk.write("b/m.xodr", Content::NoHeader(1).bytes());
-    let said = desk.qcbus(&["check", "a/m.xodr", "b/m.xodr", "--format", "html"]);
+    let cli = cli();
+    cli.write("a/m.xodr", Content::Good(1).bytes());
+    cli.write("b/m.xodr", Content::NoHeader(1).bytes());
+    let said = cli.qcbus(&["check", "a/m.xodr", "b/m.xodr", "--format", "html"]);
     assert_eq!(said.code, Some(1));
-    let files = files_below(&desk.path().join("qcbus-out"));
+    let files = files_below(&cli.path().join("qcbus-out"));
     let results = files
         .iter()
         .filter(|it| it.to_string_lossy().ends_with(".xqar"));
@@ -309,16 +307,16 @@ fn two_inputs_of_one_name_have_a_result_each() {
 
 #[test]
 fn of_many_files_the_end_says_what_to_mend_first() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     for number in 0..300 {
         let content = match number % 5 {
             0 => Content::NoHeader(number),
             1 if number < 20 => Content::NoVersion(number),
             _ => Content::Good(number),
         };
-        desk.write(&format!("in/{number:03}.xodr"), content.bytes());
+        cli.write(&format!("in/{number:03}.xodr"), content.bytes());
     }
-    let said = desk.qcbus(&["check", "in"]);
+    let said = cli.qcbus(&["check", "in"]);
     let (findings, end) = said.stdout.split_once("fix first:\n").unwrap();
     assert_eq!(findings.lines().count(), 64);
     let rows: Vec<&str> = end.lines().collect();
@@ -329,49 +327,49 @@ fn of_many_files_the_end_says_what_to_mend_first() {
         last_line(&said),
         "64 errors, 0 warnings in 64 of 300 files; 236 accepted, 64 rejected; results in qcbus-out"
     );
-    let counted = desk.qcbus(&["check", "in", "-q", "--statistics"]);
+    let counted = cli.qcbus(&["check", "in", "-q", "--statistics"]);
     let (_, end) = counted.stdout.split_once("findings by rule:\n").unwrap();
     assert_eq!(end.lines().count(), 2, "{end}");
 }
 
 #[test]
 fn a_report_is_made_of_results_that_are_there() {
-    let desk = desk();
-    desk.qcbus(&["check", "in"]);
+    let cli = cli();
+    cli.qcbus(&["check", "in"]);
     let (bad, good) = ("qcbus-out/in/bad.xodr.xqar", "qcbus-out/in/good.xodr.xqar");
     for format in [
         "text", "concise", "json", "sarif", "junit", "gitlab", "github",
     ] {
-        let said = desk.qcbus(&["report", format, bad, good]);
-        assert_eq!(said.code, Some(0), "{format}: {}", said.whole(&desk));
+        let said = cli.qcbus(&["report", format, bad, good]);
+        assert_eq!(said.code, Some(0), "{format}: {}", said.whole(&cli));
         assert!(
             said.stdout.contains("fileheader_is_present"),
             "{format}: {}",
             said.stdout
         );
     }
-    let said = desk.qcbus(&["report", "html", bad, good]);
+    let said = cli.qcbus(&["report", "html", bad, good]);
     assert_eq!(
         (said.code, said.stdout.as_str()),
         (Some(0), ""),
         "{}",
-        said.whole(&desk)
+        said.whole(&cli)
     );
-    assert!(read(&desk, "qcbus-out/in/bad.xodr.html").contains("in/bad.xodr"));
-    let said = desk.qcbus(&["report", "sarif", bad, "-o", "one.sarif"]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-    assert!(read(&desk, "one.sarif").contains("2.1.0"));
-    desk.write("none.xqar", "<CheckerResults");
+    assert!(read(&cli, "qcbus-out/in/bad.xodr.html").contains("in/bad.xodr"));
+    let said = cli.qcbus(&["report", "sarif", bad, "-o", "one.sarif"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
+    assert!(read(&cli, "one.sarif").contains("2.1.0"));
+    cli.write("none.xqar", "<CheckerResults");
     for (file, words) in [
         ("none.xqar", "as a result"),
         ("nowhere.xqar", "nowhere.xqar"),
     ] {
-        let said = desk.qcbus(&["report", "json", good, file]);
+        let said = cli.qcbus(&["report", "json", good, file]);
         assert_eq!(
             (said.code, said.stdout.as_str()),
             (Some(2), ""),
             "{}",
-            said.whole(&desk)
+            said.whole(&cli)
         );
         assert!(said.stderr.contains(words), "{}", said.stderr);
     }
@@ -379,8 +377,8 @@ fn a_report_is_made_of_results_that_are_there() {
 
 #[test]
 fn rules_are_found_by_what_people_remember_of_them() {
-    let desk = Desk::new();
-    let family = desk.qcbus(&["rule", "ids"]);
+    let cli = Cli::new();
+    let family = cli.qcbus(&["rule", "ids"]);
     assert_eq!(family.code, Some(2));
     assert!(
         family
@@ -389,16 +387,16 @@ fn rules_are_found_by_what_people_remember_of_them() {
         "{}",
         family.stderr
     );
-    let near = desk.qcbus(&["rule", "ids.only_ref_defind_ids"]);
+    let near = cli.qcbus(&["rule", "ids.only_ref_defind_ids"]);
     assert!(
         near.stderr
             .contains("did you mean `ids.only_ref_defined_ids`?"),
         "{}",
         near.stderr
     );
-    let word = desk.qcbus(&["rule", "smoothness of elevation"]);
+    let word = cli.qcbus(&["rule", "smoothness of elevation"]);
     assert!(word.stderr.contains("smoothness"), "{}", word.stderr);
-    let page = desk.qcbus(&["rule", "ids.only_ref_defined_ids"]);
+    let page = cli.qcbus(&["rule", "ids.only_ref_defined_ids"]);
     assert!(
         page.stdout.contains("https://publications.pages.asam.net/"),
         "{}",
@@ -407,25 +405,25 @@ fn rules_are_found_by_what_people_remember_of_them() {
 }
 
 /// As a hook and an editor call it.
-fn hook(desk: &Desk, further: &[&str]) -> Said {
+fn hook(cli: &Cli, further: &[&str]) -> Said {
     let call = ["check", "--force-exclude", "--output-format", "concise"];
-    desk.qcbus(&[&call, further].concat())
+    cli.qcbus(&[&call, further].concat())
 }
 
 #[test]
 fn excluded_file_is_passed_over_when_a_hook_names_it() {
-    let desk = desk();
-    desk.write(".qcignore", "vendor/\n");
-    desk.write("vendor/bad.xodr", Content::NoHeader(2).bytes());
-    let named = desk.qcbus(&["check", "vendor/bad.xodr"]);
+    let cli = cli();
+    cli.write(".qcignore", "vendor/\n");
+    cli.write("vendor/bad.xodr", Content::NoHeader(2).bytes());
+    let named = cli.qcbus(&["check", "vendor/bad.xodr"]);
     assert_eq!(named.code, Some(1), "without the flag: {named:?}");
-    let alone = hook(&desk, &["--", "vendor/bad.xodr"]);
+    let alone = hook(&cli, &["--", "vendor/bad.xodr"]);
     assert_eq!(alone.code, Some(0), "{alone:?}");
     assert_eq!(alone.stdout, "");
     assert!(alone.stderr.contains("nothing to check"), "{alone:?}");
-    let quiet = hook(&desk, &["--quiet", "--", "vendor/bad.xodr"]);
+    let quiet = hook(&cli, &["--quiet", "--", "vendor/bad.xodr"]);
     assert_eq!((quiet.code, &*quiet.stderr), (Some(0), ""), "{quiet:?}");
-    let both = hook(&desk, &["-v", "--", "vendor/bad.xodr", "in/bad.xodr"]);
+    let both = hook(&cli, &["-v", "--", "vendor/bad.xodr", "in/bad.xodr"]);
     assert_eq!(both.code, Some(1), "{both:?}");
     assert!(!both.stdout.contains("vendor"), "{both:?}");
     let passed_over = "note: vendor/bad.xodr is excluded by a .qcignore\n";
@@ -434,13 +432,10 @@ fn excluded_file_is_passed_over_when_a_hook_names_it() {
 
 #[test]
 fn missing_report_is_said_when_every_named_file_is_excluded() {
-    let desk = desk();
-    desk.write("in/.qcignore", "*\n");
-    let said = hook(
-        &desk,
-        &["--output-format", "sarif=all.sarif", "in/bad.xodr"],
-    );
+    let cli = cli();
+    cli.write("in/.qcignore", "*\n");
+    let said = hook(&cli, &["--output-format", "sarif=all.sarif", "in/bad.xodr"]);
     assert_eq!(said.code, Some(0), "{said:?}");
     assert!(said.stderr.contains("not written: sarif ("), "{said:?}");
-    assert!(!desk.path().join("all.sarif").exists());
+    assert!(!cli.path().join("all.sarif").exists());
 }

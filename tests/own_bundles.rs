@@ -14,8 +14,8 @@ use std::process::Output;
 
 use qcbus_formats::xqar::Status;
 use qcbus_messages::Verdict;
+use support::cli::Cli;
 use support::content::Content;
-use support::desk::Desk;
 use support::farm::{Farm, zoo};
 use support::watchdog::until_or;
 
@@ -318,9 +318,9 @@ fn rules_of_every_bundle_that_runs_are_known() {
 
 #[test]
 fn a_script_in_python_is_run_by_the_interpreter_that_is_found_here() {
-    let desk = Desk::new();
-    let script = desk.write("rules.py", "pass\n");
-    let said = desk.qcbus(&["bundle", "add", "mine", "rules.py", "--offline"]);
+    let cli = Cli::new();
+    let script = cli.write("rules.py", "pass\n");
+    let said = cli.qcbus(&["bundle", "add", "mine", "rules.py", "--offline"]);
     if said
         .stderr
         .contains("no directory of PATH has such a program")
@@ -328,16 +328,16 @@ fn a_script_in_python_is_run_by_the_interpreter_that_is_found_here() {
         println!("skipped: there is no python3 here");
         return;
     }
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-    let command = desk.command_in("qcbus-out/.qcbus/bundles.d/mine.json");
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
+    let command = cli.command_in("qcbus-out/.qcbus/bundles.d/mine.json");
     let (interpreter, file) = command.split_once(' ').unwrap();
     assert!(
         interpreter.starts_with('/') && interpreter.ends_with("/python3"),
         "{command}"
     );
     assert_eq!(Path::new(file), script);
-    let missing = desk.qcbus(&["bundle", "add", "other", "none.py", "--offline"]);
-    assert_eq!(missing.code, Some(2), "{}", missing.whole(&desk));
+    let missing = cli.qcbus(&["bundle", "add", "other", "none.py", "--offline"]);
+    assert_eq!(missing.code, Some(2), "{}", missing.whole(&cli));
 }
 
 /// As a stranger does it: outside of the workspace, by what the command says.

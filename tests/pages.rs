@@ -19,7 +19,7 @@ use qcbus_document::Image;
 use qcbus_ingest::Limits;
 use qcbus_opendrive::{OwnedMap, RoadMap};
 use serde_json::Value;
-use support::desk::{Desk, sample_farm};
+use support::cli::{Cli, sample_farm};
 
 /// A block of a page, unpacked.
 fn block(page: &str, id: &str) -> Option<Vec<u8>> {
@@ -32,26 +32,26 @@ fn block(page: &str, id: &str) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-fn page_of(desk: &Desk, file: &str) -> String {
-    let said = desk.check_in(
+fn page_of(cli: &Cli, file: &str) -> String {
+    let said = cli.check_in(
         &sample_farm(),
         &[
             file,
             "--output-format",
-            &format!("html={}", page(desk).display()),
+            &format!("html={}", page(cli).display()),
         ],
         "out",
     );
     assert!(
         said.code.is_some_and(|code| code <= 1),
         "{}",
-        said.whole(desk)
+        said.whole(cli)
     );
-    std::fs::read_to_string(page(desk)).unwrap()
+    std::fs::read_to_string(page(cli)).unwrap()
 }
 
-fn page(desk: &Desk) -> std::path::PathBuf {
-    desk.path().join("page.html")
+fn page(cli: &Cli) -> std::path::PathBuf {
+    cli.path().join("page.html")
 }
 
 fn data_of(page: &str) -> Value {
@@ -85,9 +85,9 @@ fn on_road(map: &RoadMap<'_>, id: &str, s: f64, t: f64) -> (usize, [f64; 2]) {
 
 #[test]
 fn every_kind_of_fault_has_its_mark_at_the_right_metre() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     let file = "faulty/seen_from_above.xodr";
-    let page = page_of(&desk, file);
+    let page = page_of(&cli, file);
     let data = data_of(&page);
     assert!(block(&page, "plan").is_some_and(|plan| plan.starts_with(b"QCPL")));
     map_of(&sample_farm().join(file)).with(|map| {
@@ -127,8 +127,8 @@ fn every_kind_of_fault_has_its_mark_at_the_right_metre() {
 
 #[test]
 fn every_finding_on_a_map_has_a_place_or_is_about_none() {
-    let desk = Desk::new();
-    let data = data_of(&page_of(&desk, "faulty/seen_from_above.xodr"));
+    let cli = Cli::new();
+    let data = data_of(&page_of(&cli, "faulty/seen_from_above.xodr"));
     for finding in data["findings"].as_array().unwrap() {
         let place = &finding["places"][0];
         assert!(place["at"].is_array(), "{finding}");
@@ -138,8 +138,8 @@ fn every_finding_on_a_map_has_a_place_or_is_about_none() {
 
 #[test]
 fn a_scenario_is_shown_on_its_map() {
-    let desk = Desk::new();
-    let page = page_of(&desk, "faulty/beside_the_road.xosc");
+    let cli = Cli::new();
+    let page = page_of(&cli, "faulty/beside_the_road.xosc");
     let data = data_of(&page);
     assert_eq!(data["map"]["path"], "maps/quay_straight.xodr");
     assert_eq!(data["map"]["own"], false);
@@ -148,13 +148,13 @@ fn a_scenario_is_shown_on_its_map() {
 
 #[test]
 fn a_file_without_a_road_has_a_page_all_the_same() {
-    let desk = Desk::new();
+    let cli = Cli::new();
     for file in [
         "catalogs/vehicles.xosc",
         "faulty/not_well_formed.xodr",
         "faulty/no_header.xodr",
     ] {
-        let page = page_of(&desk, file);
+        let page = page_of(&cli, file);
         let data = data_of(&page);
         assert_eq!(data["file"]["path"], file);
         assert!(page.contains("default-src 'none'"), "{file}");
@@ -163,14 +163,14 @@ fn a_file_without_a_road_has_a_page_all_the_same() {
 
 #[test]
 fn the_page_of_a_run_leads_to_those_of_its_files() {
-    let desk = Desk::new();
-    let page = page_of(&desk, ".");
+    let cli = Cli::new();
+    let page = page_of(&cli, ".");
     let data = data_of(&page);
     let files = data["files"].as_array().unwrap();
     assert!(files.len() > 20, "{}", files.len());
     for file in files {
         let link = file["page"].as_str().unwrap();
-        let there = std::fs::read_to_string(desk.path().join(link)).unwrap();
+        let there = std::fs::read_to_string(cli.path().join(link)).unwrap();
         let own = data_of(&there);
         assert_eq!(own["file"]["path"], file["path"]);
         assert_eq!(own["file"]["verdict"], file["verdict"]);

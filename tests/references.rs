@@ -14,7 +14,7 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 use std::process::Command;
 
 use qcbus_formats::xqar::{Location, Results};
-use support::desk::{Desk, Said, issues, places, sample_farm};
+use support::cli::{Cli, Said, issues, places, sample_farm};
 
 const MAP: &str = "../maps/quay_straight.xodr";
 const CATALOGS: &str = "../catalogs";
@@ -245,23 +245,23 @@ fn cases() -> Vec<Case> {
 }
 
 /// Everything that the cases refer to.
-fn desk() -> Desk {
-    let desk = Desk::new();
+fn cli() -> Cli {
+    let cli = Cli::new();
     let farm = |name: &str| std::fs::read(sample_farm().join(name)).unwrap();
-    desk.write("maps/quay_straight.xodr", farm("maps/quay_straight.xodr"));
-    desk.write("catalogs/vehicles.xosc", farm("catalogs/vehicles.xosc"));
-    desk.write("half/half.xosc", "<OpenSCENARIO><Catalog");
-    desk.write("maps/notes.txt", "not a catalog");
-    desk.write("maps/broken.xodr", "<OpenDRIVE>\n<road></OpenDRIVE>");
-    desk.write(
+    cli.write("maps/quay_straight.xodr", farm("maps/quay_straight.xodr"));
+    cli.write("catalogs/vehicles.xosc", farm("catalogs/vehicles.xosc"));
+    cli.write("half/half.xosc", "<OpenSCENARIO><Catalog");
+    cli.write("maps/notes.txt", "not a catalog");
+    cli.write("maps/broken.xodr", "<OpenDRIVE>\n<road></OpenDRIVE>");
+    cli.write(
         "maps/lacks.xodr",
         "<OpenDRIVE><header revMajor=\"1\" revMinor=\"7\"/>\n<include file=\"gone.xml\"/></OpenDRIVE>",
     );
     for number in 0..60 {
         let name = format!("many/{number}.xosc");
-        desk.write(&name, farm("catalogs/vehicles.xosc"));
+        cli.write(&name, farm("catalogs/vehicles.xosc"));
     }
-    let at = |name: &str| desk.path().join("maps").join(name);
+    let at = |name: &str| cli.path().join("maps").join(name);
     symlink("gone.xodr", at("dangling.xodr")).unwrap();
     symlink("../half", at("far")).unwrap();
     symlink("loop.xodr", at("loop.xodr")).unwrap();
@@ -270,7 +270,7 @@ fn desk() -> Desk {
     // Sparse: nothing of it is read.
     let large = File::create(at("large.xodr")).unwrap();
     large.set_len((1 << 30) + 1).unwrap();
-    desk
+    cli
 }
 
 /// Descriptions of what qcbus itself says of references, with their places.
@@ -302,19 +302,19 @@ fn assert_said(case: &Case, results: &Results, whole: &str) {
 
 #[test]
 fn what_a_scenario_refers_to_counts() {
-    let desk = desk();
+    let cli = cli();
     let cases = cases();
     for case in &cases {
-        desk.write(&format!("scenarios/{}.xosc", case.name), &case.text);
+        cli.write(&format!("scenarios/{}.xosc", case.name), &case.text);
     }
-    let said = desk.qcbus(&["check", "scenarios", "-v", "--out", "out"]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    let said = cli.qcbus(&["check", "scenarios", "-v", "--out", "out"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
     for case in &cases {
         let name = format!("scenarios/{}.xosc", case.name);
         let line = format!("{}: {name}: ", case.verdict);
-        assert!(said.stdout.contains(&line), "{line}\n{}", said.whole(&desk));
-        let results = desk.result(&format!("out/{name}.xqar"));
-        assert_said(case, &results, &said.whole(&desk));
+        assert!(said.stdout.contains(&line), "{line}\n{}", said.whole(&cli));
+        let results = cli.result(&format!("out/{name}.xqar"));
+        assert_said(case, &results, &said.whole(&cli));
     }
 }
 
@@ -328,14 +328,14 @@ fn code_of(verdict: &str) -> Option<i32> {
 
 #[test]
 fn a_bundle_without_a_broker_says_the_same() {
-    let desk = desk();
+    let cli = cli();
     // A broker keeps few documents at a time on the bus; a bundle by itself has them in memory.
     for case in cases().iter().filter(|case| case.name != "many_catalogs") {
         let name = format!("scenarios/{}.xosc", case.name);
-        desk.write("scenarios/whole.xosc", scenario());
-        desk.write(&name, &case.text);
-        let said = desk.qcbus(&["bundle", "run", "xosc", &name]);
-        let whole = said.whole(&desk);
+        cli.write("scenarios/whole.xosc", scenario());
+        cli.write(&name, &case.text);
+        let said = cli.qcbus(&["bundle", "run", "xosc", &name]);
+        let whole = said.whole(&cli);
         assert_eq!(said.code, code_of(case.verdict), "{}: {whole}", case.name);
         let text = case.said.map_or("", |(text, _)| text);
         assert!(said.stdout.contains(text), "{}: {whole}", case.name);
@@ -344,12 +344,12 @@ fn a_bundle_without_a_broker_says_the_same() {
 
 #[test]
 fn a_module_of_asams_framework_says_the_same() {
-    let desk = desk();
-    let input = desk.write(
+    let cli = cli();
+    let input = cli.write(
         "scenarios/missing.xosc",
         scenario().replace(MAP, "gone.xodr"),
     );
-    desk.write(
+    cli.write(
         "config.xml",
         format!(
             "<Config><Param name=\"InputFile\" value=\"{}\"/>\
@@ -357,24 +357,24 @@ fn a_module_of_asams_framework_says_the_same() {
             input.display()
         ),
     );
-    let said = desk.qcbus(&["bundle", "run", "xosc", "-c", "config.xml"]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-    let remarks = remarks(&desk.result("xoscBundle.xqar"));
+    let said = cli.qcbus(&["bundle", "run", "xosc", "-c", "config.xml"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
+    let remarks = remarks(&cli.result("xoscBundle.xqar"));
     assert_eq!(remarks.len(), 1, "{remarks:?}");
 }
 
 #[test]
 fn a_map_that_may_not_be_read_is_no_acceptance() {
-    let desk = desk();
-    let locked = desk.path().join("maps/quay_straight.xodr");
+    let cli = cli();
+    let locked = cli.path().join("maps/quay_straight.xodr");
     std::fs::set_permissions(&locked, PermissionsExt::from_mode(0o000)).unwrap();
     if File::open(&locked).is_ok() {
         println!("skipped: this user may read everything");
         return;
     }
-    desk.write("scenarios/locked.xosc", scenario());
-    let said = desk.qcbus(&["check", "scenarios"]);
-    assert_eq!(said.code, Some(3), "{}", said.whole(&desk));
+    cli.write("scenarios/locked.xosc", scenario());
+    let said = cli.qcbus(&["check", "scenarios"]);
+    assert_eq!(said.code, Some(3), "{}", said.whole(&cli));
 }
 
 /// A map that can be read and is rejected: it has an attribute that nobody knows.
@@ -384,26 +384,26 @@ fn rejected_map() -> String {
 }
 
 /// A run over a scenario before its map, the map, and a scenario behind it.
-fn checked(desk: &Desk, out: &str, more: &[&str]) -> Said {
+fn checked(cli: &Cli, out: &str, more: &[&str]) -> Said {
     let files = ["a/on_it.xosc", "maps/quay_straight.xodr", "z/on_it.xosc"];
     let mut arguments = vec!["check", "-v", "--out", out];
     arguments.extend(files.iter().chain(more));
-    desk.qcbus(&arguments)
+    cli.qcbus(&arguments)
 }
 
 #[test]
 fn scenario_on_a_rejected_map_is_rejected_until_the_map_is_fixed() {
-    let desk = desk();
-    let good = std::fs::read(desk.path().join("maps/quay_straight.xodr")).unwrap();
-    desk.write("maps/quay_straight.xodr", rejected_map());
-    desk.write("a/on_it.xosc", scenario());
-    desk.write("z/on_it.xosc", scenario());
-    let said = checked(&desk, "out", &[]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    let cli = cli();
+    let good = std::fs::read(cli.path().join("maps/quay_straight.xodr")).unwrap();
+    cli.write("maps/quay_straight.xodr", rejected_map());
+    cli.write("a/on_it.xosc", scenario());
+    cli.write("z/on_it.xosc", scenario());
+    let said = checked(&cli, "out", &[]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
     for name in ["a", "z"] {
         let line = format!("rejected: {name}/on_it.xosc: ");
-        assert!(said.stdout.contains(&line), "{line}\n{}", said.whole(&desk));
-        let results = desk.result(&format!("out/{name}/on_it.xosc.xqar"));
+        assert!(said.stdout.contains(&line), "{line}\n{}", said.whole(&cli));
+        let results = cli.result(&format!("out/{name}/on_it.xosc.xqar"));
         let (text, place) = one_about_the_map(&results);
         assert!(
             text.contains("maps/quay_straight.xodr is rejected: it has 1 error"),
@@ -412,19 +412,19 @@ fn scenario_on_a_rejected_map_is_rejected_until_the_map_is_fixed() {
         assert_eq!(place, [AT_MAP]);
     }
     // Each by itself: the map is rejected, and the scenarios only say so.
-    let said = checked(&desk, "own", &["--own-verdict"]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    let said = checked(&cli, "own", &["--own-verdict"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
     for name in ["a", "z"] {
         let line = format!("accepted: {name}/on_it.xosc: ");
-        assert!(said.stdout.contains(&line), "{line}\n{}", said.whole(&desk));
-        one_about_the_map(&desk.result(&format!("own/{name}/on_it.xosc.xqar")));
+        assert!(said.stdout.contains(&line), "{line}\n{}", said.whole(&cli));
+        one_about_the_map(&cli.result(&format!("own/{name}/on_it.xosc.xqar")));
     }
     // Its map counts also when it is checked alone.
-    let said = desk.qcbus(&["check", "a/on_it.xosc", "--out", "alone"]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
-    desk.write("maps/quay_straight.xodr", good);
-    let said = checked(&desk, "out", &[]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    let said = cli.qcbus(&["check", "a/on_it.xosc", "--out", "alone"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
+    cli.write("maps/quay_straight.xodr", good);
+    let said = checked(&cli, "out", &[]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
 }
 
 /// The text and the places of the one issue about a file that the checked one rests on.
@@ -439,22 +439,22 @@ fn one_about_the_map(results: &Results) -> (String, Vec<(u64, u64)>) {
 
 #[test]
 fn only_catalogs_that_entries_are_taken_from_count() {
-    let desk = desk();
-    let catalog = std::fs::read_to_string(desk.path().join("catalogs/vehicles.xosc")).unwrap();
+    let cli = cli();
+    let catalog = std::fs::read_to_string(cli.path().join("catalogs/vehicles.xosc")).unwrap();
     let broken = catalog.replacen("<Vehicle ", "<Vehicle paved=\"yes\" ", 1);
-    desk.write("scenarios/on_it.xosc", scenario());
+    cli.write("scenarios/on_it.xosc", scenario());
     // A scenario and another catalog in the catalog directory, both rejected, are nobody's business.
     let scenario_with_fault = scenario().replacen("<Vehicle ", "<Vehicle paved=\"yes\" ", 1);
-    desk.write("catalogs/beside.xosc", scenario_with_fault);
-    desk.write(
+    cli.write("catalogs/beside.xosc", scenario_with_fault);
+    cli.write(
         "catalogs/unused.xosc",
         broken.replace("harbour_vehicles", "others"),
     );
-    let said = desk.qcbus(&["check", "-v", "."]);
+    let said = cli.qcbus(&["check", "-v", "."]);
     let line = "accepted: scenarios/on_it.xosc: ";
-    assert!(said.stdout.contains(line), "{}", said.whole(&desk));
-    desk.write("catalogs/vehicles.xosc", broken);
-    let said = desk.qcbus(&["check", "-v", "."]);
+    assert!(said.stdout.contains(line), "{}", said.whole(&cli));
+    cli.write("catalogs/vehicles.xosc", broken);
+    let said = cli.qcbus(&["check", "-v", "."]);
     let line = "rejected: scenarios/on_it.xosc: ";
-    assert!(said.stdout.contains(line), "{}", said.whole(&desk));
+    assert!(said.stdout.contains(line), "{}", said.whole(&cli));
 }

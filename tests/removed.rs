@@ -58,7 +58,7 @@ fn remove_whole(directory: &Path) {
 }
 
 /// Waits until the status tells of a trouble in these words.
-fn until_in_trouble(farm: &Farm, words: &str) {
+fn until_failing(farm: &Farm, words: &str) {
     let told = || {
         let troubles = farm.status()?.troubles;
         troubles.iter().any(|it| it.contains(words)).then_some(())
@@ -175,7 +175,7 @@ fn directory_that_another_broker_has_taken_is_left_to_it() {
     other.verdict("other.xodr");
     there(&other, &[other.gate().join("other.xodr")]);
     farm.write("late.xodr", &Content::Good(3).bytes());
-    until_in_trouble(&farm, "another broker");
+    until_failing(&farm, "another broker");
     let there: Vec<_> = std::fs::read_dir(other.gate()).unwrap().collect();
     assert_eq!(there.len(), 2, "its mark and its file: {there:?}");
 }
@@ -185,7 +185,7 @@ fn state_directory_that_goes_is_told() {
     let farm = farm();
     let _broker = serve(&farm);
     remove_whole(&farm.base().join("state"));
-    until_in_trouble(&farm, "was removed or replaced");
+    until_failing(&farm, "was removed or replaced");
     let health = farm.qcbus(&["status", "--health"]);
     assert_eq!(health.status.code(), Some(1), "{health:?}");
     // What is judged is answered all the same.

@@ -97,11 +97,11 @@ fn children_stay_what_the_broker_is(replace: impl FnOnce(&Path, &Path)) {
         let listed = std::fs::read_to_string(format!("/proc/{pid}/comm")).unwrap();
         assert_eq!(listed, "qcbus\n", "{name}");
     }
-    let offices = all_with("--office").into_iter();
+    let runners = all_with("--office").into_iter();
     let guest = farm.base().join("guest").display().to_string();
-    let offices = offices.filter(|it| it.words.contains(&guest));
+    let runners = runners.filter(|it| it.words.contains(&guest));
     let speaks_to = |it: Process| std::fs::read_link(format!("/proc/{}/fd/2", it.pid)).ok();
-    let speak_to: Vec<PathBuf> = offices.filter_map(speaks_to).collect();
+    let speak_to: Vec<PathBuf> = runners.filter_map(speaks_to).collect();
     assert!(!speak_to.is_empty() && speak_to.iter().all(|it| *it == farm.log_path()));
     farm.write("a.xodr", &Content::Good(1).bytes());
     let judged = farm.verdict("a.xodr").verdict;

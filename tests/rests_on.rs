@@ -15,8 +15,8 @@ use std::path::Path;
 use qcbus_formats::xqar::Level;
 use qcbus_messages::Verdict;
 use support::broker::Broker;
+use support::cli::{Cli, Said, files_below, issues};
 use support::content::{CATALOG, Content, Mark};
-use support::desk::{Desk, Said, files_below, issues};
 use support::farm::Farm;
 use support::watchdog::until_or;
 
@@ -24,56 +24,52 @@ const SCENARIO: &str = "scenarios/a.xosc";
 const MAP: &str = "maps/m.xodr";
 
 /// A scenario in one directory, and its map in another.
-fn place(map: &Content) -> Desk {
-    let desk = Desk::new();
+fn place(map: &Content) -> Cli {
+    let cli = Cli::new();
     let scenario = Content::Scenario(1, format!("../{MAP}"));
-    desk.write(SCENARIO, scenario.bytes());
-    desk.write(
+    cli.write(SCENARIO, scenario.bytes());
+    cli.write(
         &format!("scenarios/{CATALOG}"),
         Content::Catalog(1, Mark::Clean).bytes(),
     );
-    desk.write(MAP, map.bytes());
-    desk
+    cli.write(MAP, map.bytes());
+    cli
 }
 
-fn check(desk: &Desk, more: &[&str]) -> Said {
-    desk.qcbus(&[&["check", SCENARIO][..], more].concat())
+fn check(cli: &Cli, more: &[&str]) -> Said {
+    cli.qcbus(&[&["check", SCENARIO][..], more].concat())
 }
 
 /// Whether a checker whose name ends so has found something in a file.
-fn is_found(desk: &Desk, file: &str, checker: &str) -> bool {
-    let results = desk.result(&format!("qcbus-out/{file}.xqar"));
+fn is_found(cli: &Cli, file: &str, checker: &str) -> bool {
+    let results = cli.result(&format!("qcbus-out/{file}.xqar"));
     issues(&results).any(|(it, _)| it.id.ends_with(checker))
 }
 
 #[test]
 fn a_scenario_alone_is_rejected_for_its_map_until_that_is_mended() {
-    let desk = place(&Content::NoHeader(1));
-    let said = check(&desk, &[]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
+    let cli = place(&Content::NoHeader(1));
+    let said = check(&cli, &[]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
     for words in [
         "maps/m.xodr",
         "fileheader_is_present",
         "in 2 of 2 files; 2 rejected",
     ] {
-        assert!(
-            said.stdout.contains(words),
-            "{words}: {}",
-            said.whole(&desk)
-        );
+        assert!(said.stdout.contains(words), "{words}: {}", said.whole(&cli));
     }
-    assert!(is_found(&desk, SCENARIO, "qcbus_rests_on"));
-    assert!(is_found(&desk, MAP, "fileheader_is_present"));
+    assert!(is_found(&cli, SCENARIO, "qcbus_rests_on"));
+    assert!(is_found(&cli, MAP, "fileheader_is_present"));
 
-    let said = check(&desk, &["--own-verdict"]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-    assert!(!is_found(&desk, SCENARIO, "qcbus_rests_on"));
+    let said = check(&cli, &["--own-verdict"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
+    assert!(!is_found(&cli, SCENARIO, "qcbus_rests_on"));
 
-    desk.write(MAP, Content::Good(1).bytes());
-    let said = check(&desk, &[]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
+    cli.write(MAP, Content::Good(1).bytes());
+    let said = check(&cli, &[]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
     let whole = "of 1 file; 1 accepted";
-    assert!(said.stdout.contains(whole), "{}", said.whole(&desk));
+    assert!(said.stdout.contains(whole), "{}", said.whole(&cli));
 }
 
 /// Who watches scenarios alone is told what nobody judges.
@@ -192,49 +188,49 @@ fn waiting_for_what_lies_in_a_directory_that_is_away_takes_no_result() {
 
 #[test]
 fn directory_of_scenarios_is_checked_with_maps_elsewhere() {
-    let desk = place(&Content::NoHeader(1));
-    let said = desk.qcbus(&["check", "scenarios"]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
-    assert!(is_found(&desk, MAP, "fileheader_is_present"));
+    let cli = place(&Content::NoHeader(1));
+    let said = cli.qcbus(&["check", "scenarios"]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
+    assert!(is_found(&cli, MAP, "fileheader_is_present"));
 }
 
 #[test]
 fn catalog_that_nobody_named_counts() {
-    let desk = place(&Content::Good(1));
+    let cli = place(&Content::Good(1));
     let catalog = Content::Catalog(1, Mark::Clean).bytes();
     let catalog = String::from_utf8(catalog).unwrap();
     let broken = catalog.replacen("maxSpeed=\"", "maxSpeed=\"-", 1);
     assert_ne!(broken, catalog);
-    desk.write(&format!("scenarios/{CATALOG}"), broken);
-    let said = check(&desk, &[]);
-    assert_eq!(said.code, Some(1), "{}", said.whole(&desk));
-    assert!(is_found(&desk, SCENARIO, "qcbus_rests_on"));
+    cli.write(&format!("scenarios/{CATALOG}"), broken);
+    let said = check(&cli, &[]);
+    assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
+    assert!(is_found(&cli, SCENARIO, "qcbus_rests_on"));
 }
 
 #[test]
 fn map_that_is_excluded_does_not_count() {
-    let desk = place(&Content::NoHeader(1));
-    desk.write(".qcignore", "maps/\n");
-    let said = check(&desk, &[]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-    let results = files_below(&desk.path().join("qcbus-out"));
+    let cli = place(&Content::NoHeader(1));
+    cli.write(".qcignore", "maps/\n");
+    let said = check(&cli, &[]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
+    let results = files_below(&cli.path().join("qcbus-out"));
     let of_map = |it: &&std::path::PathBuf| it.starts_with("maps");
     assert_eq!(results.iter().find(of_map), None);
 }
 
 #[test]
 fn the_one_result_of_a_configuration_is_that_of_its_file() {
-    let desk = place(&Content::NoHeader(1));
+    let cli = place(&Content::NoHeader(1));
     let config = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Config>\n\
          <Param name=\"InputFile\" value=\"{SCENARIO}\"/>\n\
          <CheckerBundle application=\"xoscBundle\"/>\n\
          <CheckerBundle application=\"xodrBundle\"/>\n</Config>\n"
     );
-    desk.write("config.xml", config);
-    let said = desk.qcbus(&["check", "-c", "config.xml"]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-    let results = desk.result("Result.xqar");
+    cli.write("config.xml", config);
+    let said = cli.qcbus(&["check", "-c", "config.xml"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
+    let results = cli.result("Result.xqar");
     let inputs = results.bundles.iter().flat_map(|it| &it.params);
     let named = inputs.filter(|it| it.name == "InputFile");
     let named: Vec<&str> = named.map(|it| it.value.as_str()).collect();
@@ -248,13 +244,13 @@ fn the_one_result_of_a_configuration_is_that_of_its_file() {
 /// Broker and bundles keep few documents at a time, and one scenario may need all of them.
 #[test]
 fn scenario_with_many_catalogs_does_not_hold_up_what_it_waits_for() {
-    let desk = place(&Content::Good(1));
+    let cli = place(&Content::Good(1));
     for number in 2..70 {
         let catalog = Content::Catalog(number, Mark::Clean).bytes();
-        desk.write(&format!("scenarios/catalogs/z{number}.xosc"), catalog);
+        cli.write(&format!("scenarios/catalogs/z{number}.xosc"), catalog);
     }
-    let said = desk.qcbus(&["check", "scenarios"]);
-    assert_eq!(said.code, Some(3), "{}", said.whole(&desk));
+    let said = cli.qcbus(&["check", "scenarios"]);
+    assert_eq!(said.code, Some(3), "{}", said.whole(&cli));
     let whole = "70 files; 69 accepted, 1 undetermined";
-    assert!(said.stdout.contains(whole), "{}", said.whole(&desk));
+    assert!(said.stdout.contains(whole), "{}", said.whole(&cli));
 }

@@ -20,8 +20,8 @@ use qcbus_messages::Verdict;
 use qcbus_messages::control::{Request, Response};
 use sha2::{Digest, Sha256};
 use support::broker::Broker;
+use support::cli::{Cli, files_below, issues, sample_farm};
 use support::content::Content;
-use support::desk::{Desk, files_below, issues, sample_farm};
 use support::farm::{Farm, tail};
 use support::inside::skip;
 use support::watchdog::{until_or, until_so};
@@ -53,9 +53,9 @@ fn copied_in_and_compared(load: &Load) {
         .filter(|to| is_checkable(to))
         .collect();
     farm.settle(names.len());
-    let desk = Desk::new();
-    desk.check_in(&farm.root(), &["."], "out");
-    let same = || differences(&farm.out(), &desk.path().join("out"));
+    let cli = Cli::new();
+    cli.check_in(&farm.root(), &["."], "out");
+    let same = || differences(&farm.out(), &cli.path().join("out"));
     // A file may have been judged before another that it refers to was there; then it is judged
     // again when that one comes.
     until_or(
@@ -96,8 +96,8 @@ fn differences(one: &Path, two: &Path) -> Vec<PathBuf> {
 
 /// Ids that `qcbus rule` lists as switched on, by bundle.
 fn demanded() -> BTreeMap<String, BTreeSet<String>> {
-    let desk = Desk::new();
-    let said = desk.qcbus(&["rule", "--format", "json"]);
+    let cli = Cli::new();
+    let said = cli.qcbus(&["rule", "--format", "json"]);
     let rules: serde_json::Value = serde_json::from_str(&said.stdout).unwrap();
     let mut demanded: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for rule in rules

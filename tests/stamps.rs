@@ -18,8 +18,8 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use qcbus_messages::Verdict;
 use sha2::{Digest, Sha256};
 use support::broker::Broker;
+use support::cli::Cli;
 use support::content::Content;
-use support::desk::Desk;
 use support::farm::{Farm, tail};
 use support::judge::verdicts_in_journal;
 use support::watchdog::{until_or, until_so};
@@ -251,9 +251,9 @@ fn files_from_before_1970_are_judged() {
         set_modified(&farm.root().join(name), UNIX_EPOCH - HOUR);
     }
     // A single run comes to its end.
-    let desk = Desk::new();
+    let cli = Cli::new();
     let map = farm.root().join("a.xodr").to_string_lossy().into_owned();
-    let said = desk.qcbus(&["check", &map, "--out", "out"]);
+    let said = cli.qcbus(&["check", &map, "--out", "out"]);
     assert_eq!(said.code, Some(0), "{said:?}");
     let _broker = farm.serve_ready();
     assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);

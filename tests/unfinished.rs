@@ -15,8 +15,8 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 use qcbus_messages::Verdict;
+use support::cli::Cli;
 use support::content::{CATALOG, Content, Mark};
-use support::desk::Desk;
 use support::farm::{Farm, tail};
 use support::watchdog::{until, until_or, until_so};
 
@@ -207,10 +207,10 @@ fn closed_file_is_judged_when_it_has_rested() {
 
 #[test]
 fn check_takes_a_file_as_it_is() {
-    let desk = Desk::new();
-    let path = desk.write("a.xodr", Content::Good(1).bytes());
+    let cli = Cli::new();
+    let path = cli.write("a.xodr", Content::Good(1).bytes());
     let _writer = OpenOptions::new().append(true).open(&path).unwrap();
-    let said = desk.qcbus(&["check", "a.xodr", "--out", "out"]);
-    assert_eq!(said.code, Some(0), "{}", said.whole(&desk));
-    assert!(Path::new(&desk.path().join("out/a.xodr.xqar")).exists());
+    let said = cli.qcbus(&["check", "a.xodr", "--out", "out"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
+    assert!(Path::new(&cli.path().join("out/a.xodr.xqar")).exists());
 }

@@ -11,11 +11,11 @@ mod support;
 
 #[path = "warm/bench.rs"]
 mod bench;
+#[path = "warm/failures.rs"]
+mod failures;
 #[path = "warm/leftovers.rs"]
 mod leftovers;
 #[path = "warm/others.rs"]
 mod others;
 #[path = "warm/same.rs"]
 mod same;
-#[path = "warm/trouble.rs"]
-mod trouble;

@@ -28,10 +28,10 @@ const MAP: u64 = 100 * MIB;
 const PRIVATE: u64 = 24 * MIB;
 
 /// A bundle that was started by hand; killed with the test.
-struct ByHand(Child);
+struct StartedManually(Child);
 
-impl ByHand {
-    fn start(farm: &Farm, animal: &[&str]) -> ByHand {
+impl StartedManually {
+    fn start(farm: &Farm, animal: &[&str]) -> StartedManually {
         let mut command = Command::new(zoo());
         command
             .args(animal)
@@ -41,11 +41,11 @@ impl ByHand {
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::null());
-        ByHand(quiet.spawn().unwrap())
+        StartedManually(quiet.spawn().unwrap())
     }
 }
 
-impl Drop for ByHand {
+impl Drop for StartedManually {
     fn drop(&mut self) {
         let _ = self.0.kill();
         let _ = self.0.wait();
@@ -128,9 +128,9 @@ fn large_map(bytes: u64) -> Vec<u8> {
 fn four_bundles_read_one_image() {
     let farm = Farm::with(&["--job-deadline", "10m", "--silence-limit", "5m"]);
     let broker = farm.serve_ready();
-    let more: Vec<ByHand> = ["one", "two", "three"]
+    let more: Vec<StartedManually> = ["one", "two", "three"]
         .iter()
-        .map(|name| ByHand::start(&farm, &["polite", "--name", name]))
+        .map(|name| StartedManually::start(&farm, &["polite", "--name", name]))
         .collect();
     let pids = bundles(&farm, &["xodrBundle", "one", "two", "three"]);
     let map = large_map(MAP);
@@ -186,8 +186,8 @@ fn four_bundles_read_one_image() {
 fn who_writes_to_the_image_dies_alone() {
     let farm = Farm::new();
     let mut broker = farm.serve_ready();
-    let _polite = ByHand::start(&farm, &["polite"]);
-    let mut offender = ByHand::start(&farm, &["writes_to_the_image"]);
+    let _polite = StartedManually::start(&farm, &["polite"]);
+    let mut offender = StartedManually::start(&farm, &["writes_to_the_image"]);
     let others = bundles(&farm, &["xodrBundle", "xoscBundle", "polite"]);
     bundles(&farm, &["writes_to_the_image"]);
     farm.write("bad.xodr", &Content::NoHeader(1).bytes());

@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 use qcbus_messages::control::{PeerStatus, Request, Response};
 use rustix::process::Signal;
 
+use super::failures::{self, ANIMALS, GUESTS, Failure};
 use super::files::Writer;
 use super::ledger::Ledger;
 use super::tally::Tally;
-use super::trouble::{self, ANIMALS, GUESTS, Trouble};
 use super::verdicts::JUDGE;
 use super::visitors::Stop;
 use crate::support::broker::Broker;
@@ -87,7 +87,7 @@ impl Driver {
             animals: Vec::new(),
             full_until: None,
             full_at: None,
-            config: trouble::CALM,
+            config: failures::CALM,
             next_file: 0,
             version: 0,
             gone_until: None,
@@ -101,8 +101,8 @@ impl Driver {
 
     pub fn start_broker(&mut self) {
         // With a configuration that cannot be used no broker starts: somebody has mended it.
-        if self.config == trouble::BROKEN {
-            self.write_config(trouble::CALM);
+        if self.config == failures::BROKEN {
+            self.write_config(failures::CALM);
         }
         let mut command = Command::new(self.installed());
         let serve = self.farm.serve_command();
@@ -116,33 +116,33 @@ impl Driver {
         let wait = self.dice.millis(PAUSE);
         pause(wait);
         self.mend();
-        match trouble::any(&mut self.dice) {
-            Trouble::KillBroker => self.kill_broker(),
-            Trouble::KillBundle => self.kill(ProcessKind::Bundle, "kill bundle"),
-            Trouble::KillReporter => self.kill(ProcessKind::Reporter, "kill reporter"),
-            Trouble::KillAnimal => self.kill(ProcessKind::Animal, "kill animal"),
-            Trouble::Stop => self.stop(),
-            Trouble::Animal => self.animal(),
-            Trouble::Configure => self.configure(),
-            Trouble::Write => self.write(),
-            Trouble::WriteTorn => self.write_torn(),
-            Trouble::Rename => self.rename_into_place(),
-            Trouble::Move => self.move_file(),
-            Trouble::Truncate => self.truncate(),
-            Trouble::Delete => self.delete(),
-            Trouble::Rewrite => self.rewrite(),
-            Trouble::Fill => self.fill(),
-            Trouble::Share => self.share(),
-            Trouble::Unshare => self.unshare(),
-            Trouble::Link => self.link(),
-            Trouble::Reload => self.reload(),
-            Trouble::Upgrade => self.upgrade(),
-            Trouble::Vanish => self.vanish(),
-            Trouble::Remove => self.remove(),
-            Trouble::LoseOutput => self.lose_output(),
-            Trouble::Hide => self.hide(),
-            Trouble::WriteSlowly => self.write_slowly(),
-            Trouble::Replace => self.replace_program(),
+        match failures::any(&mut self.dice) {
+            Failure::KillBroker => self.kill_broker(),
+            Failure::KillBundle => self.kill(ProcessKind::Bundle, "kill bundle"),
+            Failure::KillReporter => self.kill(ProcessKind::Reporter, "kill reporter"),
+            Failure::KillAnimal => self.kill(ProcessKind::Animal, "kill animal"),
+            Failure::Stop => self.stop(),
+            Failure::Animal => self.animal(),
+            Failure::Configure => self.configure(),
+            Failure::Write => self.write(),
+            Failure::WriteTorn => self.write_torn(),
+            Failure::Rename => self.rename_into_place(),
+            Failure::Move => self.move_file(),
+            Failure::Truncate => self.truncate(),
+            Failure::Delete => self.delete(),
+            Failure::Rewrite => self.rewrite(),
+            Failure::Fill => self.fill(),
+            Failure::Share => self.share(),
+            Failure::Unshare => self.unshare(),
+            Failure::Link => self.link(),
+            Failure::Reload => self.reload(),
+            Failure::Upgrade => self.upgrade(),
+            Failure::Vanish => self.vanish(),
+            Failure::Remove => self.remove(),
+            Failure::LoseOutput => self.lose_output(),
+            Failure::Hide => self.hide(),
+            Failure::WriteSlowly => self.write_slowly(),
+            Failure::Replace => self.replace_program(),
         }
     }
 
@@ -225,7 +225,7 @@ impl Driver {
         self.bring_back();
         self.end_writers(|_| true);
         self.share_what_has_gone();
-        self.write_config(trouble::CALM);
+        self.write_config(failures::CALM);
         if self.broker.as_mut().is_none_or(|broker| !broker.is_alive()) {
             self.start_broker();
         }

@@ -16,7 +16,7 @@ use qcbus_messages::control::{PeerStatus, Request, Response, Status};
 use super::ledger;
 use super::strain;
 use super::verdicts::JUDGE;
-use crate::support::desk::files_below;
+use crate::support::cli::files_below;
 use crate::support::dice::Dice;
 use crate::support::farm::Farm;
 use crate::support::reports::torn;
@@ -146,11 +146,11 @@ impl Watchers {
             gate: farm.gate(),
             instance: farm.instance(),
         });
-        let looker = shared.clone();
+        let scanner = shared.clone();
         let asker = shared.clone();
         let worker = shared.clone();
         let threads = vec![
-            std::thread::spawn(move || look(&looker)),
+            std::thread::spawn(move || look(&scanner)),
             std::thread::spawn(move || ask(&asker, Dice::new(seed))),
             std::thread::spawn(move || work(&worker)),
         ];

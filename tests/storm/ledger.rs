@@ -9,7 +9,7 @@ use crate::support::content::Content;
 
 /// What somebody may have read at a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Held<'l> {
+pub enum Offered<'l> {
     /// Bytes with this digest.
     Bytes(&'l str),
     /// Something half-written.
@@ -73,26 +73,26 @@ impl Ledger {
     }
 
     /// Everything that may have been read at a place in this time.
-    pub fn seen(&self, name: &str, from: Duration, to: Duration) -> Vec<Held<'_>> {
+    pub fn seen(&self, name: &str, from: Duration, to: Duration) -> Vec<Offered<'_>> {
         let changes = self.changes.get(name).map_or(&[][..], Vec::as_slice);
         let mut seen = Vec::new();
         for (at, change) in changes.iter().enumerate() {
             let over = changes.get(at + 1).map_or(Duration::MAX, |next| next.done);
             if change.begun <= to && over >= from {
                 let digest = change.digest.as_deref();
-                seen.push(digest.map_or(Held::Nothing, Held::Bytes));
+                seen.push(digest.map_or(Offered::Nothing, Offered::Bytes));
             }
             if change.begun <= to && change.done >= from {
-                seen.push(Held::Unfinished);
+                seen.push(Offered::Unfinished);
             }
         }
         seen
     }
 
     /// Whether these bytes lay at a place before this time.
-    pub fn has_held(&self, name: &str, digest: &str, to: Duration) -> bool {
+    pub fn had_bytes(&self, name: &str, digest: &str, to: Duration) -> bool {
         let seen = self.seen(name, Duration::ZERO, to);
-        seen.contains(&Held::Bytes(digest))
+        seen.contains(&Offered::Bytes(digest))
     }
 }
 

@@ -2,13 +2,13 @@
 //! when it is over.
 
 mod driver;
+mod failures;
 mod files;
 mod history;
 mod ledger;
 mod operators;
 mod strain;
 mod tally;
-mod trouble;
 mod verdicts;
 mod visitors;
 
@@ -20,8 +20,8 @@ use history::{Seen, Watchers};
 use strain::Strain;
 use verdicts::Removals;
 
+use crate::support::cli::files_below;
 use crate::support::content::Content;
-use crate::support::desk::files_below;
 use crate::support::farm::{Farm, shm_segments, tail};
 use crate::support::inside::is_inside;
 use crate::support::judge::{judge_with, verdicts_in_journal};
@@ -46,20 +46,20 @@ pub fn rage(seed: u64, seconds: u64) {
     ));
     let half = Duration::from_secs(seconds) / 2;
     rage_under(Demands::Configuration, seed, half);
-    rage_under(Demands::Roster, seed.wrapping_add(1), half);
+    rage_under(Demands::Registry, seed.wrapping_add(1), half);
 }
 
 /// What says who must judge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Demands {
     Configuration,
-    Roster,
+    Registry,
 }
 
 fn rage_under(demands: Demands, seed: u64, length: Duration) {
     let mut farm = Farm::new();
     let config = farm.base().join("config.xml");
-    std::fs::write(&config, trouble::CALM).unwrap();
+    std::fs::write(&config, failures::CALM).unwrap();
     farm.arguments = arguments(&farm);
     if demands == Demands::Configuration {
         let words = ["-c".to_owned(), config.to_string_lossy().into_owned()];
@@ -83,7 +83,7 @@ fn rage_under(demands: Demands, seed: u64, length: Duration) {
     // What a configuration demands is demanded also while its manifest is away.
     let removals = match demands {
         Demands::Configuration => Removals::default(),
-        Demands::Roster => Removals::new(&driver.removals, &history),
+        Demands::Registry => Removals::new(&driver.removals, &history),
     };
     at_every_moment(&mut driver, &history, &removals);
     report(&format!("chaos: who must judge says the {demands:?}"));

@@ -7,7 +7,7 @@ use std::process::Command;
 use rustix::fs::{CWD, RenameFlags, renameat_with};
 
 use super::driver::Driver;
-use crate::support::desk::files_below;
+use crate::support::cli::files_below;
 use crate::support::farm::{Farm, copy_program};
 
 impl Driver {

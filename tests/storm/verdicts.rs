@@ -6,7 +6,7 @@ use std::time::Duration;
 use qcbus_messages::Verdict;
 
 use super::history::{Seen, Told, What};
-use super::ledger::{Held, Ledger};
+use super::ledger::{Offered, Ledger};
 use crate::support::content::{Content, STRICT};
 
 /// The bundle of one's own that must judge everything, whatever happens to it.
@@ -100,7 +100,7 @@ impl Judge<'_> {
         match self.ledger.content(digest) {
             None => Some("nobody has written these bytes, and they are accepted"),
             Some(content) if !self.passes(content) => Some("it is accepted"),
-            Some(_) if !self.ledger.has_held(name, digest, self.seen.at) => {
+            Some(_) if !self.ledger.had_bytes(name, digest, self.seen.at) => {
                 Some("accepted, and these bytes never lay there")
             }
             Some(_) => None,
@@ -160,7 +160,7 @@ impl Judge<'_> {
             Some(content) if !self.leaves_whole(content) => {
                 Some("accepted, and a part of it spoils it")
             }
-            Some(_) if !self.ledger.has_held(part, digest, self.seen.at) => {
+            Some(_) if !self.ledger.had_bytes(part, digest, self.seen.at) => {
                 Some("accepted, and these bytes of a part never lay there")
             }
             Some(content) => {
@@ -175,7 +175,7 @@ impl Judge<'_> {
         let there = self.ledger.seen(name, self.seen.from, self.seen.at);
         if there
             .iter()
-            .all(|it| matches!(it, Held::Bytes(other) if *other != digest))
+            .all(|it| matches!(it, Offered::Bytes(other) if *other != digest))
         {
             return Some("the answer is about bytes that did not lie there when it was asked for");
         }
@@ -199,12 +199,12 @@ impl Judge<'_> {
     fn may_be_accepted(&self, name: &str) -> bool {
         let there = self.ledger.seen(name, self.seen.from, self.seen.at);
         there.into_iter().any(|it| match it {
-            Held::Bytes(digest) => {
+            Offered::Bytes(digest) => {
                 let content = self.ledger.content(digest);
                 content.is_none_or(|content| self.passes(content))
             }
-            Held::Unfinished => true,
-            Held::Nothing => false,
+            Offered::Unfinished => true,
+            Offered::Nothing => false,
         })
     }
 
@@ -212,11 +212,11 @@ impl Judge<'_> {
     fn may_pass(&self, part: &str) -> bool {
         let there = self.ledger.seen(part, self.seen.from, self.seen.at);
         there.into_iter().any(|it| match it {
-            Held::Bytes(digest) => self.ledger.content(digest).is_none_or(|content| {
+            Offered::Bytes(digest) => self.ledger.content(digest).is_none_or(|content| {
                 self.leaves_whole(content) && content.parts().iter().all(|part| self.may_pass(part))
             }),
-            Held::Unfinished => true,
-            Held::Nothing => false,
+            Offered::Unfinished => true,
+            Offered::Nothing => false,
         })
     }
 }

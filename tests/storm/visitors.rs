@@ -7,7 +7,7 @@ use qcbus_broker::control::ask_broker;
 use qcbus_messages::control::Request;
 
 use super::driver::Driver;
-use super::trouble::{self, ANIMALS, GUEST_LIMITS, GUESTS};
+use super::failures::{self, ANIMALS, GUEST_LIMITS, GUESTS};
 use super::verdicts::JUDGE;
 use crate::support::farm::zoo;
 
@@ -80,7 +80,7 @@ impl Driver {
     }
 
     pub fn configure(&mut self) {
-        let texts = [trouble::CALM, trouble::WILD, trouble::BROKEN];
+        let texts = [failures::CALM, failures::WILD, failures::BROKEN];
         let Some(text) = self.dice.pick(&texts).copied() else {
             return;
         };

@@ -7,8 +7,8 @@ use qcbus_formats::xqar::Status;
 use qcbus_messages::Verdict;
 use sha2::{Digest, Sha256};
 
+use super::cli::files_below;
 use super::content::{Content, STRICT};
-use super::desk::files_below;
 use super::farm::Farm;
 use super::reports::{reported, torn};
 

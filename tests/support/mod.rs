@@ -6,8 +6,8 @@
 pub mod asam;
 pub mod asam_venv;
 pub mod broker;
+pub mod cli;
 pub mod content;
-pub mod desk;
 pub mod dice;
 pub mod farm;
 pub mod inside;

@@ -59,7 +59,7 @@ pub enum Kind {
 
 /// What goes wrong.
 #[derive(Debug, Clone)]
-pub struct Trouble {
+pub struct Failure {
     /// With files below this path, or with this one.
     pub below: PathBuf,
     /// With these calls.
@@ -98,7 +98,7 @@ struct State {
     deeds: Vec<String>,
     hit: Option<String>,
     ended: Option<ExitStatus>,
-    trouble: Option<Trouble>,
+    failure: Option<Failure>,
     /// Calls that the trouble is about, and those of them that it was given to.
     troubled: (usize, usize),
 }
@@ -141,9 +141,9 @@ impl Traced {
     }
 
     /// From now on this goes wrong, or nothing. Says how often the last trouble came to something.
-    pub fn trouble(&self, trouble: Option<Trouble>) -> usize {
+    pub fn failure(&self, failure: Option<Failure>) -> usize {
         let mut state = self.shared.state();
-        state.trouble = trouble;
+        state.failure = failure;
         std::mem::take(&mut state.troubled).1
     }
 
@@ -280,7 +280,7 @@ impl Tracer<'_> {
 
     /// Lets those go on who waited for the end of the trouble. Somebody calls the system all the time.
     fn let_go(&mut self) {
-        if !self.held.is_empty() && self.shared.state().trouble.is_none() {
+        if !self.held.is_empty() && self.shared.state().failure.is_none() {
             for thread in self.held.drain(..) {
                 // One that was killed meanwhile is waited for.
                 let _ = ptrace::syscall(thread, None);
@@ -317,7 +317,7 @@ impl Tracer<'_> {
 
     /// Gives another answer, if there is trouble for this call. `true`: none for now.
     fn meddle(&mut self, thread: Pid, number: u64, args: &[u64; 6]) -> bool {
-        let Some(answer) = self.trouble_with(thread, number, args) else {
+        let Some(answer) = self.failure_of(thread, number, args) else {
             return false;
         };
         match answer {
@@ -331,18 +331,18 @@ impl Tracer<'_> {
         false
     }
 
-    fn trouble_with(&self, thread: Pid, number: u64, args: &[u64; 6]) -> Option<Answer> {
-        let trouble = self.shared.state().trouble.clone()?;
+    fn failure_of(&self, thread: Pid, number: u64, args: &[u64; 6]) -> Option<Answer> {
+        let failure = self.shared.state().failure.clone()?;
         let (kind, path) = touched(thread, number, args)?;
-        let concerned = trouble.kinds.contains(&kind) && path.starts_with(&trouble.below);
+        let concerned = failure.kinds.contains(&kind) && path.starts_with(&failure.below);
         let mut state = self.shared.state();
-        if !concerned || state.trouble.is_none() {
+        if !concerned || state.failure.is_none() {
             return None;
         }
         state.troubled.0 += 1;
-        let now = state.troubled.0.is_multiple_of(trouble.one_in);
+        let now = state.troubled.0.is_multiple_of(failure.one_in);
         state.troubled.1 += usize::from(now);
-        now.then_some(trouble.answer)
+        now.then_some(failure.answer)
     }
 
     fn count(&mut self, thread: Pid, what: String) {

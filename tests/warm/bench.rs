@@ -7,8 +7,8 @@ use std::process::Command;
 use qcbus_messages::control::PeerStatus;
 use rustix::process::Signal;
 
+use crate::support::cli::{Cli, Said, files_below};
 use crate::support::content::{CATALOG, Content, Mark};
-use crate::support::desk::{Desk, Said, files_below};
 use crate::support::farm::{Farm, tail};
 use crate::support::processes::signal_pid;
 use crate::support::watchdog::until_or;
@@ -22,7 +22,7 @@ const OUT: &str = "out";
 
 /// Both.
 pub struct Bench {
-    pub desk: Desk,
+    pub cli: Cli,
     pub farm: Farm,
 }
 
@@ -47,7 +47,7 @@ impl Bench {
     /// With further arguments of `qcbus serve`.
     pub fn with(arguments: &[&str]) -> Bench {
         Bench {
-            desk: Desk::new(),
+            cli: Cli::new(),
             farm: Farm::with(arguments),
         }
     }
@@ -71,19 +71,19 @@ impl Bench {
 
     /// Whether the broker does not check a file that it is asked for now.
     pub fn is_asked_in_vain(&self, file: &str) -> bool {
-        let said = self.desk.run(&mut self.command_into("vain", &[file, "-v"]));
+        let said = self.cli.run(&mut self.command_into("vain", &[file, "-v"]));
         !said.stderr.contains(WARM)
     }
 
     /// Runs a check, where no other has left anything.
     pub fn outcome(&self, command: &mut Command) -> Outcome {
-        let out = self.desk.path().join(OUT);
+        let out = self.cli.path().join(OUT);
         let _ = std::fs::remove_dir_all(&out);
         let Said {
             code,
             stdout,
             stderr,
-        } = self.desk.run(command);
+        } = self.cli.run(command);
         let files = files_below(&out).into_iter();
         let read = |file: &Path| std::fs::read(out.join(file)).unwrap();
         let letters = |file: &Path| read(file).escape_ascii().to_string();
@@ -121,7 +121,7 @@ impl Bench {
 
     /// A file that the broker does not watch.
     pub fn beside(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
-        text(&self.desk.write(name, bytes))
+        text(&self.cli.write(name, bytes))
     }
 
     /// A file that the broker watches.

@@ -10,8 +10,8 @@ use rustix::process::Signal;
 
 use crate::bench::{Bench, Made, signal};
 use crate::support::broker::Broker;
+use crate::support::cli::files_below;
 use crate::support::content::Content;
-use crate::support::desk::files_below;
 use crate::support::watchdog::{until_or, until_so};
 
 /// Everything below a directory but the journal, which is written in its own time.
@@ -70,7 +70,7 @@ fn nothing_of_it_is_left_where_runs_have_their_directories() {
     let _broker = bench.farm.serve_ready();
     let file = bench.beside("map.xodr", Content::Good(1).bytes());
     let directories = || {
-        let entries = std::fs::read_dir(bench.desk.path().join(".run/qcbus"));
+        let entries = std::fs::read_dir(bench.cli.path().join(".run/qcbus"));
         let entries = entries.into_iter().flatten().flatten();
         let names = entries.map(|it| it.file_name());
         names.collect::<std::collections::BTreeSet<_>>()
@@ -119,8 +119,8 @@ impl Asked {
         let one = |number| {
             let out = format!("out{number}");
             let mut command = bench.command_into(&out, &[file]);
-            command.current_dir(bench.desk.path());
-            command.env("XDG_RUNTIME_DIR", bench.desk.path().join(".run"));
+            command.current_dir(bench.cli.path());
+            command.env("XDG_RUNTIME_DIR", bench.cli.path().join(".run"));
             let quiet = command.stdout(Stdio::null()).stderr(Stdio::null());
             quiet.spawn().unwrap()
         };

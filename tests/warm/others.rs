@@ -62,7 +62,7 @@ fn other_limits_and_forms_are_checked_cold_and_the_same_warm() {
 fn what_is_narrowed_configured_or_added_is_checked_cold() {
     let bench = Bench::new();
     let config = bench.beside("config.xml", CONFIG);
-    let empty = bench.desk.path().join("bundles");
+    let empty = bench.cli.path().join("bundles");
     std::fs::create_dir(&empty).unwrap();
     for words in [
         &["--select", "xodrBundle"][..],
@@ -96,7 +96,7 @@ fn a_bundle_that_only_the_broker_has_is_not_asked() {
 #[test]
 fn schemas_that_have_changed_since_the_broker_read_them_count_as_they_are_now() {
     let bench = Bench::new();
-    let schemas = text(&bench.desk.path().join("own"));
+    let schemas = text(&bench.cli.path().join("own"));
     bench.beside("own/map.xsd", SCHEMA.replace("WHAT", "road"));
     let bad = bench.beside(
         "map.xodr",
@@ -144,7 +144,7 @@ fn another_copy_of_the_program_is_another_program() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     let file = bench.beside("bad.xodr", Content::NoHeader(1).bytes());
-    let copy = bench.desk.path().join("qcbus");
+    let copy = bench.cli.path().join("qcbus");
     copy_program(Path::new(env!("CARGO_BIN_EXE_qcbus")), &copy);
     let cold = bench.cold(&[&file, "-v"]);
     let mut command = Command::new(copy);

@@ -7,8 +7,8 @@ use qcbus_document::FileKind;
 use qcbus_messages::Verdict;
 
 use crate::bench::{Bench, Made, scenario, text};
+use crate::support::cli::{files_below, sample_farm};
 use crate::support::content::{CATALOG, Content, Mark};
-use crate::support::desk::{files_below, sample_farm};
 
 /// Files of every kind of verdict, by name.
 fn files() -> Vec<(&'static str, Vec<u8>)> {
@@ -45,7 +45,7 @@ fn what_a_scenario_rests_on_counts_warm_and_cold() {
     for (name, bytes) in scenario() {
         bench.beside(name, &bytes);
     }
-    let file = text(&bench.desk.path().join("scenario.xosc"));
+    let file = text(&bench.cli.path().join("scenario.xosc"));
     assert_eq!(bench.compared(&[&file]), Made::Warm);
     bench.beside("map.xodr", Content::NoHeader(2).bytes());
     assert_eq!(bench.compared(&[&file]), Made::Cold);
@@ -61,7 +61,7 @@ fn every_verdict_is_the_same_beside_the_farm_and_in_it() {
         bench.watched(name, &bytes);
     }
     for (name, _) in files() {
-        for at in [bench.desk.path(), &bench.farm.root()] {
+        for at in [bench.cli.path(), &bench.farm.root()] {
             let file = text(&at.join(name));
             let made = bench.compared(&[&file]);
             // What cannot be read is left to whoever asks: perhaps he can.
@@ -226,9 +226,9 @@ fn odd_names_and_links_are_the_same() {
     let _broker = bench.farm.serve_ready();
     let bytes = Content::NoHeader(1).bytes();
     let name = OsStr::from_bytes(b"no\xfftext.xodr");
-    std::fs::write(bench.desk.path().join(name), &bytes).unwrap();
+    std::fs::write(bench.cli.path().join(name), &bytes).unwrap();
     let link = |to: &str, name: &str| {
-        std::os::unix::fs::symlink(to, bench.desk.path().join(name)).unwrap();
+        std::os::unix::fs::symlink(to, bench.cli.path().join(name)).unwrap();
     };
     bench.beside("plain.bin", &bytes);
     bench.beside("map.xodr", &bytes);
@@ -268,7 +268,7 @@ fn results_that_cannot_be_written_are_refused_alike() {
         assert_eq!(cold.code(), Some(2), "{cold:?}");
     }
     // A result that is a directory already.
-    let taken = bench.desk.path().join("taken/map.xodr.xqar/x");
+    let taken = bench.cli.path().join("taken/map.xodr.xqar/x");
     std::fs::create_dir_all(taken).unwrap();
     assert_eq!(refused("taken", &["--cold"]), refused("taken", &[]));
 }

@@ -9,12 +9,12 @@ use qcbus_sdk::{
     AnyRule, Backport, Built, Bundle, Facts, Level, Reads, Sink, Subject, Unbuilt, Version, basic,
 };
 
-use crate::back::{Report, Told, read};
 use crate::documents;
 use crate::hosted::Hosted;
 use crate::learn::{Known, Learned};
 use crate::messages::Request;
-use crate::offices::Offices;
+use crate::results::{Report, Told, read};
+use crate::runners::Runners;
 
 /// The checker that stands for the module as a whole.
 pub(crate) const MODULE_CHECKER: &str = "check_qcbus_asam_module_is_known";
@@ -25,11 +25,11 @@ const MODULE_PAGE: &str = "# module is known\n\nThe module says nothing of check
 struct Host {
     hosted: Hosted,
     learned: Learned,
-    offices: Offices,
+    runners: Runners,
 }
 
 /// What a rule stands for.
-enum Voice {
+enum SendSide {
     /// A checker of the module.
     Checker(&'static Known),
     /// Whatever no rule stands for.
@@ -38,7 +38,7 @@ enum Voice {
 
 struct HostedRule {
     facts: Facts,
-    voice: Voice,
+    send_side: SendSide,
     host: &'static Host,
 }
 
@@ -58,19 +58,23 @@ fn leak_text(text: impl Into<String>) -> &'static str {
 }
 
 /// The bundle of a module.
-pub(crate) fn bundle(hosted: Hosted, learned: Learned, offices: Offices) -> &'static Bundle {
+pub(crate) fn bundle(hosted: Hosted, learned: Learned, runners: Runners) -> &'static Bundle {
     let host = leak(Host {
         hosted,
         learned,
-        offices,
+        runners,
     });
     let learned = &host.learned;
     let known = learned.checkers.iter();
-    let rules = known.map(|it| (facts_of(it), Voice::Checker(it)));
-    let rules = rules.chain([(module_facts(), Voice::Rest)]);
+    let rules = known.map(|it| (facts_of(it), SendSide::Checker(it)));
+    let rules = rules.chain([(module_facts(), SendSide::Rest)]);
     let rules: Vec<&'static dyn AnyRule> = rules
-        .map(|(facts, voice)| {
-            let rule = leak(HostedRule { facts, voice, host });
+        .map(|(facts, send_side)| {
+            let rule = leak(HostedRule {
+                facts,
+                send_side,
+                host,
+            });
             rule as &'static dyn AnyRule
         })
         .collect();
@@ -137,7 +141,7 @@ impl Host {
             report: None,
         };
         let name = &self.hosted.name;
-        let answered = match self.offices.ask(&request, &pieces) {
+        let answered = match self.runners.ask(&request, &pieces) {
             Ok(answered) => answered,
             Err(error) => {
                 // Behind the fence no other one can be started: whoever started this process starts a new one.
@@ -216,9 +220,9 @@ impl<'d> Built<'d> for Run<'d> {
         let Some(rule) = rule.as_any().downcast_ref::<HostedRule>() else {
             return;
         };
-        match rule.voice {
-            Voice::Checker(known) => self.told(known, found),
-            Voice::Rest => self.told_besides(rule.host, found),
+        match rule.send_side {
+            SendSide::Checker(known) => self.told(known, found),
+            SendSide::Rest => self.told_besides(rule.host, found),
         }
     }
 }

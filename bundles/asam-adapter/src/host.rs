@@ -9,8 +9,8 @@ use qcbus_sdk::run::OwnFiles;
 use crate::bundle::bundle;
 use crate::hosted::{Asked, Hosted, parse};
 use crate::learn::learn;
-use crate::office;
-use crate::offices::Offices;
+use crate::runner;
+use crate::runners::Runners;
 
 /// Runs the adapter. `program` are the words behind the name of the program that lead here, such as `asam-adapter`;
 /// `arguments` what follows them. What there is to say goes to the log, and where that ends by itself to `complain`.
@@ -21,7 +21,7 @@ pub fn run(
 ) -> Exit {
     let Asked {
         hosted,
-        is_office,
+        is_runner,
         rest,
     } = match parse(arguments) {
         Ok(asked) => asked,
@@ -30,8 +30,8 @@ pub fn run(
             return Exit::Usage;
         }
     };
-    if is_office {
-        return office::serve(&hosted);
+    if is_runner {
+        return runner::serve(&hosted);
     }
     let mode = match Mode::parse(rest) {
         Ok(mode) => mode,
@@ -62,17 +62,17 @@ fn begin(
     // Before anything is run: each run looks whether they are still the same.
     hosted.programs.iter_mut().for_each(crate::Program::look);
     let name = hosted.name.clone();
-    let offices = Offices::start(count, &hosted, program)
+    let runners = Runners::start(count, &hosted, program)
         .map_err(|error| format!("`{name}` cannot be run: {error}"))?;
-    let learned = learn(&hosted, &offices)
+    let learned = learn(&hosted, &runners)
         .map_err(|why| format!("`{name}` is of no use as a bundle: {why}"))?;
-    Ok(bundle(hosted, learned, offices))
+    Ok(bundle(hosted, learned, runners))
 }
 
 /// It reads nothing of its own, and what its manifest declares is for what the offices run.
 fn own() -> OwnFiles {
     OwnFiles {
-        modest: true,
+        restricted: true,
         ..OwnFiles::default()
     }
 }

@@ -72,7 +72,7 @@ pub fn usual_scratch() -> PathBuf {
 pub(crate) struct Asked {
     pub hosted: Hosted,
     /// This is the process that runs modules.
-    pub is_office: bool,
+    pub is_runner: bool,
     pub rest: Vec<OsString>,
 }
 
@@ -97,7 +97,7 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Ask
             scratch: usual_scratch(),
             is_cold: false,
         },
-        is_office: false,
+        is_runner: false,
         rest: Vec::new(),
     };
     let hosted = &mut asked.hosted;
@@ -127,7 +127,7 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Ask
             Long("memory-mb") => limits.memory = positive(&mut parser)?.saturating_mul(1 << 20),
             Long("output-mb") => limits.output = positive(&mut parser)?.saturating_mul(1 << 20),
             Long("cold") => hosted.is_cold = true,
-            Long("office") => asked.is_office = true,
+            Long("office") => asked.is_runner = true,
             Long(option @ ("instance" | "instance-dir" | "launch" | "threads" | "format")) => {
                 asked.rest.push(format!("--{option}").into());
                 asked.rest.push(parser.value()?);

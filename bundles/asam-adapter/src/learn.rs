@@ -6,10 +6,10 @@ use qcbus_document::FileKind;
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Level;
 
-use crate::back::{Report, Told, read};
 use crate::hosted::Hosted;
 use crate::messages::{Bytes, Document, Request};
-use crate::offices::Offices;
+use crate::results::{Report, Told, read};
+use crate::runners::Runners;
 use crate::samples::{SAMPLES, Sample};
 
 /// What was learned of a module.
@@ -46,7 +46,7 @@ const NOWHERE: &str = "/sample of qcbus";
 ///
 /// # Errors
 /// Why it is of no use, for a person.
-pub(crate) fn learn(hosted: &Hosted, offices: &Offices) -> Result<Learned, String> {
+pub(crate) fn learn(hosted: &Hosted, runners: &Runners) -> Result<Learned, String> {
     let wanted = |it: &&Sample| {
         hosted
             .kinds
@@ -58,7 +58,7 @@ pub(crate) fn learn(hosted: &Hosted, offices: &Offices) -> Result<Learned, Strin
         .iter()
         .map(|it| (request(it, hosted), it.text.as_bytes().to_vec()))
         .collect();
-    let answers = offices
+    let answers = runners
         .ask_all(&requests)
         .map_err(|error| format!("nothing can be run: {error}"))?;
     let mut learned: Option<Learned> = None;

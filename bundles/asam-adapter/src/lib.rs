@@ -8,30 +8,30 @@
 //!
 //! Which checkers a module has it does not tell: they are learned from a run over small valid files ([`learn`]).
 
-mod back;
 mod bundle;
 mod channel;
 mod configuration;
 mod documents;
 mod family;
+mod fork_server;
 mod host;
 mod hosted;
-mod keeper;
 mod learn;
 mod messages;
-mod office;
-mod offices;
+mod pending;
 mod process;
 mod program;
 mod report;
+mod results;
+mod runner;
+mod runners;
 mod samples;
 mod scratch;
-mod staging;
 pub mod warm;
 mod written;
 
+pub use fork_server::goes_where_it_is;
 pub use host::run;
 pub use hosted::{Hosted, Limits, usual_scratch};
-pub use keeper::goes_where_it_is;
 pub use program::Program;
 pub use report::{ReportFile, ReportModule};

@@ -13,8 +13,8 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Pid, PidfdFlags, pidfd_open};
 
 use crate::family;
+use crate::fork_server::{ForkServer, Started};
 use crate::hosted::Limits;
-use crate::keeper::{Keeper, Started};
 
 /// How often a run is looked at while nothing is heard of it.
 const TICK: Duration = Duration::from_millis(100);
@@ -67,13 +67,15 @@ pub(crate) enum Broken {
 pub(crate) fn run(
     run: &Run<'_>,
     caller: BorrowedFd<'_>,
-    keeper: &mut Keeper,
+    fork_server: &mut ForkServer,
     plainly: bool,
 ) -> Result<Ended, Broken> {
     let (reader, writer) = io::pipe().map_err(Broken::Start)?;
     rustix::fs::fcntl_setfl(&reader, rustix::fs::OFlags::NONBLOCK)
         .map_err(|error| Broken::Start(error.into()))?;
-    let started = keeper.start(run, writer, plainly).map_err(Broken::Start)?;
+    let started = fork_server
+        .start(run, writer, plainly)
+        .map_err(Broken::Start)?;
     let handle = match &started {
         Started::Cold(child) => Pid::from_raw(child.id().cast_signed())
             .and_then(|pid| pidfd_open(pid, PidfdFlags::empty()).ok()),
@@ -82,7 +84,7 @@ pub(crate) fn run(
     let mut watched = Watched {
         limits: run.limits,
         begin: Instant::now(),
-        keeper,
+        fork_server,
         handle,
         started,
         reader,
@@ -90,10 +92,10 @@ pub(crate) fn run(
     };
     let end = watched.end(caller);
     if let Err(Broken::Unkept(_)) = end {
-        watched.keeper.let_go();
+        watched.fork_server.let_go();
     }
     // Before anything is looked at: nothing is written any more by then.
-    family::end(&watched.keeper.spared()).map_err(Broken::Lasts)?;
+    family::end(&watched.fork_server.spared()).map_err(Broken::Lasts)?;
     watched.hear();
     let fault = end?;
     Ok(Ended {
@@ -105,7 +107,7 @@ pub(crate) fn run(
 struct Watched<'k> {
     limits: Limits,
     begin: Instant,
-    keeper: &'k mut Keeper,
+    fork_server: &'k mut ForkServer,
     /// Can be waited for together with other things; older kernels have none.
     handle: Option<OwnedFd>,
     started: Started,
@@ -119,7 +121,7 @@ impl Watched<'_> {
         let mut looked = Instant::now();
         loop {
             self.hear();
-            match self.keeper.ended(&mut self.started) {
+            match self.fork_server.ended(&mut self.started) {
                 Ok(None) => {}
                 Ok(Some(status)) => return Ok(self.fault_of(status)),
                 Err(error) if matches!(self.started, Started::Warm(_)) => {
@@ -150,7 +152,7 @@ impl Watched<'_> {
         }
         let ends = match self.started {
             Started::Cold(_) => self.handle.as_ref().map(|it| it.as_fd()),
-            Started::Warm(_) => self.keeper.heard(),
+            Started::Warm(_) => self.fork_server.heard(),
         };
         if let Some(ends) = ends {
             fds.push(PollFd::from_borrowed_fd(ends, PollFlags::IN));
@@ -185,7 +187,7 @@ impl Watched<'_> {
     }
 
     fn takes_too_much(&self) -> Option<String> {
-        let family = family::living(&self.keeper.spared());
+        let family = family::living(&self.fork_server.spared());
         let limits = &self.limits;
         if family.len() > limits.processes {
             let most = limits.processes;

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use qcbus_disk::{FileMark, foreign};
+use qcbus_disk::{FileFingerprint, foreign};
 use qcbus_messages::Digest;
 use sha2::{Digest as _, Sha256};
 
@@ -38,7 +38,7 @@ fn digest_of(path: &Path) -> io::Result<Digest> {
 
 /// Programs, and how each looked when it was last seen to be the one that was learned.
 #[derive(Debug)]
-pub(crate) struct Programs(Vec<(Program, Option<FileMark>)>);
+pub(crate) struct Programs(Vec<(Program, Option<FileFingerprint>)>);
 
 impl Programs {
     pub(crate) fn new(programs: &[Program]) -> Programs {
@@ -49,7 +49,7 @@ impl Programs {
     pub(crate) fn changed(&mut self) -> Option<String> {
         self.0.iter_mut().find_map(|(program, seen)| {
             let digest = program.digest?;
-            let now = FileMark::at(&program.path);
+            let now = FileFingerprint::at(&program.path);
             if now.is_some() && now == *seen {
                 return None;
             }

@@ -6,16 +6,16 @@ use std::path::Path;
 use qcbus_formats::xqar::Param;
 use qcbus_messages::Exit;
 
-use crate::back::Paths;
 use crate::hosted::{Hosted, parse};
 use crate::messages::{Bytes, Document, Request};
-use crate::offices::Offices;
+use crate::results::Paths;
+use crate::runners::Runners;
 
 /// A report module that is run for every result.
 #[derive(Debug)]
 pub struct ReportModule {
     hosted: Hosted,
-    offices: Offices,
+    runners: Runners,
 }
 
 /// A file that it has written: its name, below its own directory, and what is in it.
@@ -34,9 +34,9 @@ impl ReportModule {
         let asked = parse(arguments).map_err(|error| (Exit::Usage, error.to_string()))?;
         let hosted = asked.hosted;
         let name = &hosted.name;
-        let offices = Offices::start(1, &hosted, program)
+        let runners = Runners::start(1, &hosted, program)
             .map_err(|error| (Exit::Internal, format!("`{name}` cannot be run: {error}")))?;
-        Ok((ReportModule { hosted, offices }, asked.rest))
+        Ok((ReportModule { hosted, runners }, asked.rest))
     }
 
     /// The name under which it joins.
@@ -65,7 +65,7 @@ impl ReportModule {
             applications,
             report: Some(params.collect()),
         };
-        let answered = self.offices.ask(&request, &[&bytes]);
+        let answered = self.runners.ask(&request, &[&bytes]);
         // Whoever started this process starts a new one.
         let answered = answered.unwrap_or_else(|error| {
             tracing::error!(module = name, %error, "the office is gone");

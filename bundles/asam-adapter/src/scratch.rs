@@ -28,7 +28,7 @@ impl Scratch {
         // Modules may write paths as the kernel knows them, and those are to be found again.
         let root = root.canonicalize()?;
         let scratch = Scratch { root };
-        let _door = scratch.shut()?;
+        let _lock = scratch.lock()?;
         sweep(&scratch.root);
         Ok(scratch)
     }
@@ -38,7 +38,7 @@ impl Scratch {
     /// # Errors
     /// The system's.
     pub fn for_a_run(&self) -> io::Result<Room> {
-        let _door = self.shut()?;
+        let _lock = self.lock()?;
         let own = std::process::id();
         let number = std::hash::BuildHasher::hash_one(&std::hash::RandomState::new(), own);
         let path = self.root.join(format!("{own}-{number:016x}"));
@@ -49,10 +49,10 @@ impl Scratch {
     }
 
     /// While it is shut no directory is new and not yet locked, and none is swept.
-    fn shut(&self) -> io::Result<File> {
-        let door = File::open(&self.root)?;
-        flock(&door, FlockOperation::LockExclusive)?;
-        Ok(door)
+    fn lock(&self) -> io::Result<File> {
+        let lock = File::open(&self.root)?;
+        flock(&lock, FlockOperation::LockExclusive)?;
+        Ok(lock)
     }
 }
 

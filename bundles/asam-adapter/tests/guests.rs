@@ -287,8 +287,8 @@ fn who_takes_its_directory_away_has_no_result() {
 
 #[test]
 fn what_it_leaves_goes_however_it_is_left() {
-    let shut = "polite; mkdir -p a/b/c; echo x > a/b/c/d; chmod 0 a/b/c a/b a; exit 0";
-    assert_eq!(Guest::doing(shut).judge(&[]), (Some(0), String::new()));
+    let lock = "polite; mkdir -p a/b/c; echo x > a/b/c/d; chmod 0 a/b/c a/b a; exit 0";
+    assert_eq!(Guest::doing(lock).judge(&[]), (Some(0), String::new()));
 }
 
 #[test]
@@ -398,9 +398,9 @@ fn who_is_killed_leaves_no_process_and_the_next_no_directory() {
         until("it runs", || {
             (processes_with(&guest.mark).len() >= 2).then_some(())
         });
-        let office = until("the office", || child_of(child.id(), "--office"));
+        let runner = until("the office", || child_of(child.id(), "--office"));
         match victim {
-            "the office" => kill(office),
+            "the office" => kill(runner),
             _ => kill(child.id().cast_signed()),
         }
         let output = within(child);

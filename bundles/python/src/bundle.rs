@@ -167,7 +167,7 @@ impl Native {
         let own = OwnFiles {
             reads,
             lists,
-            modest: false,
+            restricted: false,
         };
         // One thread at a time may run Python: more of them would only wait for each other.
         let mode = Mode::parse(arguments).map(|mode| mode.with_threads(1).reading(own));

@@ -7,14 +7,14 @@
 
 pub mod basic;
 mod bundle;
+mod cached;
 mod check;
 pub mod corpus;
-mod hands;
-mod kept;
 mod load;
 pub mod mutate;
 pub mod pages;
 mod param;
+mod permits;
 mod place;
 mod plan;
 mod resource;
@@ -27,11 +27,11 @@ mod subject;
 mod version;
 
 pub use bundle::{BACKPORT_SUFFIX, Bundle, Checker, Reads};
+pub use cached::LinkedModel;
 pub use check::{Listener, Outcome, check, check_with};
-pub use hands::Hands;
-pub use kept::LinkedModel;
 pub use load::{LoadError, Loaded};
 pub use param::{Default, MAX_ISSUES, Param, ParamError, Values};
+pub use permits::Permits;
 pub use place::Place;
 pub use plan::Plan;
 pub use qcbus_formats::xqar::{Issue, Level, Status};

@@ -10,7 +10,7 @@ use qcbus_ingest::{IngestError, Limits, Prepared, Reader, Source, Walking};
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Absence, Digest, DocumentRole, Link, MissingDocument};
 
-use crate::kept::JobModels;
+use crate::cached::JobModels;
 use crate::subject::LinkedImage;
 use crate::{Bundle, Subject};
 
@@ -148,7 +148,7 @@ impl Loaded {
         boundary: &Path,
         search: &SearchPath,
     ) -> Result<(), LoadError> {
-        let mut shelf = Shelf {
+        let mut store = SourceStore {
             reader,
             boundary,
             linked: Vec::new(),
@@ -160,14 +160,14 @@ impl Loaded {
             max_image: Limits::default().max_image,
             search,
         };
-        let Ok(found) = qcbus_ingest::gather(&root, &walking, &mut shelf);
+        let Ok(found) = qcbus_ingest::gather(&root, &walking, &mut store);
         self.missing = found.missing;
         let mut links = found.links.into_iter();
         self.links = links.next().unwrap_or_default();
-        for (linked, links) in shelf.linked.iter_mut().zip(links) {
+        for (linked, links) in store.linked.iter_mut().zip(links) {
             linked.links = links;
         }
-        self.linked = shelf.linked;
+        self.linked = store.linked;
         Ok(())
     }
 }
@@ -176,13 +176,13 @@ impl Loaded {
 const MAX_DOCUMENTS: usize = 2048;
 
 /// Fetches documents from disk into memory.
-struct Shelf<'b> {
+struct SourceStore<'b> {
     reader: Reader,
     boundary: &'b Path,
     linked: Vec<LinkedImage>,
 }
 
-impl Source for Shelf<'_> {
+impl Source for SourceStore<'_> {
     type Document = Vec<u8>;
     type Halt = Infallible;
 

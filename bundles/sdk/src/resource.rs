@@ -229,16 +229,16 @@ pub(crate) fn resources(bundle: &Bundle) -> Vec<&'static Resource> {
     all
 }
 
-enum Trouble {
+enum ListingError {
     Io(PathBuf, std::io::Error),
     TooMuch,
 }
 
-impl Trouble {
+impl ListingError {
     fn of(self, directory: &Path) -> ResourceError {
         match self {
-            Trouble::Io(path, error) => unreadable(&path, &error),
-            Trouble::TooMuch => ResourceError::TooMuch {
+            ListingError::Io(path, error) => unreadable(&path, &error),
+            ListingError::TooMuch => ResourceError::TooMuch {
                 path: directory.display().to_string(),
                 most: MOST,
                 deepest: DEEPEST,
@@ -252,13 +252,13 @@ fn collect(
     endings: &[&str],
     (depth, budget): (usize, &mut usize),
     found: &mut Vec<PathBuf>,
-) -> Result<(), Trouble> {
-    let io = |error| Trouble::Io(directory.to_owned(), error);
+) -> Result<(), ListingError> {
+    let io = |error| ListingError::Io(directory.to_owned(), error);
     for entry in std::fs::read_dir(directory).map_err(io)? {
         let path = entry.map_err(io)?.path();
-        *budget = budget.checked_sub(1).ok_or(Trouble::TooMuch)?;
+        *budget = budget.checked_sub(1).ok_or(ListingError::TooMuch)?;
         if path.is_dir() {
-            let depth = depth.checked_sub(1).ok_or(Trouble::TooMuch)?;
+            let depth = depth.checked_sub(1).ok_or(ListingError::TooMuch)?;
             collect(&path, endings, (depth, budget), found)?;
         } else if has_ending(&path, endings) {
             found.push(path);

@@ -213,7 +213,7 @@ pub trait AnyRule: Sync {
     fn with_model<'d>(
         &self,
         subject: &'d Subject<'d>,
-        hand: &mut dyn FnMut(&dyn Built<'d>),
+        permit: &mut dyn FnMut(&dyn Built<'d>),
     ) -> Result<(), Unbuilt>;
     /// The rule, to find out its type.
     #[doc(hidden)]
@@ -263,11 +263,11 @@ impl<M: Model> AnyRule for Rule<M> {
     fn with_model<'d>(
         &self,
         subject: &'d Subject<'d>,
-        hand: &mut dyn FnMut(&dyn Built<'d>),
+        permit: &mut dyn FnMut(&dyn Built<'d>),
     ) -> Result<(), Unbuilt> {
         let whole = &M::build(subject)?;
         let parts = M::parts(whole);
-        hand(&Divided::<M> { whole, parts });
+        permit(&Divided::<M> { whole, parts });
         Ok(())
     }
 

@@ -10,14 +10,14 @@ use crate::{Resource, ResourceError};
 pub(crate) struct Seen {
     resource: &'static Resource,
     path: PathBuf,
-    files: Result<Vec<Look>, ResourceError>,
+    files: Result<Vec<FileState>, ResourceError>,
     /// Something had changed so shortly before that it may change again without a trace.
     racy: bool,
 }
 
 /// Changes whenever a file is written, replaced or given back an old date.
 #[derive(Debug, PartialEq, Eq)]
-struct Look {
+struct FileState {
     path: PathBuf,
     /// Device, inode, size, and when it was changed; nothing for a file that is not there.
     known: Option<(u64, u64, u64, SystemTime)>,
@@ -33,7 +33,7 @@ impl Seen {
 
     fn at(now: SystemTime, resource: &'static Resource, path: &Path) -> Seen {
         let files = stamps(resource, path);
-        let changed = |stamp: &Look| stamp.known.map(|(.., changed)| changed);
+        let changed = |stamp: &FileState| stamp.known.map(|(.., changed)| changed);
         let last = files.iter().flatten().filter_map(changed).max();
         Seen {
             resource,
@@ -53,19 +53,19 @@ impl Seen {
     }
 }
 
-fn stamps(resource: &Resource, path: &Path) -> Result<Vec<Look>, ResourceError> {
+fn stamps(resource: &Resource, path: &Path) -> Result<Vec<FileState>, ResourceError> {
     let files = resource.listing(path)?.into_iter();
     Ok(files.map(stamp).collect())
 }
 
-fn stamp(path: PathBuf) -> Look {
+fn stamp(path: PathBuf) -> FileState {
     let known = std::fs::metadata(&path).ok().map(|it| {
         let seconds = Duration::from_secs(u64::try_from(it.ctime()).unwrap_or(0));
         let rest = Duration::from_nanos(u64::try_from(it.ctime_nsec()).unwrap_or(0));
         let changed = SystemTime::UNIX_EPOCH + seconds + rest;
         (it.dev(), it.ino(), it.size(), changed)
     });
-    Look { path, known }
+    FileState { path, known }
 }
 
 #[cfg(test)]

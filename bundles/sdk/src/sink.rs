@@ -25,7 +25,7 @@ pub struct Sink<'d> {
     values: &'d Values,
     /// Said on every issue of a rule that is not normative for the document's version.
     not_normative: Option<String>,
-    kept: Vec<Kept>,
+    cached: Vec<Cached>,
     /// What is looked at now: the part with this number, or the whole.
     part: u32,
     suppressed: Option<Suppressed>,
@@ -42,7 +42,7 @@ pub struct Sink<'d> {
 }
 
 /// A finding that is listed.
-struct Kept {
+struct Cached {
     /// What was being looked at: findings are made in this order.
     part: u32,
     /// Where it is in the document: findings are listed in this order.
@@ -55,8 +55,8 @@ pub(crate) const WHOLE: u32 = u32::MAX;
 
 /// A finding about something to which references lead.
 struct Behind {
-    /// Its place in `kept`, if it is there.
-    kept: Option<usize>,
+    /// Its place in `cached`, if it is there.
+    cached: Option<usize>,
     /// Where the last reference stands.
     last: u32,
     /// The references after the first.
@@ -88,7 +88,7 @@ impl<'d> Sink<'d> {
             facts,
             values,
             not_normative,
-            kept: Vec::new(),
+            cached: Vec::new(),
             part: WHOLE,
             suppressed: None,
             behind: HashMap::new(),
@@ -121,16 +121,16 @@ impl<'d> Sink<'d> {
         } else {
             self.facts.level
         };
-        let full = self.kept.len() >= self.limit();
+        let full = self.cached.len() >= self.limit();
         let issue = if full {
             self.suppress(place, level);
             scratch(&mut self.scratch)
         } else {
             let (order, issue) = self.complete(place, text, level);
             let part = self.part;
-            self.kept.push(Kept { part, order, issue });
-            match self.kept.last_mut() {
-                Some(kept) => &mut kept.issue,
+            self.cached.push(Cached { part, order, issue });
+            match self.cached.last_mut() {
+                Some(cached) => &mut cached.issue,
                 None => scratch(&mut self.scratch),
             }
         };
@@ -178,18 +178,18 @@ impl<'d> Sink<'d> {
             known.last = reference.offset();
             known.more += usize::from(is_other);
             let shown = known
-                .kept
+                .cached
                 .filter(|_| is_other && known.more <= MOST_REFERENCES);
-            if let Some(kept) = shown.and_then(|kept| self.kept.get_mut(kept)) {
+            if let Some(cached) = shown.and_then(|cached| self.cached.get_mut(cached)) {
                 let what = "a further reference that leads there";
                 let spot = locate(self.subject, &Place::Node(reference), Some(what));
-                kept.issue.locations.push(spot.locations);
+                cached.issue.locations.push(spot.locations);
             }
             return true;
         }
-        let kept = self.kept.len();
+        let cached = self.cached.len();
         let behind = Behind {
-            kept: (kept < self.limit()).then_some(kept),
+            cached: (cached < self.limit()).then_some(cached),
             last: reference.offset(),
             more: 0,
         };
@@ -242,13 +242,13 @@ impl<'d> Sink<'d> {
     /// Passes on an issue as another program has said it, with its places, which are not looked at. Such issues are
     /// listed in the order in which they are passed on.
     pub fn retell(&mut self, issue: Issue) {
-        if self.kept.len() >= self.limit() {
+        if self.cached.len() >= self.limit() {
             let level = issue.level;
             return self.suppress(&Place::Text(self.subject.written(), 0), level);
         }
         let part = self.part;
-        let order = (0, u32::try_from(self.kept.len()).unwrap_or(u32::MAX));
-        self.kept.push(Kept { part, order, issue });
+        let order = (0, u32::try_from(self.cached.len()).unwrap_or(u32::MAX));
+        self.cached.push(Cached { part, order, issue });
     }
 
     /// What is checked, with everything that the root refers to.
@@ -278,7 +278,7 @@ impl<'d> Sink<'d> {
 
     /// How many findings there are, listed or not.
     pub fn count(&self) -> u64 {
-        self.kept.len() as u64
+        self.cached.len() as u64
             + self
                 .suppressed
                 .as_ref()
@@ -300,22 +300,23 @@ impl<'d> Sink<'d> {
         if !plain(self) || !others.iter().all(plain) {
             return false;
         }
-        self.kept.extend(others.into_iter().flat_map(|it| it.kept));
+        self.cached
+            .extend(others.into_iter().flat_map(|it| it.cached));
         // Every part was one thread's, and is in order.
-        self.kept.sort_by_key(|kept| kept.part);
-        self.kept.retain(|kept| kept.part <= last);
-        self.kept.len() <= self.limit()
+        self.cached.sort_by_key(|cached| cached.part);
+        self.cached.retain(|cached| cached.part <= last);
+        self.cached.len() <= self.limit()
     }
 
     /// Takes out the findings in document order, and facts about those that are not listed.
     pub(crate) fn finish(&mut self) -> (Vec<Issue>, Vec<Metadata>) {
-        let mut kept = std::mem::take(&mut self.kept);
+        let mut cached = std::mem::take(&mut self.cached);
         let mut behind: Vec<Behind> = std::mem::take(&mut self.behind).into_values().collect();
-        behind.sort_unstable_by_key(|behind| behind.kept);
+        behind.sort_unstable_by_key(|behind| behind.cached);
         for behind in behind {
-            let finding = behind.kept.and_then(|at| kept.get_mut(at));
+            let finding = behind.cached.and_then(|at| cached.get_mut(at));
             let unsaid = behind.more.saturating_sub(MOST_REFERENCES);
-            if let Some(Kept { issue, .. }) = finding.filter(|_| unsaid > 0) {
+            if let Some(Cached { issue, .. }) = finding.filter(|_| unsaid > 0) {
                 let text = match unsaid {
                     1 => "; one more reference leads there".to_owned(),
                     unsaid => format!("; {unsaid} more references lead there"),
@@ -323,8 +324,8 @@ impl<'d> Sink<'d> {
                 issue.description.push_str(&text);
             }
         }
-        kept.sort_by_key(|kept| kept.order);
-        let mut issues: Vec<Issue> = kept.into_iter().map(|kept| kept.issue).collect();
+        cached.sort_by_key(|cached| cached.order);
+        let mut issues: Vec<Issue> = cached.into_iter().map(|cached| cached.issue).collect();
         let mut facts = std::mem::take(&mut self.metadata);
         let Some(suppressed) = self.suppressed.take() else {
             return (issues, facts);

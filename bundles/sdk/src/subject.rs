@@ -8,7 +8,7 @@ use qcbus_ingest::Limits;
 use qcbus_ingest::modular::{Expansion, Piece};
 use qcbus_messages::{DocumentRole, Link, MissingDocument};
 
-use crate::kept::{ImageId, JobModels};
+use crate::cached::{ImageId, JobModels};
 use crate::{LinkedModel, Reads, ResourceValue, Version};
 
 /// The documents of one check.
@@ -84,7 +84,7 @@ impl Linked<'_> {
     ///
     /// What costs time on a large document belongs into such a model, so that a root costs its own
     /// checks and not those of its map.
-    pub fn kept<M: LinkedModel>(&self) -> Option<Arc<M>> {
+    pub fn cached<M: LinkedModel>(&self) -> Option<Arc<M>> {
         self.models.get(self.image.id, &self.image.image)
     }
 }

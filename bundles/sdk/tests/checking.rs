@@ -14,7 +14,7 @@ use qcbus_document::Document;
 use qcbus_formats::pool::{CheckerOutcome, Ending};
 use qcbus_formats::xqar::Status;
 use qcbus_sdk::{
-    AnyRule, Backport, Bundle, Checker, Hands, Level, Loaded, Model, Param, Plan, Rule, Sink,
+    AnyRule, Backport, Bundle, Checker, Level, Loaded, Model, Param, Permits, Plan, Rule, Sink,
     Subject, Unbuilt, examine, examine_timed,
 };
 
@@ -188,7 +188,7 @@ fn findings_are_located_and_in_document_order() {
 fn timings_name_every_demanded_checker_and_sum_up() {
     let loaded = Loaded::from_bytes(Path::new("a.xodr"), MAP.as_bytes().to_vec()).unwrap();
     let (outcome, timings) =
-        examine_timed(&Plan::by_default(&BUNDLE), &loaded, &Hands::new(2)).unwrap();
+        examine_timed(&Plan::by_default(&BUNDLE), &loaded, &Permits::new(2)).unwrap();
     let text = timings.to_string();
     for checker in &outcome.checkers {
         let lines = text

@@ -50,7 +50,7 @@ fn tell(_: &Document<'_>, found: &mut Sink<'_>) {
     };
     let maps: Vec<_> = subject.with_role(DocumentRole::Map).cloned().collect();
     for map in maps {
-        match map.kept::<FirstRoad>() {
+        match map.cached::<FirstRoad>() {
             Some(road) => found.issue(root, format!("{}, {} before", road.id, road.before)),
             None => found.issue(root, "no road"),
         };

@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 use qcbus_document::Document;
 use qcbus_formats::xqar::{Issue, Status};
 use qcbus_sdk::{
-    AnyRule, Bundle, Hands, Listener, Loaded, MAX_ISSUES, Outcome, Plan, Rule, Sink, check_with,
+    AnyRule, Bundle, Listener, Loaded, MAX_ISSUES, Outcome, Permits, Plan, Rule, Sink, check_with,
 };
 use roads::Roads;
 
@@ -198,8 +198,8 @@ fn heard(bundle: &'static Bundle, threads: usize, patience: Option<usize>) -> (b
         patience,
         ..Heard::default()
     };
-    let hands = Hands::new(threads);
-    let complete = check_with(&plan(bundle), &subject, &hands, &mut heard);
+    let permits = Permits::new(threads);
+    let complete = check_with(&plan(bundle), &subject, &permits, &mut heard);
     (complete, heard)
 }
 

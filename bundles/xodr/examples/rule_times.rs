@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
-use qcbus_sdk::{Hands, Issue, Listener, Loaded, Outcome, Plan, check_with};
+use qcbus_sdk::{Issue, Listener, Loaded, Outcome, Permits, Plan, check_with};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let measured: Vec<Measured> = maps
         .iter()
-        .map(|map| measure(map, runs, &Hands::new(threads)))
+        .map(|map| measure(map, runs, &Permits::new(threads)))
         .collect::<Result<_, _>>()?;
     for (map, measured) in maps.iter().zip(&measured) {
         let [best, median] = [measured.best, measured.median].map(milliseconds);
@@ -73,7 +73,11 @@ struct Measured {
     issues: usize,
 }
 
-fn measure(map: &str, runs: usize, hands: &Hands) -> Result<Measured, Box<dyn std::error::Error>> {
+fn measure(
+    map: &str,
+    runs: usize,
+    hands: &Permits,
+) -> Result<Measured, Box<dyn std::error::Error>> {
     let path = Path::new(map);
     let loaded = Loaded::from_path(path, path.parent().unwrap_or(path))?;
     let plan = Plan::by_default(&qcbus_xodr::BUNDLE);
@@ -103,7 +107,7 @@ fn measure(map: &str, runs: usize, hands: &Hands) -> Result<Measured, Box<dyn st
 }
 
 /// The CPU time of this thread when it is alone, else the time on the wall.
-fn clock(hands: &Hands) -> Duration {
+fn clock(hands: &Permits) -> Duration {
     let clock = match hands.count() {
         1 => libc::CLOCK_THREAD_CPUTIME_ID,
         _ => libc::CLOCK_MONOTONIC,

@@ -64,7 +64,7 @@ fn map(subject: &Subject<'_>) -> LinkedMap {
             _ if broken => LinkedMap::NotHad,
             false => LinkedMap::Foreign,
             true => linked
-                .kept::<KeptRoads>()
+                .cached::<KeptRoads>()
                 .map_or(LinkedMap::NotHad, |kept| LinkedMap::Roads(kept.0.clone())),
         };
     }

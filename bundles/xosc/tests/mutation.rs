@@ -22,7 +22,7 @@ use list::{Entry, Mutation};
 use qcbus_sdk::corpus::agrees_or_says;
 use qcbus_sdk::mutate::in_parallel;
 use qcbus_xosc::BUNDLE;
-use trial::{BASES, Base, Desk, Trial, rule_of};
+use trial::{BASES, Base, Cli, Trial, rule_of};
 
 const EDITS: &str = include_str!("mutation/edits.txt");
 
@@ -31,8 +31,8 @@ const LEAST: usize = 3;
 
 #[test]
 fn nothing_is_wrong_with_the_scenarios() {
-    let told: Vec<String> = in_parallel(&BASES, |desk: &mut Desk, base: &Base| {
-        let said = desk.unedited(base).unwrap();
+    let told: Vec<String> = in_parallel(&BASES, |cli: &mut Cli, base: &Base| {
+        let said = cli.unedited(base).unwrap();
         let told = said.iter().map(|it| format!("{}: {it}\n", base.name));
         told.collect()
     });
@@ -72,9 +72,8 @@ fn every_edit_is_found_and_by_its_rule_only() {
         .filter(asked)
         .flat_map(|entry| entry.edits.iter().map(move |edit| (entry, edit)))
         .collect();
-    let trials: Vec<Trial<'_>> = in_parallel(&all, |desk: &mut Desk, (entry, edit)| {
-        desk.trial(entry, edit)
-    });
+    let trials: Vec<Trial<'_>> =
+        in_parallel(&all, |cli: &mut Cli, (entry, edit)| cli.trial(entry, edit));
     if !wanted.is_empty() {
         for trial in &trials {
             std::io::stderr()

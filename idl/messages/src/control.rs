@@ -37,7 +37,7 @@ pub enum Request {
         #[serde(with = "path_text::one")]
         file: PathBuf,
         /// Under what.
-        terms: Terms,
+        check_context: CheckContext,
     },
     /// Drain and stop.
     Down,
@@ -121,7 +121,7 @@ pub enum Response {
     /// Answer to `Bundle`; nothing when there is none of this name.
     Bundle {
         /// How it stands.
-        bundle: Option<Box<BundleStanding>>,
+        bundle: Option<Box<BundleReadiness>>,
     },
     /// Answer to `Trials`.
     Trials {
@@ -144,7 +144,7 @@ pub enum Response {
 
 /// How a bundle stands, of which a manifest says what is wanted.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct BundleStanding {
+pub struct BundleReadiness {
     /// Its name.
     pub name: String,
     /// The command of the manifest that is in force; nothing when it was started by hand or comes with the program.
@@ -152,7 +152,7 @@ pub struct BundleStanding {
     /// Tells the files that this command runs, and all else of the manifest, from former ones.
     pub spec: u64,
     /// How the process of this very command stands.
-    pub standing: Standing,
+    pub readiness: Readiness,
     /// Who judges at the moment, be it an older process; nothing when nobody does.
     pub runs: Option<Runs>,
     /// The last lines that a process of it has said before it ended without having joined, as it said them.
@@ -163,7 +163,7 @@ pub struct BundleStanding {
 /// How the process stands that is wanted of a bundle.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "standing", rename_all = "kebab-case")]
-pub enum Standing {
+pub enum Readiness {
     /// It has joined, has said what it checks, and is asked from now on.
     Ready,
     /// It is being started, and nothing has gone wrong so far.
@@ -178,9 +178,9 @@ pub enum Standing {
     },
 }
 
-impl Default for Standing {
-    fn default() -> Standing {
-        Standing::Coming { joined: false }
+impl Default for Readiness {
+    fn default() -> Readiness {
+        Readiness::Coming { joined: false }
     }
 }
 
@@ -257,7 +257,7 @@ pub struct Offer {
 
 /// Under what a file is checked. A broker of the same program that works under equal terms finds the same.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Terms {
+pub struct CheckContext {
     /// Digest over the configuration, the form of results, and all limits.
     pub general: String,
     /// The bundles that are to look at the file, each with a digest over how it is started.

@@ -39,7 +39,7 @@ mod section;
 
 #[cfg(doc)]
 use qcbus_reporter_sdk::Output;
-use qcbus_reporter_sdk::{FormReporter, Registration};
+use qcbus_reporter_sdk::{FormatReporter, Registration};
 
 pub use entry::Entry;
 pub use report::Annotations;
@@ -54,7 +54,7 @@ pub static REPORTER: Registration = Registration {
     name: NAME,
     about: "NAME.github.txt beside every result",
     is_page: false,
-    make: |setting| Box::new(FormReporter::new(Annotations, setting)),
+    make: |setting| Box::new(FormatReporter::new(Annotations, setting)),
 };
 
 /// How many annotations of one level GitHub takes from a step.

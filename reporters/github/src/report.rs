@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use qcbus_messages::{ResultMessage, Verdict, shown};
-use qcbus_reporter_sdk::{Destination, ReportError, ReportForm, Sources, Subject};
+use qcbus_reporter_sdk::{Destination, ReportError, ReportFormat, Sources, Subject};
 
 use crate::choice::Chosen;
 use crate::command::{annotation, data, place_path, unescaped};
@@ -16,7 +16,7 @@ const END_OF_GROUP: &str = "::endgroup::";
 #[derive(Debug, Clone, Copy)]
 pub struct Annotations;
 
-impl ReportForm for Annotations {
+impl ReportFormat for Annotations {
     type Section = Section;
     const SUFFIX: &'static str = "github.txt";
 

@@ -13,7 +13,7 @@ use qcbus_formats::location::OtherPlace;
 use qcbus_formats::xqar::{Level, Location, Param, Status};
 use qcbus_messages::Verdict;
 use qcbus_report_github::{Annotations, LONGEST_TEXT, REPORTER};
-use qcbus_reporter_sdk::{NoSources, ReportForm as _, Setting};
+use qcbus_reporter_sdk::{NoSources, ReportFormat as _, Setting};
 
 #[test]
 fn a_report_of_several_files() {

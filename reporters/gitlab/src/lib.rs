@@ -31,7 +31,7 @@ mod section;
 
 #[cfg(doc)]
 use qcbus_reporter_sdk::Output;
-use qcbus_reporter_sdk::{FormReporter, Registration};
+use qcbus_reporter_sdk::{FormatReporter, Registration};
 
 pub use report::{CodeQuality, MOST_ENTRIES};
 pub use section::Section;
@@ -45,5 +45,5 @@ pub static REPORTER: Registration = Registration {
     name: NAME,
     about: "NAME.codequality.json beside every result",
     is_page: false,
-    make: |setting| Box::new(FormReporter::new(CodeQuality, setting)),
+    make: |setting| Box::new(FormatReporter::new(CodeQuality, setting)),
 };

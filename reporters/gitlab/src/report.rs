@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use qcbus_messages::ResultMessage;
-use qcbus_reporter_sdk::{Destination, Repeats, ReportError, ReportForm, Sources, fingerprint_of};
+use qcbus_reporter_sdk::{
+    Destination, Repeats, ReportError, ReportFormat, Sources, fingerprint_of,
+};
 
 use crate::entry::{Entry, Lines, Location, Own, Severity};
 use crate::section::Section;
@@ -18,7 +20,7 @@ const LEFT_OUT: &str = "qcbus/left_out";
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CodeQuality;
 
-impl ReportForm for CodeQuality {
+impl ReportFormat for CodeQuality {
     type Section = Section;
     const SUFFIX: &'static str = "codequality.json";
 

@@ -11,7 +11,7 @@ use qcbus_formats::xqar::{Checker, Issue, Level, Location, Locations, Metadata, 
 use qcbus_messages::{ResultMessage, Verdict};
 use qcbus_report_gitlab::{CodeQuality, MOST_ENTRIES, Section};
 use qcbus_reporter_sdk::samples::result;
-use qcbus_reporter_sdk::{Destination, NoSources, ReportForm as _};
+use qcbus_reporter_sdk::{Destination, NoSources, ReportFormat as _};
 use serde_json::Value;
 
 const UID: &str = "asam.net:xodr:1.4.0:road.lane.link_order";

@@ -68,7 +68,7 @@ mod xml;
 use qcbus_reporter_sdk::Output;
 
 use qcbus_messages::ResultMessage;
-use qcbus_reporter_sdk::{FormReporter, Registration};
+use qcbus_reporter_sdk::{FormatReporter, Registration};
 use serde::Serialize as _;
 
 /// The reporter's name on the bus and in configurations.
@@ -80,7 +80,7 @@ pub static REPORTER: Registration = Registration {
     name: NAME,
     about: "NAME.json beside every result",
     is_page: false,
-    make: |setting| Box::new(FormReporter::new(report::Documents, setting)),
+    make: |setting| Box::new(FormatReporter::new(report::Documents, setting)),
 };
 
 /// The number under `qcbus.schema`. It changes when a field changes its meaning or goes away.

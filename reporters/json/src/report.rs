@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use qcbus_formats::xqar::Param;
 use qcbus_messages::ResultMessage;
-use qcbus_reporter_sdk::{Destination, ReportError, ReportForm, Sources, param};
+use qcbus_reporter_sdk::{Destination, ReportError, ReportFormat, Sources, param};
 
 use crate::{DEFAULT_INDENT, render};
 
 /// A sequence of JSON documents, each with `qcbus.inputFile`.
 pub(crate) struct Documents;
 
-impl ReportForm for Documents {
+impl ReportFormat for Documents {
     type Section = String;
     const SUFFIX: &'static str = "json";
 

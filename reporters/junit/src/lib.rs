@@ -37,7 +37,7 @@ mod text;
 
 #[cfg(doc)]
 use qcbus_reporter_sdk::Output;
-use qcbus_reporter_sdk::{FormReporter, Registration};
+use qcbus_reporter_sdk::{FormatReporter, Registration};
 
 pub use report::Suites;
 
@@ -50,7 +50,7 @@ pub static REPORTER: Registration = Registration {
     name: NAME,
     about: "NAME.junit.xml beside every result",
     is_page: false,
-    make: |setting| Box::new(FormReporter::new(Suites, setting)),
+    make: |setting| Box::new(FormatReporter::new(Suites, setting)),
 };
 
 /// How many findings one case says in full.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use qcbus_formats::xqar::Param;
 use qcbus_messages::ResultMessage;
-use qcbus_reporter_sdk::{Destination, ReportError, ReportForm, Sources, Subject, param};
+use qcbus_reporter_sdk::{Destination, ReportError, ReportFormat, Sources, Subject, param};
 use quick_junit::{Report, TestSuite};
 
 use crate::suite::{self, INPUT, Inapplicable};
@@ -14,7 +14,7 @@ use crate::text::path;
 #[derive(Debug, Clone, Copy)]
 pub struct Suites;
 
-impl ReportForm for Suites {
+impl ReportFormat for Suites {
     type Section = TestSuite;
     const SUFFIX: &'static str = "junit.xml";
 

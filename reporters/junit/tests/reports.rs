@@ -13,7 +13,7 @@ use qcbus_formats::location::OtherPlace;
 use qcbus_formats::xqar::{Level, Location, Locations, Param, Status};
 use qcbus_messages::Verdict;
 use qcbus_report_junit::{LONGEST_FINDING, MOST_FINDINGS, REPORTER, Suites};
-use qcbus_reporter_sdk::{NoSources, ReportForm as _, Setting};
+use qcbus_reporter_sdk::{NoSources, ReportFormat as _, Setting};
 
 fn set(name: &str, value: &str) -> Param {
     Param {

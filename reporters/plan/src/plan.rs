@@ -9,7 +9,7 @@ use crate::furniture;
 use crate::junction::{Outlines, Roads};
 use crate::origin::Shift;
 use crate::road::{RoadPlan, road};
-use crate::sample::Trouble;
+use crate::sample::NotDrawn;
 use crate::writer::{Writer, unsigned};
 
 /// What the bytes begin with.
@@ -50,7 +50,7 @@ pub struct Plan {
 }
 
 /// What became of a road.
-type Drawn<'a> = Result<RoadPlan<'a>, Trouble>;
+type Drawn<'a> = Result<RoadPlan<'a>, NotDrawn>;
 
 impl Plan {
     /// Draws a map. Takes 2 to 10 ms per megabyte of it, and whatever it says time in proportion to its size.
@@ -59,18 +59,18 @@ impl Plan {
         let mut roads = draw(map, origin);
         redraw(map, origin, &mut roads);
         let mut cuts = Vec::new();
-        let failed = |trouble| {
+        let failed = |not_drawn| {
             let pairs = map.roads().iter().zip(&roads);
-            let failed = pairs.filter(move |(_, drawn)| drawn.as_ref().err() == Some(&trouble));
+            let failed = pairs.filter(move |(_, drawn)| drawn.as_ref().err() == Some(&not_drawn));
             failed.map(|(road, _)| road.id())
         };
         cuts.extend(sentence(
-            failed(Trouble::Nowhere),
+            failed(NotDrawn::Nowhere),
             "road",
             "for want of a finite place within 1,000 km of the other roads",
         ));
         cuts.extend(sentence(
-            failed(Trouble::TooLong),
+            failed(NotDrawn::TooLong),
             "road",
             "as it would take too many points",
         ));
@@ -165,7 +165,7 @@ fn redraw<'a>(map: &RoadMap<'a>, origin: Shift, roads: &mut [Drawn<'a>]) {
     let mut left = RESERVE;
     for (one, drawn) in map.roads().iter().zip(roads) {
         let work = left.min(RESERVE_OF_A_ROAD);
-        if matches!(drawn, Err(Trouble::TooLong)) && work > allowance(map, one) {
+        if matches!(drawn, Err(NotDrawn::TooLong)) && work > allowance(map, one) {
             let (again, spent) = road(one, origin, work);
             left -= spent;
             *drawn = again;

@@ -5,7 +5,7 @@ use qcbus_opendrive::geometry::Cubic;
 
 use crate::frame::{Piece, Rows};
 use crate::origin::Shift;
-use crate::sample::{Sampler, Trouble};
+use crate::sample::{Sampler, NotDrawn};
 use crate::section::{self, SectionPlan, TOLERANCE};
 use crate::simplify::{Vertex, profile};
 
@@ -25,17 +25,17 @@ pub(crate) fn road<'a>(
     road: &Road<'a>,
     origin: Shift,
     work: usize,
-) -> (Result<RoadPlan<'a>, Trouble>, usize) {
+) -> (Result<RoadPlan<'a>, NotDrawn>, usize) {
     let mut sampler = Sampler { origin, left: work };
     let plan = draw(road, &mut sampler);
     (plan, work - sampler.left)
 }
 
-fn draw<'a>(road: &Road<'a>, sampler: &mut Sampler) -> Result<RoadPlan<'a>, Trouble> {
-    let reach = section::reach(road).ok_or(Trouble::Nowhere)?;
+fn draw<'a>(road: &Road<'a>, sampler: &mut Sampler) -> Result<RoadPlan<'a>, NotDrawn> {
+    let reach = section::reach(road).ok_or(NotDrawn::Nowhere)?;
     let mut rows = Rows::default();
     section::each_piece(reach, own_starts(road), |piece| {
-        let piece = Piece::of(road, piece, vec![Cubic::default()]).ok_or(Trouble::Nowhere)?;
+        let piece = Piece::of(road, piece, vec![Cubic::default()]).ok_or(NotDrawn::Nowhere)?;
         sampler.take(&piece, &mut rows)
     })?;
     let mut own = own_starts(road);

@@ -30,7 +30,7 @@ const MEASURED: usize = 40;
 
 /// Why a road cannot be drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Trouble {
+pub(crate) enum NotDrawn {
     /// A part of it has no finite place or lies too far away.
     Nowhere,
     /// It has more points than it may have.
@@ -47,7 +47,7 @@ pub(crate) struct Sampler {
 impl Sampler {
     /// Appends the rows of a piece to those of the pieces before. A first row that is no other than the last one is
     /// left out; where something steps, both stay.
-    pub(crate) fn take(&mut self, piece: &Piece, rows: &mut Rows) -> Result<(), Trouble> {
+    pub(crate) fn take(&mut self, piece: &Piece, rows: &mut Rows) -> Result<(), NotDrawn> {
         let (mut one, mut other, mut end) = (Vec::new(), Vec::new(), Vec::new());
         self.row(piece, piece.from, &mut end)?;
         let same = |(s, row)| f64::abs(s - piece.from) < SHORTEST && is_same(row, &end);
@@ -57,7 +57,7 @@ impl Sampler {
         let parts = turning(piece.placed(), piece.to - piece.from) / TURN;
         // More parts than points allowed need not be listed.
         if parts.is_nan() || parts > self.left as f64 {
-            return Err(Trouble::TooLong);
+            return Err(NotDrawn::TooLong);
         }
         let mut open = Vec::new();
         divide([piece.from, piece.to], parts.ceil().max(1.0), &mut open);
@@ -88,11 +88,11 @@ impl Sampler {
         Ok(())
     }
 
-    fn row(&mut self, piece: &Piece, s: f64, row: &mut Vec<Sample>) -> Result<(), Trouble> {
+    fn row(&mut self, piece: &Piece, s: f64, row: &mut Vec<Sample>) -> Result<(), NotDrawn> {
         let measured = matches!(piece.placed().curve, Curve::Poly3(_));
         let price = 2 + piece.width() + if measured { MEASURED } else { 0 };
-        self.left = self.left.checked_sub(price).ok_or(Trouble::TooLong)?;
-        piece.row(self.origin, s, row).ok_or(Trouble::Nowhere)
+        self.left = self.left.checked_sub(price).ok_or(NotDrawn::TooLong)?;
+        piece.row(self.origin, s, row).ok_or(NotDrawn::Nowhere)
     }
 }
 

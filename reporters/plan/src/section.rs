@@ -6,7 +6,7 @@ use qcbus_opendrive::{LaneRef, Road, SectionRef, Side};
 use crate::columns::{Flank, mark_starts};
 use crate::frame::{Piece, Rows, valid};
 use crate::origin::Spot;
-use crate::sample::{Sampler, Trouble};
+use crate::sample::{Sampler, NotDrawn};
 use crate::simplify::{Vertex, levels, profile};
 
 /// Stations closer together than this, in metres, are one.
@@ -57,7 +57,7 @@ pub(crate) fn section<'a>(
     line: [f64; 2],
     starts: [&[f64]; 2],
     sampler: &mut Sampler,
-) -> Result<SectionPlan<'a>, Trouble> {
+) -> Result<SectionPlan<'a>, NotDrawn> {
     let flanks = [Side::Left, Side::Right].map(|side| Flank::of(section, side));
     let start = section.s().unwrap_or(f64::NAN);
     let ends = Side::BOTH.into_iter().filter(|side| section.covers(*side));
@@ -110,7 +110,7 @@ fn rows(
     [from, to]: [f64; 2],
     starts: [&[f64]; 2],
     sampler: &mut Sampler,
-) -> Result<Rows, Trouble> {
+) -> Result<Rows, NotDrawn> {
     let start = section.s().unwrap_or(from);
     let mut breaks: Vec<f64> = Vec::new();
     for starts in starts {
@@ -131,7 +131,7 @@ fn rows(
             .map(|flank| flank.bordered().len())
             .sum::<usize>();
         // What a piece costs before its first row.
-        sampler.left = sampler.left.checked_sub(columns).ok_or(Trouble::TooLong)?;
+        sampler.left = sampler.left.checked_sub(columns).ok_or(NotDrawn::TooLong)?;
         let offset = section.layer.offset();
         let center = valid(offset, piece[0]).unwrap_or_default();
         let mut borders: Vec<Cubic> = Vec::with_capacity(columns);
@@ -139,7 +139,7 @@ fn rows(
         for flank in flanks {
             flank.push(start, piece[0], center, &mut borders);
         }
-        let piece = Piece::of(section.road, piece, borders).ok_or(Trouble::Nowhere)?;
+        let piece = Piece::of(section.road, piece, borders).ok_or(NotDrawn::Nowhere)?;
         sampler.take(&piece, &mut rows)
     })?;
     Ok(rows)
@@ -149,8 +149,8 @@ fn rows(
 pub(crate) fn each_piece(
     [from, to]: [f64; 2],
     mut breaks: Vec<f64>,
-    mut visit: impl FnMut([f64; 2]) -> Result<(), Trouble>,
-) -> Result<(), Trouble> {
+    mut visit: impl FnMut([f64; 2]) -> Result<(), NotDrawn>,
+) -> Result<(), NotDrawn> {
     breaks.retain(|s| *s > from + SAME_STATION && *s < to - SAME_STATION);
     breaks.sort_unstable_by(f64::total_cmp);
     breaks.dedup_by(|next, last| *next - *last <= SAME_STATION);

@@ -35,7 +35,7 @@ mod unanswered;
 
 #[cfg(doc)]
 use qcbus_reporter_sdk::Output;
-use qcbus_reporter_sdk::{FormReporter, Registration};
+use qcbus_reporter_sdk::{FormatReporter, Registration};
 
 pub use limits::{MOST_PACKED_BYTES, MOST_PLACES, MOST_RESULTS, SHOWN_RESULTS};
 pub use report::Sarif;
@@ -51,5 +51,5 @@ pub static REPORTER: Registration = Registration {
     name: NAME,
     about: "NAME.sarif beside every result",
     is_page: false,
-    make: |setting| Box::new(FormReporter::new(Sarif::new(setting.pages), setting)),
+    make: |setting| Box::new(FormatReporter::new(Sarif::new(setting.pages), setting)),
 };

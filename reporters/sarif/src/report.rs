@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use qcbus_messages::ResultMessage;
-use qcbus_reporter_sdk::{Destination, Pages, Repeats, ReportError, ReportForm, Sources};
+use qcbus_reporter_sdk::{Destination, Pages, Repeats, ReportError, ReportFormat, Sources};
 
 use crate::finding::plain;
 use crate::limits;
@@ -30,7 +30,7 @@ impl Sarif {
     }
 }
 
-impl ReportForm for Sarif {
+impl ReportFormat for Sarif {
     type Section = Section;
     const SUFFIX: &'static str = "sarif";
 
@@ -168,7 +168,7 @@ fn artifact_of(locations: &[Location]) -> Option<usize> {
     location.physical_location.artifact_location.index
 }
 
-/// What [`ReportForm::whole`] put together, taken apart.
+/// What [`ReportFormat::whole`] put together, taken apart.
 fn sections_of(run: Run) -> BTreeMap<String, Section> {
     let notes: BTreeMap<String, RuleNote> = run.tool.driver.rules.into_iter().map(note).collect();
     let mut sections: Vec<Section> = run.artifacts.into_iter().map(bare).collect();

@@ -13,7 +13,7 @@ use qcbus_report_sarif::{
     MOST_PACKED_BYTES, MOST_PLACES, MOST_RESULTS, SHOWN_RESULTS, Sarif, Section, UNANSWERED,
 };
 use qcbus_reporter_sdk::samples::result;
-use qcbus_reporter_sdk::{Destination, NoSources, ReportForm as _, RulePage};
+use qcbus_reporter_sdk::{Destination, NoSources, ReportFormat as _, RulePage};
 use serde_json::Value;
 
 const UID: &str = "asam.net:xodr:1.4.0:road.lane.link_order";

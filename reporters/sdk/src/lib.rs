@@ -6,46 +6,46 @@
 //! reporter on an `.xqar` that exists already, as ASAM's report modules do.
 //!
 //! What reporters have in common lies here too: the lines of the checked files ([`Sources`]), the
-//! places of an issue with those in other files ([`issue_locations`]), and where reports go ([`Outlet`],
-//! [`Output`], [`Shelf`]). A reporter that turns results into text implements [`ReportForm`] and nothing
+//! places of an issue with those in other files ([`issue_locations`]), and where reports go ([`OutputTarget`],
+//! [`Output`], [`ArtifactStore`]). A reporter that turns results into text implements [`ReportFormat`] and nothing
 //! else; a crate says by a [`Registration`] what it offers.
 
+mod artifacts;
 mod checkers;
 mod clean;
 mod daemon;
 mod fingerprint;
-mod form;
+mod format;
 mod issue_location;
 mod loaded;
 mod once;
-mod outlet;
 mod output;
+mod output_target;
 mod registration;
 mod responder;
 mod road_network;
 pub mod samples;
-mod shelf;
 mod silence;
 mod sources;
 mod underline;
 mod wording;
 
+pub use artifacts::ArtifactStore;
 pub use checkers::{checkers, is_blocked, is_inapplicable, is_open, not_listed, reason};
 pub use clean::{one_line, printable};
 pub use daemon::{Identity, RunError, run};
 pub use fingerprint::{Repeats, fingerprint, fingerprint_of};
-pub use form::{Destination, FormReporter, ReportForm};
+pub use format::{Destination, FormatReporter, ReportFormat};
 pub use issue_location::{IssueLocation, issue_locations, path_for_people};
 pub use loaded::{LoadError, load};
 pub use once::{OnceError, OneShot, report_once};
-pub use outlet::{Outlet, Subject, write_stream};
 pub use output::{
     Output, clear_place, earlier, inside, param, remove_file, replace_file, write_named,
 };
+pub use output_target::{OutputTarget, Subject, write_stream};
 pub use registration::{Pages, Registration, RulePage, Setting};
 pub use responder::Responder;
 pub use road_network::road_network;
-pub use shelf::Shelf;
 pub use silence::{Silence, silences};
 pub use sources::{Answer, BothSources, FileSources, ImageSources, Line, NoSources, Sources};
 pub use underline::underlined;

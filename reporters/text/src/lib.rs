@@ -22,7 +22,7 @@ use qcbus_formats::xqar::{Checker, CheckerBundle, Issue, Level};
 use qcbus_messages::ResultMessage;
 #[cfg(doc)]
 use qcbus_reporter_sdk::Output;
-use qcbus_reporter_sdk::{FormReporter, IssueLocation, Registration, Sources, issue_locations};
+use qcbus_reporter_sdk::{FormatReporter, IssueLocation, Registration, Sources, issue_locations};
 
 use paint::Paint;
 
@@ -35,7 +35,7 @@ pub static REPORTER: Registration = Registration {
     name: NAME,
     about: "NAME.txt beside every result",
     is_page: false,
-    make: |setting| Box::new(FormReporter::new(report::Full, setting)),
+    make: |setting| Box::new(FormatReporter::new(report::Full, setting)),
 };
 
 /// The same on one line each, which editors and CI read.
@@ -44,7 +44,7 @@ pub static CONCISE: Registration = Registration {
     name: "qc-report-concise",
     about: "NAME.concise.txt beside every result: a line for each finding",
     is_page: false,
-    make: |setting| Box::new(FormReporter::new(report::Concise, setting)),
+    make: |setting| Box::new(FormatReporter::new(report::Concise, setting)),
 };
 
 /// How to render.

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use qcbus_formats::xqar::{Level, Param};
 use qcbus_messages::{ResultMessage, Verdict, shown};
-use qcbus_reporter_sdk::{Destination, ReportError, ReportForm, Sources, Subject, one_line, param};
+use qcbus_reporter_sdk::{
+    Destination, ReportError, ReportFormat, Sources, Subject, one_line, param,
+};
 
 use crate::{Folding, Options, concise, render};
 
@@ -31,7 +33,7 @@ const RULER: &str = "====";
 /// A line for each finding.
 pub(crate) struct Concise;
 
-impl ReportForm for Concise {
+impl ReportFormat for Concise {
     type Section = String;
     const SUFFIX: &'static str = "concise.txt";
 
@@ -86,7 +88,7 @@ fn path_of(line: &str) -> Option<&str> {
 /// report begins with a ruler.
 pub(crate) struct Full;
 
-impl ReportForm for Full {
+impl ReportFormat for Full {
     type Section = String;
     const SUFFIX: &'static str = "txt";
 

@@ -10,9 +10,9 @@ use tokio::task::AbortHandle;
 
 mod ask;
 mod clients;
+mod file_view;
 mod others;
 mod place;
-mod same;
 
 pub use self::ask::{AskError, Line, ask_broker};
 use self::clients::{Bounds, Clients};

@@ -3,7 +3,7 @@
 
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
-use crate::seams::is_simulated;
+use crate::environment::is_simulated;
 
 /// What one peer takes: its services, ports and connections on the bus (22 were counted), and a few more
 /// while it comes and goes.

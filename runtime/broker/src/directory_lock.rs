@@ -59,7 +59,7 @@ pub enum LockError {
         "{} is {} of another broker that runs ({holder}); stop that one with `qcbus down`, or give this one {}",
         to_text(directory), purpose.as_str(), purpose.way_out()
     )]
-    Held {
+    Taken {
         /// The directory.
         directory: PathBuf,
         /// What it is to that broker.
@@ -362,7 +362,7 @@ fn refusal(file: &mut File, directory: &Path, purpose: Purpose) -> LockError {
         Some((pid, instance)) => format!("instance `{instance}`, process {pid}"),
         None => "it has not said which".to_owned(),
     };
-    LockError::Held {
+    LockError::Taken {
         directory,
         purpose,
         holder,
@@ -416,7 +416,7 @@ mod tests {
             first.hold().unwrap();
             assert!(first.is_in_place(), "it is made and taken");
             let second = DirectoryLock::take(&place, purpose, "second");
-            assert!(matches!(second, Err(LockError::Held { .. })));
+            assert!(matches!(second, Err(LockError::Taken { .. })));
             std::fs::remove_dir_all(&place).unwrap();
             let second = DirectoryLock::take(&place, purpose, "second").unwrap();
             let refused = first.hold().unwrap_err().to_string();

@@ -3,10 +3,10 @@
 
 use std::path::Path;
 
-use crate::seams;
+use crate::environment;
 
 /// Says that a file has got this far.
 pub fn reached(stage: &'static str, path: &Path) {
     tracing::debug!(target: "qcbus_broker::stages", stage, path = %path.display());
-    seams::step(stage, path);
+    environment::step(stage, path);
 }

@@ -12,7 +12,7 @@ use qcbus_document::FileKind;
 use qcbus_ingest::{Content, Stat};
 
 use crate::core::Stamp;
-use crate::seams::{stat, wall_time};
+use crate::environment::{stat, wall_time};
 
 /// The stamp of a regular file, which may lie behind a symbolic link; `None` for anything else, a
 /// link that leads nowhere or back to itself for instance.

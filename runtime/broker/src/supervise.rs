@@ -18,17 +18,17 @@ use tokio::process::{Child, Command};
 use tokio::sync::mpsc::UnboundedSender;
 
 use crate::core::{ChildEnd, ChildSpec, Event, Launch};
-use crate::former::Former;
-use crate::last_words::{Heard, LastWords, listen_to};
+use crate::descendants::{self, Strangers};
+use crate::final_output::{FinalOutput, Heard, listen_to};
 use crate::launches::Launches;
-use crate::orphans::{self, Strangers};
 use crate::own_program::{OwnProgram, RUNNING};
 use crate::reload::{self, ready};
+use crate::stale_children::StaleChildren;
 use ends::{kill_early, watch};
 use limits::restrict;
 
 /// Looks for orphans at the end, two milliseconds apart.
-const ORPHANS_AT_MOST: u32 = 500;
+const DESCENDANTS_AT_MOST: u32 = 500;
 /// How long one that is killed is waited for before orphans are looked for.
 const DIES_WITHIN: Duration = Duration::from_millis(20);
 
@@ -62,7 +62,7 @@ pub struct Children {
     /// What former brokers have started and has joined this one.
     adopted: BTreeMap<Launch, Process>,
     strangers: Strangers,
-    last_words: LastWords,
+    final_output: FinalOutput,
     events: UnboundedSender<Event>,
 }
 
@@ -92,14 +92,14 @@ impl Children {
         events: UnboundedSender<Event>,
     ) -> Children {
         Children {
-            strangers: orphans::adopt(),
+            strangers: descendants::adopt(),
             surroundings,
             launches,
             first: Launch::first_of(generation),
             early: BTreeMap::new(),
             own: BTreeMap::new(),
             adopted: BTreeMap::new(),
-            last_words: LastWords::default(),
+            final_output: FinalOutput::default(),
             events,
         }
     }
@@ -144,11 +144,11 @@ impl Children {
                     process: pid.and_then(|id| Process::open(id, None)),
                 };
                 self.own.insert(launch, own);
-                let (name, words) = (spec.name.clone(), self.last_words.clone());
+                let (name, words) = (spec.name.clone(), self.final_output.clone());
                 tokio::spawn(watch(launch, name, started, words, self.events.clone()));
             }
             Err(why) => {
-                self.last_words.forget(&spec.name);
+                self.final_output.forget(&spec.name);
                 let end = ChildEnd::NotStarted(why);
                 // The loop that receives this is the one that called; it is there.
                 let _ = self.events.send(Event::Exited { launch, end });
@@ -199,8 +199,8 @@ impl Children {
     }
 
     /// The last lines that a child has said that has ended.
-    pub fn last_words(&self, name: &str) -> Vec<String> {
-        self.last_words.of(name)
+    pub fn final_output(&self, name: &str) -> Vec<String> {
+        self.final_output.of(name)
     }
 
     /// Reporters write files where they are told to, and are ours; bundles are not.
@@ -221,15 +221,15 @@ impl Children {
             return None;
         }
         let mut own = self.own.values().filter_map(|it| it.process.as_ref());
-        let is_ours = own.any(|it| it.id() == peer.pid || orphans::is_below(peer.pid, it.id()));
+        let is_ours = own.any(|it| it.id() == peer.pid || descendants::is_below(peer.pid, it.id()));
         let surrounded = self.surroundings.sandbox && is_ours;
         // One that a former broker has started has them, too; one that was started by hand confines itself to nothing.
-        let ring = if self.surroundings.sandbox {
+        let sandbox = if self.surroundings.sandbox {
             Outer::FILTERS
         } else {
             0
         };
-        let given = own_filters() + ring;
+        let given = own_filters() + sandbox;
         let (state, why) = match (looks(peer.pid, given), kernel_level()) {
             (Looks::Unknown, _) => return None,
             (Looks::Filtered, 1..) => ("confined", ""),
@@ -256,14 +256,14 @@ impl Children {
     /// Kills and buries what children that have ended, or hidden it, have left. Meant to be called now and then:
     /// where the kernel keeps no list of children it is left to the next end of a child, for looking through all
     /// processes takes too long.
-    pub fn look_for_orphans(&self) {
-        if orphans::are_listed() {
+    pub fn look_for_descendants(&self) {
+        if descendants::are_listed() {
             self.sweep();
         }
     }
 
     fn sweep(&self) {
-        orphans::sweep(&self.ours(), &self.strangers, &self.launches);
+        descendants::sweep(&self.ours(), &self.strangers, &self.launches);
     }
 
     /// The processes that somebody watches, by their ids: one that ends at once is waited for by its watcher, and would
@@ -303,7 +303,7 @@ impl Children {
             ));
         }
         if own.is_some() {
-            self.last_words.joined(launch);
+            self.final_output.joined(launch);
         }
         if let (None, Some(process)) = (own, process) {
             self.adopted.retain(|_, process| process.is_alive());
@@ -317,20 +317,20 @@ impl Children {
         let own = self.own.get(&launch).and_then(|it| it.process.as_ref());
         if let Some(process) = own.or(self.adopted.get(&launch)) {
             if process.is_alive() {
-                orphans::kill_below(process);
+                descendants::kill_below(process);
             }
             process.kill();
         }
         if self.adopted.contains_key(&launch) {
             // The process that has joined need not be the first of those that were started.
-            Former::of(&self.launches, Launch(u64::MAX)).kill_those_of(launch);
+            StaleChildren::of(&self.launches, Launch(u64::MAX)).kill_those_of(launch);
         }
     }
 
     /// What former brokers of this instance have started; `None` where children die with their broker.
-    pub fn former(&self) -> Option<Former> {
+    pub fn stale_children(&self) -> Option<StaleChildren> {
         let may_be = !self.surroundings.die_with_broker;
-        may_be.then(|| Former::of(&self.launches, self.first))
+        may_be.then(|| StaleChildren::of(&self.launches, self.first))
     }
 
     /// Kills whatever is left, also what it has started. [`Children::bury_all`] sees to it that nothing has escaped.
@@ -352,8 +352,8 @@ impl Children {
         }
         // One that ends hands over what it has started; hence more than one look, but not for ever.
         let nobody = BTreeMap::new();
-        for _ in 0..ORPHANS_AT_MOST {
-            if orphans::sweep(&nobody, &self.strangers, &self.launches) == 0 {
+        for _ in 0..DESCENDANTS_AT_MOST {
+            if descendants::sweep(&nobody, &self.strangers, &self.launches) == 0 {
                 return;
             }
             std::thread::sleep(Duration::from_millis(2));
@@ -364,7 +364,7 @@ impl Children {
     /// has left its group or its session.
     pub fn kill_what_they_started(&self) {
         if !self.surroundings.die_with_broker {
-            Former::of(&self.launches, Launch(u64::MAX)).kill_but(&BTreeSet::new());
+            StaleChildren::of(&self.launches, Launch(u64::MAX)).kill_but(&BTreeSet::new());
         }
     }
 

@@ -9,7 +9,7 @@ use qcbus_messages::Verdict;
 use qcbus_messages::path_text::to_text;
 use serde::Serialize;
 
-use crate::core::{FinishedJob, Input, Judged, Juror, Jury, RestsOn};
+use crate::core::{FinishedJob, Input, Judged, RequiredBundle, RequiredSet, RestsOn};
 
 /// Version of the form.
 pub const FORMAT: u32 = 1;
@@ -121,8 +121,10 @@ pub fn render(
         configuration_sha256: job.config.to_string(),
         qcbus_version: env!("CARGO_PKG_VERSION"),
         epoch: job.epoch.0,
-        demanded: names(&job.jury, |_| true),
-        absent: names(&job.jury, |juror| juror.mark.is_none()),
+        demanded: names(&job.required_set, |_| true),
+        absent: names(&job.required_set, |required_bundle| {
+            required_bundle.version_digest.is_none()
+        }),
         bundles: bundles(pooled),
         errors: pooled.counts.errors,
         warnings: pooled.counts.warnings,
@@ -157,9 +159,14 @@ fn rests_on_line(it: &RestsOn) -> RestsOnLine {
     }
 }
 
-fn names(jury: &Jury, wanted: impl Fn(&Juror) -> bool) -> Vec<&str> {
-    let jurors = jury.0.iter().filter(|juror| wanted(juror));
-    jurors.map(|juror| juror.name.as_str()).collect()
+fn names(required_set: &RequiredSet, wanted: impl Fn(&RequiredBundle) -> bool) -> Vec<&str> {
+    let required_bundles = required_set
+        .0
+        .iter()
+        .filter(|required_bundle| wanted(required_bundle));
+    required_bundles
+        .map(|required_bundle| required_bundle.name.as_str())
+        .collect()
 }
 
 /// The bundles that took part; not those that are only demanded.

@@ -10,13 +10,15 @@ use qcbus_formats::xqar::Dialect;
 use qcbus_messages::{Digest, JobId, Verdict};
 use tokio::sync::mpsc::unbounded_channel;
 
-use crate::core::{Epoch, FinishedJob, Input, Judged, Jury, PreparedJob, Reading, StoreOutcome};
+use crate::core::{
+    Epoch, FinishedJob, Input, Judged, PreparedJob, Reading, RequiredSet, StoreOutcome,
+};
 use crate::directory_lock::DirectoryLock;
 use crate::gate::{Gate, GateOptions, Outside};
 use crate::journal::{Entry, Journal};
 use crate::outputs::Outputs;
+use crate::probes::Probes;
 use crate::result_paths::ResultPaths;
-use crate::scouts::Scouts;
 use crate::stamp::stamp_through_links;
 use crate::store::{Store, digest_of};
 use crate::writers::{Order, Writers};
@@ -27,7 +29,7 @@ fn store_in(dir: &Path) -> Store {
     Store {
         outputs: Outputs::default(),
         lock: DirectoryLock::share(&dir.join("out")).unwrap(),
-        scouts: Scouts::default(),
+        probes: Probes::default(),
         places: ResultPaths::of_watched(dir.join("out"), vec![dir.join("farm")]),
         choice: Default::default(),
         dialect: Dialect::default(),
@@ -71,7 +73,7 @@ fn finished(dir: &Path, epoch: u64) -> FinishedJob {
         unreadable: None,
         bundles: Vec::new(),
         rests_on: Vec::new(),
-        jury: Arc::new(Jury::default()),
+        required_set: Arc::new(RequiredSet::default()),
         epoch: Epoch(epoch),
         elapsed: Duration::ZERO,
     }
@@ -117,7 +119,7 @@ fn what_must_not_lie_behind_the_gate_waits_for_no_journal() {
         durable: false,
         outside: Outside::default(),
         max_file: u64::MAX,
-        scouts: Scouts::default(),
+        probes: Probes::default(),
         is_judged: Box::new(|_| true),
         say: Box::new(|_| {}),
     };
@@ -163,7 +165,7 @@ fn accepted(job: &FinishedJob) -> Judged {
         digest: inputs[0].digest().unwrap(),
         basis: Digest::default(),
         config: Digest::default(),
-        jury: Arc::default(),
+        required_set: Arc::default(),
         epoch: job.epoch,
         inputs,
         racy: false,

@@ -8,15 +8,15 @@ use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use qcbus_bus::Held;
+use qcbus_bus::MappedImage;
 use qcbus_formats::config::Config;
 use qcbus_messages::path_text::to_text;
 use tokio::sync::mpsc::UnboundedSender;
 
 use crate::core::{Event, FinishedJob, Judged, Notice, StoreOutcome};
+use crate::environment::{Receiver, Sender, channel, now, place, thread};
 use crate::journal::Entry;
-use crate::seams::{Receiver, Sender, channel, now, place, thread};
-use crate::store::{Store, Trouble};
+use crate::store::{Store, StoreFailure};
 
 /// An order for a writer.
 #[derive(Debug)]
@@ -28,7 +28,7 @@ pub enum Order {
         /// The configuration that it was checked under.
         config: Option<Arc<Config>>,
         /// The root's image.
-        root: Option<Held>,
+        root: Option<MappedImage>,
     },
     /// Remove the result of a file that has gone.
     Withdraw {
@@ -217,7 +217,7 @@ impl Writer {
             if self.waiting.is_empty() {
                 retry_at = None;
                 if std::mem::take(&mut self.troubled) {
-                    self.is_in_trouble(None);
+                    self.is_failing(None);
                 }
             } else {
                 retry_at = retry_at.or_else(|| Some(now() + RETRY));
@@ -233,25 +233,25 @@ impl Writer {
             match self.carry_out(&mut order) {
                 Ok(None) => return,
                 Ok(Some(next)) => return self.take(next),
-                Err(trouble) => self.hold_up(&trouble),
+                Err(failure) => self.hold_up(&failure),
             }
         }
-        self.shut_early(&order);
+        self.withdraw_early(&order);
         self.held_up.extend(order.path().cloned());
         self.waiting.push_back(order);
     }
 
     /// What must not lie behind the gate goes at once, whatever has to wait for a disk or the journal. When its turn
     /// comes it goes again: an order before it may have brought it back.
-    fn shut_early(&mut self, order: &Order) {
+    fn withdraw_early(&mut self, order: &Order) {
         if let Order::CloseGate { path } | Order::Withdraw { path, .. } = order
-            && let Err(trouble) = self.store.close_gate(path)
+            && let Err(failure) = self.store.close_gate(path)
         {
-            self.hold_up(&trouble);
+            self.hold_up(&failure);
         }
     }
 
-    fn is_in_trouble(&self, what: Option<String>) {
+    fn is_failing(&self, what: Option<String>) {
         let mut troubles = self.troubles.lock().unwrap_or_else(PoisonError::into_inner);
         match what {
             Some(what) => troubles.insert(self.number, what),
@@ -259,15 +259,15 @@ impl Writer {
         };
     }
 
-    fn hold_up(&mut self, trouble: &Trouble) {
+    fn hold_up(&mut self, failure: &StoreFailure) {
         self.troubled = true;
-        self.is_in_trouble(Some(trouble.what.clone()));
-        self.stopped |= trouble.concerns_all;
+        self.is_failing(Some(failure.what.clone()));
+        self.stopped |= failure.concerns_all;
         if !self.told {
             self.told = true;
             let _ = self.notices.send(Notice::Storing(format!(
                 "{}; it is tried again",
-                trouble.what
+                failure.what
             )));
         }
     }
@@ -282,7 +282,7 @@ impl Writer {
     }
 
     /// Does an order, and says what is to be done next.
-    fn carry_out(&self, order: &mut Order) -> Result<Option<Order>, Trouble> {
+    fn carry_out(&self, order: &mut Order) -> Result<Option<Order>, StoreFailure> {
         match order {
             Order::Store { job, config, root } => {
                 let root = root.as_deref();
@@ -305,7 +305,7 @@ impl Writer {
                     history: None,
                     written: None,
                 };
-                self.store.record(&[entry]).map_err(Trouble::of_all)?;
+                self.store.record(&[entry]).map_err(StoreFailure::of_all)?;
                 return self.open_gate(path, judged);
             }
             Order::CloseGate { path } => self.store.close_gate(path)?,
@@ -313,7 +313,7 @@ impl Writer {
             Order::Follow { path } => self.store.follow(path)?,
             Order::Record(entry) => {
                 let recorded = self.store.record(std::slice::from_ref(entry));
-                recorded.map_err(Trouble::of_all)?;
+                recorded.map_err(StoreFailure::of_all)?;
                 if let Entry::Voided { path, .. } = entry {
                     // The report was the last that lay there.
                     self.store.tidy_above(path);
@@ -323,7 +323,7 @@ impl Writer {
         Ok(None)
     }
 
-    fn open_gate(&self, path: &Arc<Path>, judged: &Judged) -> Result<Option<Order>, Trouble> {
+    fn open_gate(&self, path: &Arc<Path>, judged: &Judged) -> Result<Option<Order>, StoreFailure> {
         self.store.open_gate(path, judged)?;
         let path = path.clone();
         let _ = self.events.send(Event::Opened { path: path.clone() });

@@ -12,8 +12,8 @@ use qcbus_messages::services::{BLOCK_BYTES, Topic};
 use qcbus_messages::{Digest, DocId};
 use tokio::sync::Notify;
 
-use crate::held::{Block, DocumentHeader, Held, LET_GO, Ticket, kind_code};
-use crate::memory::{SharedMemory, Turns, free_shared_memory};
+use crate::mapped_image::{Block, DocumentHeader, ImageUse, LET_GO, MappedImage, kind_code};
+use crate::memory::{RoomLocks, SharedMemory, free_shared_memory};
 use crate::pages::{back_with_memory, take_memory_from};
 use crate::ports::{self, Hub, PortError, Pub, Service, Sub, TopicService};
 
@@ -98,7 +98,7 @@ struct Class {
     /// Our own subscriber: through it the broker holds what it has published. It is locked from
     /// sending to receiving, so that what is received is what was sent.
     own: Mutex<Sub<Block, DocumentHeader>>,
-    held: Arc<AtomicUsize>,
+    mapped_image: Arc<AtomicUsize>,
     lent: Arc<AtomicUsize>,
 }
 
@@ -113,7 +113,7 @@ impl Class {
             used: AtomicBool::new(false),
             own: Mutex::new(own),
             row,
-            held: Arc::default(),
+            mapped_image: Arc::default(),
             lent: Arc::default(),
         })
     }
@@ -131,7 +131,7 @@ impl Class {
     ///
     /// The publisher stays the same: a confined peer could not connect to another one.
     fn empty(&self, shared: &Shared) {
-        let _turn = shared.turns.take();
+        let _lock = shared.room_locks.take();
         let Some(_open) = shared.open() else {
             return;
         };
@@ -192,7 +192,7 @@ struct Shared {
     reserve: u64,
     /// What the bus takes for itself, in bytes.
     own: u64,
-    turns: Turns,
+    room_locks: RoomLocks,
     /// Whether nothing is lent or published any more. Read by whoever may make files of the bus, for as long as that
     /// takes: what is made after they were removed would stay.
     stopped: RwLock<bool>,
@@ -232,7 +232,7 @@ impl Documents {
             classes: [Class::new(hub, small)?, Class::new(hub, large)?],
             reserve,
             own,
-            turns: Turns::new(),
+            room_locks: RoomLocks::new(),
             stopped: RwLock::new(false),
             again: Notify::new(),
         };
@@ -266,8 +266,9 @@ impl Documents {
         }
         let index = usize::from(len > self.shared.classes[0].row.slot_bytes());
         let class = &self.shared.classes[index];
-        let held = Ticket::take(&class.held, most_held(&class.row)).ok_or(LoanError::Busy)?;
-        let lent = Ticket::take(&class.lent, class.row.loans).ok_or(LoanError::Busy)?;
+        let mapped_image =
+            ImageUse::take(&class.mapped_image, most_held(&class.row)).ok_or(LoanError::Busy)?;
+        let lent = ImageUse::take(&class.lent, class.row.loans).ok_or(LoanError::Busy)?;
         let blocks = len.div_ceil(BLOCK_BYTES).max(1);
         let bytes = (blocks * BLOCK_BYTES) as u64;
         let sample = self.take(class, blocks, bytes).or_else(|error| {
@@ -282,7 +283,7 @@ impl Documents {
             sample: initialised(sample),
             class: index,
             len,
-            held,
+            mapped_image,
             _lent: lent,
             documents: self.clone(),
         })
@@ -290,7 +291,7 @@ impl Documents {
 
     /// Takes a slot, and all memory that it needs.
     fn take(&self, class: &Class, blocks: usize, bytes: u64) -> Result<Uninit, LoanError> {
-        let _turn = self.shared.turns.take();
+        let _lock = self.shared.room_locks.take();
         self.look_for(bytes)?;
         let open = self.shared.open().ok_or_else(has_stopped)?;
         let publisher = class
@@ -354,12 +355,17 @@ impl Documents {
     ///
     /// # Errors
     /// See [`LoanError`].
-    pub fn publish_again(&self, held: &Held) -> Result<(), LoanError> {
+    pub fn publish_again(&self, mapped_image: &MappedImage) -> Result<(), LoanError> {
         // Beside all that jobs need. One less than a subscriber may hold: receiving needs a hand free.
-        let mut loan = self.lend(held.len(), |row| row.borrowed - 1)?;
-        loan.copy_from_slice(held);
-        loan.publish(held.doc(), held.len(), held.digest(), held.kind())
-            .map_err(|error| LoanError::Bus(error.to_string()))?;
+        let mut loan = self.lend(mapped_image.len(), |row| row.borrowed - 1)?;
+        loan.copy_from_slice(mapped_image);
+        loan.publish(
+            mapped_image.doc(),
+            mapped_image.len(),
+            mapped_image.digest(),
+            mapped_image.kind(),
+        )
+        .map_err(|error| LoanError::Bus(error.to_string()))?;
         self.shared.again.notify_one();
         Ok(())
     }
@@ -390,9 +396,9 @@ impl Documents {
 
     fn give_back(&self, ours: usize) {
         for (index, class) in self.shared.classes.iter().enumerate() {
-            let ticket = (index != ours).then(|| Ticket::take(&class.lent, class.row.loans));
+            let image_use = (index != ours).then(|| ImageUse::take(&class.lent, class.row.loans));
             class.empty(&self.shared);
-            drop(ticket);
+            drop(image_use);
         }
         self.shared.again.notify_one();
     }
@@ -425,8 +431,8 @@ pub struct Loan {
     sample: SampleMut<Service, [Block], DocumentHeader>,
     class: usize,
     len: usize,
-    held: Ticket,
-    _lent: Ticket,
+    mapped_image: ImageUse,
+    _lent: ImageUse,
     documents: Documents,
 }
 
@@ -441,7 +447,7 @@ impl Loan {
         used: usize,
         digest: Digest,
         kind: FileKind,
-    ) -> Result<Held, PublishError> {
+    ) -> Result<MappedImage, PublishError> {
         let lent = self.len;
         if used > lent {
             return Err(PublishError::TooMuchUsed { used, lent });
@@ -467,7 +473,7 @@ impl Loan {
         let sent = sample.send();
         while let Some(back) = own.receive().map_err(|why| refused(format!("{why:?}")))? {
             if back.user_header().doc == doc.0 {
-                return Held::new(back, self.documents.shared.generation, self.held)
+                return MappedImage::new(back, self.documents.shared.generation, self.mapped_image)
                     .ok_or_else(|| refused("the image came back changed".to_owned()));
             }
         }

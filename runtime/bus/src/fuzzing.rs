@@ -6,13 +6,13 @@ use std::sync::{Mutex, PoisonError};
 
 use qcbus_messages::services::{Growth, Services, Topic};
 
-use crate::door::Door;
-use crate::entrance::introduce;
+use crate::admission::introduce;
 use crate::generation::Generation;
 use crate::host::HelloHeader;
 use crate::instance::Instance;
 use crate::link::{FrameHeader, SessionKey};
 use crate::ports::{self, Hub, Pub, Sub, WakeNotifier};
+use crate::removal_lock::RemovalLock;
 
 /// What goes before a frame, to be filled with anything.
 #[derive(Debug, Clone, Copy, Default)]
@@ -47,7 +47,7 @@ pub struct Rogue {
     hello: Pub<u8, HelloHeader>,
     wake: WakeNotifier,
     /// Manners it needs none, but it leaves nothing in a memory that is removed: tests look.
-    door: Door,
+    removal_lock: RemovalLock,
     hub: Hub,
     instance: Instance,
     /// What says which process this is, the latest.
@@ -65,8 +65,11 @@ impl Rogue {
     pub fn new(instance: &Instance) -> Result<Rogue, String> {
         let generation = Generation::current(instance).ok_or("no broker")?;
         let services = Services::new(&generation.limits);
-        let door = Door::of(&generation.root).map_err(|shut| shut.to_string())?;
-        let inside = door.enter().map_err(|shut| shut.to_string())?;
+        let removal_lock = RemovalLock::of(&generation.root)
+            .map_err(|lock_for_removal| lock_for_removal.to_string())?;
+        let inside = removal_lock
+            .enter()
+            .map_err(|lock_for_removal| lock_for_removal.to_string())?;
         let hub = Hub::join(&inside).map_err(|error| in_words(&error))?;
         let greetings = hub
             .topic(&services.hello, "")
@@ -82,7 +85,7 @@ impl Rogue {
             wake: ports::notifier(&wake).map_err(|error| in_words(&error))?,
             generation: generation.number,
             services,
-            door: door.clone(),
+            removal_lock: removal_lock.clone(),
             hub,
             instance: instance.clone(),
             proofs: Mutex::default(),
@@ -132,7 +135,7 @@ impl Rogue {
             incarnation,
             attempt,
         };
-        let Ok(_inside) = self.door.enter() else {
+        let Ok(_inside) = self.removal_lock.enter() else {
             return false;
         };
         let suffix = key.suffix();

@@ -17,12 +17,12 @@ use qcbus_messages::services::Limits;
 use rustix::fs::{FlockOperation, flock};
 use serde::{Deserialize, Serialize};
 
-use crate::door;
 use crate::instance::Instance;
 use crate::memory::SHARED_MEMORY;
 use crate::options::StartError;
 use crate::ports::ICEORYX2_VERSION;
 use crate::process::{Process, start_time};
+use crate::removal_lock;
 
 const CURRENT: &str = "current";
 const IDENTITY: &str = "id";
@@ -77,7 +77,7 @@ impl Generation {
         fs::DirBuilder::new().mode(0o700).create(&dir)?;
         let prefix = format!("{identity}{number:x}_");
         let root = root_in_memory(&prefix).map_err(StartError::shared_memory)?;
-        door::make(&root).map_err(StartError::shared_memory)?;
+        removal_lock::make(&root).map_err(StartError::shared_memory)?;
         Ok(Generation {
             number,
             prefix,
@@ -146,7 +146,7 @@ pub(crate) fn sweep(instance: &Instance, keep: Option<&Generation>) {
             continue;
         }
         let removed = match path.is_dir() {
-            true => door::shut_and_remove(&path),
+            true => removal_lock::lock_and_remove(&path),
             // Of a version that put its segments there.
             false => fs::remove_file(&path),
         };
@@ -183,7 +183,7 @@ pub(crate) fn sweep_strays() -> usize {
         .map(|name| Path::new(SHARED_MEMORY).join(name));
     let strays = roots.filter(|root| is_own(root) && is_stray(root));
     strays
-        .filter(|it| door::shut_and_remove(it).is_ok())
+        .filter(|it| removal_lock::lock_and_remove(it).is_ok())
         .count()
 }
 
@@ -307,7 +307,7 @@ mod tests {
     fn root() -> PathBuf {
         let prefix = format!("qc{:015x}g1_", random() >> 4);
         let root = root_in_memory(&prefix).unwrap();
-        door::make(&root).unwrap();
+        removal_lock::make(&root).unwrap();
         fs::write(root.join("segment"), "of a broker").unwrap();
         root
     }
@@ -323,7 +323,7 @@ mod tests {
         assert!(!is_stray(&root), "its broker may be about to lock it");
         age(&root, UNLOCKED_FOR);
         assert!(is_stray(&root));
-        door::shut_and_remove(&root).unwrap();
+        removal_lock::lock_and_remove(&root).unwrap();
     }
 
     #[test]
@@ -334,7 +334,7 @@ mod tests {
         assert_eq!((seen, is_stray(&root)), (Some(false), false));
         drop(life);
         assert!(is_stray(&root), "it has died");
-        door::shut_and_remove(&root).unwrap();
+        removal_lock::lock_and_remove(&root).unwrap();
     }
 
     #[test]
@@ -346,7 +346,7 @@ mod tests {
         assert!(!is_stray(&root));
         drop(life);
         assert!(is_stray(&root), "it has died");
-        door::shut_and_remove(&root).unwrap();
+        removal_lock::lock_and_remove(&root).unwrap();
     }
 
     #[test]

@@ -15,19 +15,19 @@ use qcbus_messages::services::{
 };
 use qcbus_messages::{Digest, FromPeer, Hello, ToPeer};
 
+use crate::admission::{Admission, Known};
 use crate::documents::Documents;
-use crate::entrance::{Entrance, Known};
 use crate::generation::{Generation, close_to_others, sweep};
 use crate::instance::{Instance, InstanceLock, LockError};
 use crate::janitor::Janitor;
 use crate::link::SessionKey;
-use crate::memory::{SharedMemory, Turns, fitting_reserve, keep_room};
+use crate::memory::{RoomLocks, SharedMemory, fitting_reserve, keep_room};
 use crate::options::{HostOptions, StartError};
 use crate::ports::{self, Hub, PortError, Pub, Sub};
-use crate::presence::{LockSlot, Presence};
 use crate::process::Process;
+use crate::receive_budget::{Budget, Waiting};
+use crate::runtime_files::{LockSlot, RuntimeFiles};
 use crate::session::Session;
-use crate::turn::{Budget, Waiting};
 use crate::wake::{TICK, Waker};
 
 /// Frames read from one peer before it is the next one's turn.
@@ -109,7 +109,7 @@ pub enum HostEvent {
 /// memory that somebody has mapped stays readable.
 pub struct Host {
     generation: Generation,
-    presence: Arc<Presence>,
+    runtime_files: Arc<RuntimeFiles>,
     limits: Limits,
     services: Services,
     waiting: Waiting,
@@ -124,7 +124,7 @@ pub struct Host {
     last_turn: Instant,
     last_tick: Instant,
     last_watch: Instant,
-    entrance: Entrance,
+    admission: Admission,
     // What follows is dropped in this order: ports, the janitor, the node.
     waker: Waker,
     hello: Sub<u8, HelloHeader>,
@@ -180,7 +180,7 @@ impl Host {
     pub fn start(instance: &Instance, options: HostOptions) -> Result<Host, StartError> {
         instance.create_dir()?;
         let lock = InstanceLock::take(instance).map_err(|error| match error {
-            LockError::Held { pid } => StartError::AlreadyRunning {
+            LockError::Taken { pid } => StartError::AlreadyRunning {
                 instance: instance.name().to_owned(),
                 pid,
             },
@@ -197,8 +197,8 @@ impl Host {
         if !options.config_grows {
             services.config.growth = Growth::Fixed;
         }
-        let turns = Turns::new();
-        let turn = turns.take();
+        let room_locks = RoomLocks::new();
+        let receive_budget = room_locks.take();
         let expected = options.expected_peers.min(limits.peers) as u64;
         let room = expected * services.peer_bytes();
         let own = services.broker_bytes();
@@ -223,7 +223,7 @@ impl Host {
         let config = publish(&hub, &services.config)?;
         let waker = Waker::new(ports::listener(&wake)?)?;
         close_to_others(&generation.root).map_err(StartError::shared_memory)?;
-        let presence = Arc::new(Presence::new(instance, &generation, &lock));
+        let runtime_files = Arc::new(RuntimeFiles::new(instance, &generation, &lock));
         let host = Host {
             hello,
             config,
@@ -231,16 +231,16 @@ impl Host {
             janitor: Some(Janitor::start(
                 instance,
                 &generation,
-                Arc::clone(&presence),
+                Arc::clone(&runtime_files),
             )?),
-            presence,
+            runtime_files,
             documents,
             hub,
             waiting: Waiting::default(),
             sessions: BTreeMap::new(),
             attempts: HashMap::new(),
             strangers: HashMap::new(),
-            entrance: Entrance::open(instance, generation.number)?,
+            admission: Admission::open(instance, generation.number)?,
             next_peer: 1,
             last_read: PeerId(0),
             last_turn: Instant::now(),
@@ -252,8 +252,8 @@ impl Host {
             limits,
             services,
         };
-        drop(turn);
-        host.presence.announce()?;
+        drop(receive_budget);
+        host.runtime_files.announce()?;
         Ok(host)
     }
 
@@ -266,7 +266,7 @@ impl Host {
             return false;
         }
         self.say_goodbye();
-        self.entrance.close();
+        self.admission.close();
         // Or it would make again what goes now.
         self.janitor = None;
         self.remains = None;
@@ -275,7 +275,7 @@ impl Host {
     }
 
     fn say_goodbye(&mut self) {
-        self.presence.withdraw();
+        self.runtime_files.withdraw();
         self.documents.stop();
         for session in self.sessions.values_mut() {
             session.link.farewell("");
@@ -291,19 +291,19 @@ impl Host {
     /// future is dropped. Nothing moves on the bus unless this is awaited. However much peers say,
     /// it is read in turns of a few milliseconds, and others get theirs in between.
     pub async fn next(&mut self) -> HostEvent {
-        let mut turns = 0;
+        let mut room_locks = 0;
         loop {
             // Also while events wait, or nothing would be sent until the last of them is fetched.
             let more = if self.waiting.is_empty() || self.last_turn.elapsed() >= TICK {
-                self.turn()
+                self.receive_budget()
             } else {
                 false
             };
             if let Some(event) = self.waiting.pop() {
                 return event;
             }
-            turns += 1;
-            if more || turns % TURNS_IN_A_ROW == 0 {
+            room_locks += 1;
+            if more || room_locks % TURNS_IN_A_ROW == 0 {
                 tokio::task::yield_now().await;
             }
             if more {
@@ -385,7 +385,7 @@ impl Host {
 
     /// Why nobody can join any more, for a person; said once.
     pub fn loss(&self) -> Option<String> {
-        self.presence.loss()
+        self.runtime_files.loss()
     }
 
     /// Lends and publishes documents, from any thread.
@@ -395,7 +395,7 @@ impl Host {
 
     /// Sends what there is and reads as much as one turn may, without waiting. `true`: there may be
     /// more to read.
-    fn turn(&mut self) -> bool {
+    fn receive_budget(&mut self) -> bool {
         let now = Instant::now();
         self.greet(now, &Budget::new(now));
         // One of its own: whoever introduces himself again and again keeps nobody from being heard.
@@ -403,7 +403,7 @@ impl Host {
         let ticked = now.duration_since(self.last_tick) >= TICK;
         if ticked {
             self.last_tick = now;
-            self.entrance.turn(now);
+            self.admission.receive_budget(now);
         }
         for session in self.sessions.values_mut() {
             if ticked {
@@ -491,8 +491,8 @@ impl Host {
     /// Whoever has proven who it is gets a session.
     fn meet(&mut self, key: SessionKey, hello: Hello, now: Instant) {
         // It has said who it is before it said hello.
-        self.entrance.turn(now);
-        let Some(known) = self.entrance.take(&key) else {
+        self.admission.receive_budget(now);
+        let Some(known) = self.admission.take(&key) else {
             return self.is_strange(key, &hello, now);
         };
         // Who was told why it may not take part has no claim to anything.
@@ -501,7 +501,7 @@ impl Host {
         if older.is_some_and(|it| !it.is_of(&known)) {
             let why = "another process that runs has said so of itself before: give every process a number \
                  of its own";
-            return self.turn_away(key, &hello, why, now);
+            return self.refuse_hello(key, &hello, why, now);
         }
         self.open(key, hello, known, now);
     }
@@ -518,12 +518,12 @@ impl Host {
             let why = "it has not proven which process it is: build it with this version of qcbus, and let it \
                  connect to peers.sock in the instance's directory before it says hello (in another container: \
                  share that directory, and run as the same user)";
-            self.turn_away(key, hello, why, now);
+            self.refuse_hello(key, hello, why, now);
         }
     }
 
     /// Tells somebody who is not believed why, once.
-    fn turn_away(&mut self, key: SessionKey, hello: &Hello, why: &str, now: Instant) {
+    fn refuse_hello(&mut self, key: SessionKey, hello: &Hello, why: &str, now: Instant) {
         let told = self.sessions.values().filter(|it| it.is_silent()).count();
         if self.strangers.get(&key).is_some_and(|(_, told)| *told) || told >= MAX_TOLD {
             return;
@@ -557,7 +557,7 @@ impl Host {
                 name = hello.name,
                 "no room even to refuse a peer; it has to wait"
             );
-            return self.entrance.keep(key, known, now);
+            return self.admission.keep(key, known, now);
         }
         let (process, launch) = (known.process.clone(), known.launch.clone());
         hello.pid = process.as_ref().map_or(0, Process::id);
@@ -565,7 +565,7 @@ impl Host {
             Ok(session) => session,
             Err(error) => {
                 tracing::warn!(%error, name = hello.name, "cannot open a session");
-                return self.entrance.keep(key, known, now);
+                return self.admission.keep(key, known, now);
             }
         };
         known.tell();

@@ -144,7 +144,7 @@ pub(crate) struct InstanceLock {
 /// Why the claim failed.
 #[derive(Debug)]
 pub(crate) enum LockError {
-    Held { pid: Option<u32> },
+    Taken { pid: Option<u32> },
     Io(io::Error),
 }
 
@@ -186,7 +186,7 @@ impl InstanceLock {
             }
             std::thread::sleep(std::time::Duration::from_millis(2));
         }
-        Err(LockError::Held { pid: holder })
+        Err(LockError::Taken { pid: holder })
     }
 
     /// Whether the file is there by which others see the claim.
@@ -206,7 +206,9 @@ fn is_alive(pid: u32) -> bool {
 
 fn is_still_there(file: &File, path: &Path) -> bool {
     match (file.metadata(), fs::metadata(path)) {
-        (Ok(held), Ok(named)) => (held.dev(), held.ino()) == (named.dev(), named.ino()),
+        (Ok(mapped_image), Ok(named)) => {
+            (mapped_image.dev(), mapped_image.ino()) == (named.dev(), named.ino())
+        }
         _ => false,
     }
 }
@@ -247,7 +249,7 @@ mod tests {
         assert_eq!(instance.broker_pid(), Some(std::process::id()));
         assert!(matches!(
             InstanceLock::take(&instance),
-            Err(LockError::Held { pid: Some(pid) }) if pid == std::process::id()
+            Err(LockError::Taken { pid: Some(pid) }) if pid == std::process::id()
         ));
         // As the kernel does when a process dies: the file stays.
         drop(lock);

@@ -10,7 +10,7 @@ use iceoryx2::prelude::Config;
 use crate::generation::{Generation, sweep};
 use crate::instance::Instance;
 use crate::ports::{clean_dead_nodes, generation_config};
-use crate::presence::Presence;
+use crate::runtime_files::RuntimeFiles;
 
 const EVERY: Duration = Duration::from_millis(250);
 /// A clean-up takes milliseconds; one that hangs must not keep the broker from stopping.
@@ -28,7 +28,7 @@ impl Janitor {
     pub(crate) fn start(
         instance: &Instance,
         generation: &Generation,
-        presence: Arc<Presence>,
+        runtime_files: Arc<RuntimeFiles>,
     ) -> std::io::Result<Janitor> {
         let config = generation_config(&generation.root).map_err(std::io::Error::other)?;
         let (stop, asked) = channel();
@@ -38,7 +38,7 @@ impl Janitor {
             .name("bus-janitor".to_owned())
             .spawn(move || {
                 sweep(&instance, Some(&generation));
-                clean_until_asked(&config, &presence, &asked);
+                clean_until_asked(&config, &runtime_files, &asked);
                 let _ = done.send(());
             })?;
         Ok(Janitor {
@@ -49,9 +49,9 @@ impl Janitor {
     }
 }
 
-fn clean_until_asked(config: &Config, presence: &Presence, asked: &Receiver<()>) {
+fn clean_until_asked(config: &Config, runtime_files: &RuntimeFiles, asked: &Receiver<()>) {
     while let Err(RecvTimeoutError::Timeout) = asked.recv_timeout(EVERY) {
-        presence.look_after();
+        runtime_files.look_after();
         clean_dead_nodes(config);
     }
 }

@@ -7,10 +7,10 @@ use std::sync::atomic::AtomicUsize;
 use qcbus_messages::DocId;
 use qcbus_messages::services::{Services, Topic};
 
-use crate::held::{Block, DocumentHeader, Held, LET_GO, Ticket};
+use crate::mapped_image::{Block, DocumentHeader, ImageUse, LET_GO, MappedImage};
 use crate::ports::{self, Hub, PortError, Sub};
 
-struct Shelf {
+struct Subscription {
     row: Topic,
     subscriber: Sub<Block, DocumentHeader>,
     out: Arc<AtomicUsize>,
@@ -20,7 +20,7 @@ struct Shelf {
 }
 
 struct Book {
-    held: Held,
+    mapped_image: MappedImage,
     /// Whether the peer has finished with it.
     released: bool,
     used_at: u64,
@@ -30,12 +30,12 @@ struct Book {
 pub(crate) struct Library {
     generation: u64,
     clock: u64,
-    shelves: [Shelf; 2],
+    subscriptions: [Subscription; 2],
 }
 
 /// What is to be read next.
 enum Next {
-    Document(Held),
+    Document(MappedImage),
     /// The broker needs shared memory.
     LetGo,
     Nothing,
@@ -50,9 +50,9 @@ impl Library {
         Ok(Library {
             generation,
             clock: 0,
-            shelves: [
-                Shelf::new(hub, services.document_small)?,
-                Shelf::new(hub, services.document_large)?,
+            subscriptions: [
+                Subscription::new(hub, services.document_small)?,
+                Subscription::new(hub, services.document_large)?,
             ],
         })
     }
@@ -61,10 +61,10 @@ impl Library {
     /// needs shared memory, so that what is only kept is to be let go.
     pub(crate) fn drain(&mut self, mut arrived: impl FnMut(DocId)) -> bool {
         let mut asked = false;
-        for shelf in &mut self.shelves {
+        for subscription in &mut self.subscriptions {
             loop {
-                let held = match shelf.receive(self.generation) {
-                    Next::Document(held) => held,
+                let mapped_image = match subscription.receive(self.generation) {
+                    Next::Document(mapped_image) => mapped_image,
                     Next::LetGo => {
                         asked = true;
                         continue;
@@ -75,47 +75,47 @@ impl Library {
                 let book = Book {
                     released: false,
                     used_at: self.clock,
-                    held,
+                    mapped_image,
                 };
-                let doc = book.held.doc();
-                shelf.books.insert(doc, book);
+                let doc = book.mapped_image.doc();
+                subscription.books.insert(doc, book);
                 arrived(doc);
             }
         }
         asked
     }
 
-    pub(crate) fn get(&self, doc: DocId) -> Option<Held> {
-        self.shelves
+    pub(crate) fn get(&self, doc: DocId) -> Option<MappedImage> {
+        self.subscriptions
             .iter()
-            .find_map(|shelf| shelf.books.get(&doc))
-            .map(|book| book.held.clone())
+            .find_map(|subscription| subscription.books.get(&doc))
+            .map(|book| book.mapped_image.clone())
     }
 
     /// A job needs this document: it stays, as long as there is another that may go.
     pub(crate) fn want(&mut self, doc: DocId) {
-        for shelf in &mut self.shelves {
-            shelf.wanted.insert(doc);
+        for subscription in &mut self.subscriptions {
+            subscription.wanted.insert(doc);
         }
     }
 
     pub(crate) fn forget(&mut self, doc: DocId) {
-        for shelf in &mut self.shelves {
-            shelf.wanted.remove(&doc);
-            if let Some(book) = shelf.books.get_mut(&doc) {
+        for subscription in &mut self.subscriptions {
+            subscription.wanted.remove(&doc);
+            if let Some(book) = subscription.books.get_mut(&doc) {
                 self.clock += 1;
                 book.released = true;
                 book.used_at = self.clock;
             }
-            shelf.tidy();
+            subscription.tidy();
         }
     }
 }
 
-impl Shelf {
-    fn new(hub: &Hub, row: Topic) -> Result<Shelf, PortError> {
+impl Subscription {
+    fn new(hub: &Hub, row: Topic) -> Result<Subscription, PortError> {
         let service = hub.topic::<Block, DocumentHeader>(&row, "")?;
-        Ok(Shelf {
+        Ok(Subscription {
             subscriber: ports::subscriber(&service, &row)?,
             row,
             out: Arc::default(),
@@ -127,7 +127,7 @@ impl Shelf {
     /// The next document, unless there is none or every hand is full with documents in use.
     fn receive(&mut self, generation: u64) -> Next {
         loop {
-            let Some(ticket) = self.hand() else {
+            let Some(image_use) = self.hand() else {
                 return Next::Nothing;
             };
             match self.subscriber.receive() {
@@ -137,8 +137,8 @@ impl Shelf {
                     return Next::LetGo;
                 }
                 Ok(Some(sample)) => {
-                    if let Some(held) = Held::new(sample, generation, ticket) {
-                        return Next::Document(held);
+                    if let Some(mapped_image) = MappedImage::new(sample, generation, image_use) {
+                        return Next::Document(mapped_image);
                     }
                 }
                 Ok(None) => return Next::Nothing,
@@ -151,12 +151,15 @@ impl Shelf {
     }
 
     /// A free hand; lets go of what is least needed when there is none.
-    fn hand(&mut self) -> Option<Ticket> {
+    fn hand(&mut self) -> Option<ImageUse> {
         loop {
-            if let Some(ticket) = Ticket::take(&self.out, self.row.borrowed - 1) {
-                return Some(ticket);
+            if let Some(image_use) = ImageUse::take(&self.out, self.row.borrowed - 1) {
+                return Some(image_use);
             }
-            let unused = self.books.iter().filter(|(_, it)| it.held.is_unused());
+            let unused = self
+                .books
+                .iter()
+                .filter(|(_, it)| it.mapped_image.is_unused());
             let need = |(doc, book): &(&DocId, &Book)| {
                 (self.wanted.contains(doc), !book.released, book.used_at)
             };

@@ -9,17 +9,17 @@ use iceoryx2::prelude::*;
 use qcbus_messages::services::{HELLO_BYTES, Services};
 use qcbus_messages::{Digest, Hello, ToPeer, codec};
 
-use crate::door::{Door, NoEntry};
-use crate::entrance::{Statement, introduce};
+use crate::admission::{Statement, introduce};
 use crate::generation::Generation;
 use crate::host::{ConfigHeader, HelloHeader};
 use crate::instance::Instance;
 use crate::library::Library;
 use crate::link::{FrameHeader, Link, SessionKey, Wants};
-use crate::memory::{Turns, free_shared_memory, take_room};
+use crate::memory::{RoomLocks, free_shared_memory, take_room};
 use crate::peer::PeerEvent;
 use crate::ports::{self, Hub, PortError, Pub, Sub, TopicService, WakeNotifier};
 use crate::process::Process;
+use crate::removal_lock::{NoEntry, RemovalLock};
 use crate::wake::{TICK, Waker};
 
 /// How often an introduction is repeated.
@@ -31,7 +31,7 @@ const QUOTA: usize = 32;
 
 /// How things stand between peer and broker.
 #[derive(Debug)]
-pub(crate) enum Standing {
+pub(crate) enum MembershipState {
     /// Not answered yet.
     Waiting,
     /// Welcomed in this turn.
@@ -84,7 +84,7 @@ pub(crate) struct Membership {
     /// Where we have said who we are; the broker sees by them whether we live.
     said: Vec<Statement>,
     /// Until it is welcome it makes files.
-    door: Door,
+    removal_lock: RemovalLock,
     last_tick: Instant,
     welcome: bool,
     refused: Option<String>,
@@ -116,10 +116,10 @@ impl Membership {
             return Err(BeginError::Hello(why));
         }
         let services = Services::new(&generation.limits);
-        let turns = Turns::new();
-        let _turn = turns.take();
-        let door = Door::of(&generation.root)?;
-        let inside = door.enter()?;
+        let room_locks = RoomLocks::new();
+        let _lock = room_locks.take();
+        let removal_lock = RemovalLock::of(&generation.root)?;
+        let inside = removal_lock.enter()?;
         take_part(&generation.root, services.peer_bytes())?;
         let hub = Hub::join(&inside)?;
         let config = hub.topic(&services.config, "")?;
@@ -145,7 +145,7 @@ impl Membership {
             proves,
             instance: instance.clone(),
             said: Vec::new(),
-            door,
+            removal_lock,
             last_tick: Instant::now(),
             welcome: false,
             refused: None,
@@ -220,34 +220,34 @@ impl Membership {
     }
 
     /// Does as much as can be done without waiting.
-    pub(crate) fn turn(
+    pub(crate) fn receive_budget(
         &mut self,
         now: Instant,
         max_events: usize,
         events: &mut VecDeque<PeerEvent>,
         config: &mut Option<(Digest, Arc<[u8]>)>,
-    ) -> Standing {
-        let door = self.door.clone();
-        let _inside = match (!self.welcome).then(|| door.enter()).transpose() {
+    ) -> MembershipState {
+        let removal_lock = self.removal_lock.clone();
+        let _inside = match (!self.welcome).then(|| removal_lock.enter()).transpose() {
             Ok(inside) => inside,
-            Err(shut) => return Standing::Failed(shut.to_string()),
+            Err(lock_for_removal) => return MembershipState::Failed(lock_for_removal.to_string()),
         };
         if self.channels.is_none()
             && let Err(error) = self.connect(now)
         {
-            return Standing::Failed(error);
+            return MembershipState::Failed(error);
         }
         let was_welcome = self.welcome;
         let ended = self.read(max_events, events, config);
         self.flush();
         if let Some(reason) = self.refused.take() {
-            return Standing::Refused(reason);
+            return MembershipState::Refused(reason);
         }
         match (was_welcome, self.welcome) {
-            _ if ended => Standing::Ended,
-            (false, true) => Standing::JustWelcomed,
-            (_, true) => Standing::Welcome,
-            (_, false) => Standing::Waiting,
+            _ if ended => MembershipState::Ended,
+            (false, true) => MembershipState::JustWelcomed,
+            (_, true) => MembershipState::Welcome,
+            (_, false) => MembershipState::Waiting,
         }
     }
 

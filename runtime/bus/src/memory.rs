@@ -81,11 +81,11 @@ pub(crate) fn fitting_reserve(wanted: u64) -> u64 {
 }
 
 /// Sees to it that of all processes of this user one at a time takes shared memory.
-pub(crate) struct Turns(Mutex<Option<File>>);
+pub(crate) struct RoomLocks(Mutex<Option<File>>);
 
-impl Turns {
+impl RoomLocks {
     /// Where the lock cannot be had, every process goes by what is free alone.
-    pub(crate) fn new() -> Turns {
+    pub(crate) fn new() -> RoomLocks {
         let open = || -> Option<File> {
             let path = Instance::base_dir().ok()?.join(".memory");
             let mut how = OpenOptions::new();
@@ -98,14 +98,14 @@ impl Turns {
             };
             how.open(&path).or_else(|_| read()).ok()
         };
-        Turns(Mutex::new(open()))
+        RoomLocks(Mutex::new(open()))
     }
 
     /// Waits for a turn, but not for ever: whoever was stopped in its turn must not stop the others.
-    pub(crate) fn take(&self) -> Turn<'_> {
+    pub(crate) fn take(&self) -> RoomLock<'_> {
         let file = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let locked = file.as_ref().is_some_and(wait_for);
-        Turn { file, locked }
+        RoomLock { file, locked }
     }
 }
 
@@ -128,12 +128,12 @@ fn wait_for(file: &File) -> bool {
 }
 
 /// Nobody else takes shared memory meanwhile.
-pub(crate) struct Turn<'t> {
+pub(crate) struct RoomLock<'t> {
     file: MutexGuard<'t, Option<File>>,
     locked: bool,
 }
 
-impl Drop for Turn<'_> {
+impl Drop for RoomLock<'_> {
     fn drop(&mut self) {
         if let (true, Some(file)) = (self.locked, self.file.as_ref()) {
             let _ = flock(file, FlockOperation::Unlock);

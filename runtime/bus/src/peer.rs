@@ -8,11 +8,11 @@ use std::time::{Duration, Instant};
 use qcbus_messages::{Digest, DocId, FromPeer, Hello, PROTOCOL_VERSION, ToPeer, codec};
 
 use crate::generation::Generation;
-use crate::held::Held;
 use crate::instance::Instance;
-use crate::membership::{Membership, Standing};
+use crate::mapped_image::MappedImage;
+use crate::membership::{Membership, MembershipState};
 use crate::ports::ICEORYX2_VERSION;
-use crate::voice;
+use crate::send_side;
 use crate::wake::TICK;
 
 /// How often somebody without a session looks for one.
@@ -217,9 +217,9 @@ impl Peer {
         // A broker that is there gets longer: it may be busy starting.
         let answer_until = until.max(Instant::now() + options.grace);
         loop {
-            peer.turn()?;
+            peer.receive_budget()?;
             if peer.joined_before {
-                voice::joined();
+                send_side::joined();
                 return Ok(peer);
             }
             let now = Instant::now();
@@ -259,7 +259,7 @@ impl Peer {
                     reason: reason.clone(),
                 };
             }
-            if let Err(error) = self.turn() {
+            if let Err(error) = self.receive_budget() {
                 self.close(error.to_string());
             }
             if self.events.is_empty() && !matches!(self.state, State::Closed(_)) {
@@ -302,7 +302,7 @@ impl Peer {
     }
 
     /// A document, read in place; `None` when it has not arrived or was let go to make room.
-    pub fn document(&self, doc: DocId) -> Option<Held> {
+    pub fn document(&self, doc: DocId) -> Option<MappedImage> {
         match &self.state {
             State::Member(membership) => membership.library().get(doc),
             _ => None,
@@ -385,21 +385,22 @@ impl Peer {
     /// What a session has made is taken down, unless this process may not do so any more: then the broker's janitor
     /// does, when the process has ended.
     fn change(&mut self, state: State) {
-        let former = std::mem::replace(&mut self.state, state);
+        let earlier = std::mem::replace(&mut self.state, state);
         if self.joined_before && !self.options.rejoins {
-            std::mem::forget(former);
+            std::mem::forget(earlier);
         }
     }
 
     /// Does as much as can be done without waiting.
-    fn turn(&mut self) -> Result<(), JoinError> {
+    fn receive_budget(&mut self) -> Result<(), JoinError> {
         let now = Instant::now();
         if matches!(self.state, State::Seeking) && now >= self.seek_at {
             self.seek()?;
         }
         if let State::Member(membership) = &mut self.state {
-            let standing = membership.turn(now, MAX_WAITING, &mut self.events, &mut self.config);
-            self.take_note(standing, now);
+            let membership_state =
+                membership.receive_budget(now, MAX_WAITING, &mut self.events, &mut self.config);
+            self.take_note(membership_state, now);
         }
         if now.duration_since(self.last_watch) >= WATCH_EVERY {
             self.last_watch = now;
@@ -409,22 +410,22 @@ impl Peer {
         Ok(())
     }
 
-    fn take_note(&mut self, standing: Standing, now: Instant) {
-        match standing {
-            Standing::Waiting | Standing::Welcome => {}
-            Standing::JustWelcomed => {
+    fn take_note(&mut self, membership_state: MembershipState, now: Instant) {
+        match membership_state {
+            MembershipState::Waiting | MembershipState::Welcome => {}
+            MembershipState::JustWelcomed => {
                 if self.joined_before {
                     self.events.push_front(PeerEvent::Rejoined);
                 }
                 self.joined_before = true;
                 self.lost = None;
             }
-            Standing::Refused(reason) => self.close(reason),
-            Standing::Failed(why) => {
+            MembershipState::Refused(reason) => self.close(reason),
+            MembershipState::Failed(why) => {
                 self.last_error = Some(why);
                 self.lose(now);
             }
-            Standing::Ended => self.lose(now),
+            MembershipState::Ended => self.lose(now),
         }
     }
 

@@ -14,9 +14,9 @@ use iceoryx2::prelude::*;
 use iceoryx2::service::port_factory::{event, publish_subscribe};
 use qcbus_messages::services::{Growth, Topic, Wake};
 
-use crate::door::Inside;
-pub(crate) use crate::enclosed::Enclosed as Service;
 use crate::memory::Backing;
+pub(crate) use crate::private_root::PrivateRoot as Service;
+use crate::removal_lock::Inside;
 
 pub(crate) type Pub<T, H> = Publisher<Service, [T], H>;
 pub(crate) type Sub<T, H> = Subscriber<Service, [T], H>;
@@ -329,7 +329,7 @@ mod tests {
     use qcbus_messages::services::{Limits, Services};
 
     use super::*;
-    use crate::held::{Block, DocumentHeader};
+    use crate::mapped_image::{Block, DocumentHeader};
 
     fn assert_as_written(row: &Topic, made: &StaticConfig) {
         let numbers = (

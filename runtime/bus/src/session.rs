@@ -6,11 +6,11 @@ use iceoryx2::prelude::*;
 use qcbus_messages::services::Services;
 use qcbus_messages::{FromPeer, codec};
 
-use crate::entrance::Known;
+use crate::admission::Known;
 use crate::host::{HostEvent, PeerId};
 use crate::link::{FrameHeader, Link, SessionKey, Wants};
 use crate::ports::{self, Hub, PortError, TopicService, WakeService};
-use crate::turn::{Budget, Waiting};
+use crate::receive_budget::{Budget, Waiting};
 
 /// How long a peer may take to open its channels after its introduction.
 const CONNECT_WITHIN: Duration = Duration::from_secs(10);

@@ -7,7 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 
 use qcbus_reporter_sdk::Registration;
-use qcbus_sdk::Hands;
+use qcbus_sdk::Permits;
 
 use crate::standard::REPORTERS;
 
@@ -623,8 +623,8 @@ fn name_value(text: &str) -> Result<(String, String), String> {
 /// A number of threads.
 fn threads(text: &str) -> Result<usize, String> {
     let number = text.parse().ok();
-    let number = number.filter(|it| (1..=Hands::MOST).contains(it));
-    number.ok_or_else(|| format!("`{text}` is no number from 1 to {}", Hands::MOST))
+    let number = number.filter(|it| (1..=Permits::MOST).contains(it));
+    number.ok_or_else(|| format!("`{text}` is no number from 1 to {}", Permits::MOST))
 }
 
 /// Reads `250ms`, `30s`, `5m`, `2h`, `90d`; a number alone is seconds.

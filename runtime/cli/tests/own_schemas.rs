@@ -22,44 +22,44 @@ const OWN: &str = r#"<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema">
 const BROKEN: &str = "<xs:schema xmlns:xs=\"http://www.w3.org/2001/XMLSchema\">\n<xs:import namespace=\"x\"/>\n</xs:schema>";
 
 /// A folder with a map and two folders of schemas, one of them broken.
-fn desk() -> TempDir {
-    let desk = TempDir::new().unwrap();
+fn cli() -> TempDir {
+    let cli = TempDir::new().unwrap();
     let write = |name: &str, text: &str| {
-        let path = desk.path().join(name);
+        let path = cli.path().join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, text).unwrap();
     };
     write("map.xodr", MAP);
     write("own/map.xsd", OWN);
     write("broken/map.xsd", BROKEN);
-    desk
+    cli
 }
 
 /// A broker that does not outlive a test that fails.
 struct Broker<'d> {
     process: Child,
-    desk: &'d Path,
+    cli: &'d Path,
 }
 
 impl<'d> Broker<'d> {
-    fn serve(desk: &'d Path, options: &[&str]) -> Broker<'d> {
+    fn serve(cli: &'d Path, options: &[&str]) -> Broker<'d> {
         let process = Command::new(env!("CARGO_BIN_EXE_qcbus"))
             .args(["serve", ".", "--instance", "schemas"])
             .args(options)
-            .current_dir(desk)
-            .env("XDG_RUNTIME_DIR", desk)
+            .current_dir(cli)
+            .env("XDG_RUNTIME_DIR", cli)
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        Broker { process, desk }
+        Broker { process, cli }
     }
 
     fn ask(&self, command: &[&str]) -> Output {
         Command::new(env!("CARGO_BIN_EXE_qcbus"))
             .args(command)
             .args(["--instance", "schemas"])
-            .current_dir(self.desk)
-            .env("XDG_RUNTIME_DIR", self.desk)
+            .current_dir(self.cli)
+            .env("XDG_RUNTIME_DIR", self.cli)
             .output()
             .unwrap()
     }
@@ -78,7 +78,7 @@ impl<'d> Broker<'d> {
                 "the broker has ended"
             );
         }
-        result(self.desk, "qcbus-out/map.xodr.xqar")
+        result(self.cli, "qcbus-out/map.xodr.xqar")
     }
 
     fn down(mut self) {
@@ -94,18 +94,18 @@ impl Drop for Broker<'_> {
     }
 }
 
-fn qcbus(desk: &Path, arguments: &[&str]) -> Output {
-    let runtime = desk.join("run");
+fn qcbus(cli: &Path, arguments: &[&str]) -> Output {
+    let runtime = cli.join("run");
     std::fs::create_dir_all(&runtime).unwrap();
     Command::new(env!("CARGO_BIN_EXE_qcbus"))
         .args(arguments)
-        .current_dir(desk)
+        .current_dir(cli)
         .env("XDG_RUNTIME_DIR", runtime)
         .output()
         .unwrap()
 }
 
-fn configuration(desk: &Path, global: &str, bundle: &str, checker: &str) {
+fn configuration(cli: &Path, global: &str, bundle: &str, checker: &str) {
     let param = |value: &str| match value {
         "" => String::new(),
         value => format!("<Param name=\"schemaDir\" value=\"{value}\"/>"),
@@ -117,17 +117,17 @@ fn configuration(desk: &Path, global: &str, bundle: &str, checker: &str) {
         param(bundle),
         param(checker)
     );
-    std::fs::write(desk.join("config.xml"), text).unwrap();
+    std::fs::write(cli.join("config.xml"), text).unwrap();
 }
 
-fn result(desk: &Path, name: &str) -> String {
-    std::fs::read_to_string(desk.join(name)).unwrap()
+fn result(cli: &Path, name: &str) -> String {
+    std::fs::read_to_string(cli.join(name)).unwrap()
 }
 
-fn names_own_schema(desk: &Path, result: &str) -> bool {
+fn names_own_schema(cli: &Path, result: &str) -> bool {
     let digest = Sha256::digest(OWN.as_bytes());
     let digest: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
-    let file = desk.join("own/map.xsd");
+    let file = cli.join("own/map.xsd");
     result.contains(&format!("sha256:{digest}"))
         && result.contains(&file.display().to_string())
         && result.contains("has no child &lt;road&gt;")
@@ -135,19 +135,19 @@ fn names_own_schema(desk: &Path, result: &str) -> bool {
 
 #[test]
 fn the_flag_reaches_the_bundles_and_the_result_names_the_schema() {
-    let desk = desk();
+    let cli = cli();
     let output = qcbus(
-        desk.path(),
+        cli.path(),
         &["check", "-q", "--schema-dir", "own", "map.xodr"],
     );
     assert_eq!(output.status.code(), Some(1), "{output:?}");
-    let result = result(desk.path(), "qcbus-out/map.xodr.xqar");
-    assert!(names_own_schema(desk.path(), &result), "{result}");
+    let result = result(cli.path(), "qcbus-out/map.xodr.xqar");
+    assert!(names_own_schema(cli.path(), &result), "{result}");
 }
 
 #[test]
 fn a_broken_schema_ends_every_command_before_it_begins() {
-    let desk = desk();
+    let cli = cli();
     for arguments in [
         &["check", "--schema-dir", "broken", "map.xodr"][..],
         &["serve", "--schema-dir", "broken", "."],
@@ -169,7 +169,7 @@ fn a_broken_schema_ends_every_command_before_it_begins() {
             "config.xml",
         ],
     ] {
-        let output = qcbus(desk.path(), arguments);
+        let output = qcbus(cli.path(), arguments);
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
         assert!(
@@ -181,34 +181,28 @@ fn a_broken_schema_ends_every_command_before_it_begins() {
 
 #[test]
 fn a_configuration_names_schemas_checker_before_bundle_before_global() {
-    let desk = desk();
-    let own = desk.path().join("own").display().to_string();
+    let cli = cli();
+    let own = cli.path().join("own").display().to_string();
     for (global, bundle, checker) in [
         (own.as_str(), "", ""),
         ("broken", own.as_str(), ""),
         ("broken", "broken", own.as_str()),
     ] {
-        configuration(desk.path(), global, bundle, checker);
-        let output = qcbus(
-            desk.path(),
-            &["check", "-q", "-c", "config.xml", "map.xodr"],
-        );
+        configuration(cli.path(), global, bundle, checker);
+        let output = qcbus(cli.path(), &["check", "-q", "-c", "config.xml", "map.xodr"]);
         assert_eq!(output.status.code(), Some(1), "{output:?}");
-        let result = result(desk.path(), "Result.xqar");
-        assert!(names_own_schema(desk.path(), &result), "{result}");
+        let result = result(cli.path(), "Result.xqar");
+        assert!(names_own_schema(cli.path(), &result), "{result}");
     }
 }
 
 #[test]
 fn a_broken_schema_of_a_configuration_is_the_checkers_error_unless_the_flag_says_another() {
-    let desk = desk();
-    configuration(desk.path(), "", "broken", "");
-    let output = qcbus(
-        desk.path(),
-        &["check", "-q", "-c", "config.xml", "map.xodr"],
-    );
+    let cli = cli();
+    configuration(cli.path(), "", "broken", "");
+    let output = qcbus(cli.path(), &["check", "-q", "-c", "config.xml", "map.xodr"]);
     assert_eq!(output.status.code(), Some(3), "{output:?}");
-    let found = result(desk.path(), "Result.xqar");
+    let found = result(cli.path(), "Result.xqar");
     assert!(found.contains("status=\"error\""), "{found}");
     assert!(
         found.contains("broken/map.xsd:2:1: &lt;xs:import&gt;"),
@@ -224,25 +218,25 @@ fn a_broken_schema_of_a_configuration_is_the_checkers_error_unless_the_flag_says
         "own",
         "map.xodr",
     ];
-    let output = qcbus(desk.path(), &flagged);
+    let output = qcbus(cli.path(), &flagged);
     assert_eq!(output.status.code(), Some(1), "{output:?}");
-    let found = result(desk.path(), "Result.xqar");
-    assert!(names_own_schema(desk.path(), &found), "{found}");
+    let found = result(cli.path(), "Result.xqar");
+    assert!(names_own_schema(cli.path(), &found), "{found}");
 }
 
 #[test]
 fn other_schemas_make_a_running_broker_judge_again() {
-    let desk = desk();
+    let cli = cli();
     let check = |schemas: &[&str]| {
         // One broker after the other over one state.
-        let mut broker = Broker::serve(desk.path(), schemas);
+        let mut broker = Broker::serve(cli.path(), schemas);
         let found = broker.judge();
         broker.down();
         found
     };
     assert!(check(&[]).contains("OpenDRIVE 1.7"));
     assert!(names_own_schema(
-        desk.path(),
+        cli.path(),
         &check(&["--schema-dir", "own"])
     ));
     assert!(check(&[]).contains("OpenDRIVE 1.7"));
@@ -250,13 +244,13 @@ fn other_schemas_make_a_running_broker_judge_again() {
 
 #[test]
 fn a_running_broker_uses_what_a_schema_of_its_configuration_has_become() {
-    let desk = desk();
-    let write = |name: &str, text: &str| std::fs::write(desk.path().join(name), text).unwrap();
-    let own = desk.path().join("own").display().to_string();
-    configuration(desk.path(), "", "", &own);
-    let mut broker = Broker::serve(desk.path(), &["-c", "config.xml"]);
+    let cli = cli();
+    let write = |name: &str, text: &str| std::fs::write(cli.path().join(name), text).unwrap();
+    let own = cli.path().join("own").display().to_string();
+    configuration(cli.path(), "", "", &own);
+    let mut broker = Broker::serve(cli.path(), &["-c", "config.xml"]);
     let found = broker.judge();
-    assert!(names_own_schema(desk.path(), &found), "{found}");
+    assert!(names_own_schema(cli.path(), &found), "{found}");
 
     write(
         "own/map.xsd",
@@ -282,24 +276,24 @@ fn a_running_broker_uses_what_a_schema_of_its_configuration_has_become() {
 
 #[test]
 fn tables_are_for_the_version_in_the_name_of_their_directory() {
-    let desk = desk();
-    let dir = desk.path().join("acme-1.7");
+    let cli = cli();
+    let dir = cli.path().join("acme-1.7");
     std::fs::create_dir(&dir).unwrap();
     std::fs::write(dir.join("map.xsd"), OWN).unwrap();
     let compile = ["schema", "compile", "acme-1.7", "-o", "own.tbl"];
-    let output = qcbus(desk.path(), &compile);
+    let output = qcbus(cli.path(), &compile);
     assert!(output.status.success(), "{output:?}");
-    let tables = result(desk.path(), "own.tbl");
+    let tables = result(cli.path(), "own.tbl");
     assert!(tables.contains("\ntitle acme-1.7\n"), "{tables}");
 
     let map = |minor: &str| {
         let text = MAP.replace("revMinor=\"7\"", &format!("revMinor=\"{minor}\""));
-        std::fs::write(desk.path().join("map.xodr"), text).unwrap();
+        std::fs::write(cli.path().join("map.xodr"), text).unwrap();
         qcbus(
-            desk.path(),
+            cli.path(),
             &["check", "-q", "--schema-dir", "own.tbl", "map.xodr"],
         );
-        result(desk.path(), "qcbus-out/map.xodr.xqar")
+        result(cli.path(), "qcbus-out/map.xodr.xqar")
     };
     assert!(map("7").contains("own.tbl sha256:"));
     assert!(map("6").contains("OpenDRIVE 1.6"));

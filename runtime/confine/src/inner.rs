@@ -29,7 +29,7 @@ const HARMLESS: &[&str] = &[
 
 /// What a bundle needs besides what its manifest declares.
 #[derive(Debug, Default)]
-pub struct Fenced {
+pub struct Sandboxed {
     /// The directory of shared memory of the generation that it has joined. Of others it sees nothing.
     pub memory: Option<PathBuf>,
     /// Files and directories that it reads.
@@ -48,15 +48,15 @@ pub struct Fenced {
 ///
 /// # Errors
 /// [`SandboxError::Kernel`]: the process is not confined, or not wholly.
-pub fn confine(fenced: &Fenced) -> Result<(), SandboxError> {
+pub fn confine(sandboxed: &Sandboxed) -> Result<(), SandboxError> {
     if threads() != Some(1) {
         let why = "threads run already that would stay outside";
         return Err(SandboxError::kernel("a single thread is needed", why));
     }
-    let may = &fenced.may;
+    let may = &sandboxed.may;
     let mut rules = Rules::new(may.network)?.allow("/dev/null", everything())?;
     // Images are published in segments that come later, under names that nobody knows before.
-    if let Some(memory) = &fenced.memory {
+    if let Some(memory) = &sandboxed.memory {
         rules = rules.allow(memory, files())?;
     }
     for path in HARMLESS {
@@ -64,10 +64,10 @@ pub fn confine(fenced: &Fenced) -> Result<(), SandboxError> {
     }
     // What runs, and not what lies at its path by now.
     rules = rules.allow("/proc/self/exe", files())?;
-    for path in fenced.reads.iter().chain(&may.read) {
+    for path in sandboxed.reads.iter().chain(&may.read) {
         rules = rules.allow(path, trees())?;
     }
-    for path in &fenced.lists {
+    for path in &sandboxed.lists {
         rules = rules.allow(path, listings())?;
     }
     for path in &may.write {

@@ -10,18 +10,18 @@
 //!   from then on goes to what it has open: its own streams.
 //!
 //! What lies inside cannot be widened again, so a session that is lost is followed by one in a fresh process:
-//! [`keep`] starts them.
+//! [`run_sessions`] starts them.
 
 mod calls;
 mod inner;
-mod keep;
+mod launcher;
 mod looks;
 mod orders;
 mod outer;
 mod rules;
 
-pub use inner::{Fenced, confine};
-pub use keep::{After, Kept, keep};
+pub use inner::{Sandboxed, confine};
+pub use launcher::{After, LauncherEnd, run_sessions};
 pub use looks::{Looks, looks, own_filters};
 pub use orders::{Orders, SandboxError};
 pub use outer::Outer;

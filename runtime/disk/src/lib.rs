@@ -74,7 +74,7 @@ pub fn write_ahead(path: &Path, content: &[u8], durable: bool) -> io::Result<Tem
 /// What tells a file that was written from any other that comes to lie in its place: size, time of
 /// modification in nanoseconds, inode. A rename changes none of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FileMark {
+pub struct FileFingerprint {
     /// In bytes.
     size: u64,
     /// Since 1970.
@@ -82,42 +82,42 @@ pub struct FileMark {
     inode: u64,
 }
 
-impl FileMark {
-    /// The mark of no file.
-    pub const NONE: FileMark = FileMark {
+impl FileFingerprint {
+    /// The fingerprint of no file.
+    pub const NONE: FileFingerprint = FileFingerprint {
         size: u64::MAX,
         modified_ns: i128::MAX,
         inode: u64::MAX,
     };
 
-    fn of(data: &Metadata) -> FileMark {
+    fn of(data: &Metadata) -> FileFingerprint {
         let seconds = i128::from(data.mtime());
-        FileMark {
+        FileFingerprint {
             size: data.len(),
             modified_ns: seconds * 1_000_000_000 + i128::from(data.mtime_nsec()),
             inode: data.ino(),
         }
     }
 
-    /// Reads a mark as [`FileMark`] is displayed; `None` when it is none.
-    pub fn parse(text: &str) -> Option<FileMark> {
+    /// Reads a fingerprint as [`FileFingerprint`] is displayed; `None` when it is none.
+    pub fn parse(text: &str) -> Option<FileFingerprint> {
         let mut numbers = text.split(' ');
-        let mark = FileMark {
+        let fingerprint = FileFingerprint {
             size: numbers.next()?.parse().ok()?,
             modified_ns: numbers.next()?.parse().ok()?,
             inode: numbers.next()?.parse().ok()?,
         };
-        numbers.next().is_none().then_some(mark)
+        numbers.next().is_none().then_some(fingerprint)
     }
 
     /// That of the regular file which lies there, if one does.
-    pub fn at(path: &Path) -> Option<FileMark> {
+    pub fn at(path: &Path) -> Option<FileFingerprint> {
         let data = std::fs::symlink_metadata(path).ok()?;
-        data.is_file().then(|| FileMark::of(&data))
+        data.is_file().then(|| FileFingerprint::of(&data))
     }
 }
 
-impl std::fmt::Display for FileMark {
+impl std::fmt::Display for FileFingerprint {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} {} {}", self.size, self.modified_ns, self.inode)
     }
@@ -128,7 +128,7 @@ pub type Content<'a> = (&'a Path, &'a [u8]);
 
 /// Writes two files as [`write_whole`] does; `first` gets its name before `second` does. Both are
 /// synced at the same time, because then the file system's journal is written once for both. Returns
-/// the marks of both.
+/// the fingerprints of both.
 ///
 /// # Errors
 /// As [`write_whole`], with the path that could not be written.
@@ -136,23 +136,23 @@ pub fn write_both<'a>(
     first: Content<'a>,
     second: Content<'a>,
     durable: bool,
-) -> Result<[FileMark; 2], (&'a Path, io::Error)> {
+) -> Result<[FileFingerprint; 2], (&'a Path, io::Error)> {
     let of = |path| move |error| (path, error);
     let one = write_aside(first.0, first.1).map_err(of(first.0))?;
     let other = write_aside(second.0, second.1).map_err(of(second.0))?;
     if durable {
         sync_both(&one.0, &other.0).map_err(of(second.0))?;
     }
-    let mark = |file: &File| file.metadata().map(|data| FileMark::of(&data));
-    let marks = [
-        mark(&one.0).map_err(of(first.0))?,
-        mark(&other.0).map_err(of(second.0))?,
+    let fingerprint = |file: &File| file.metadata().map(|data| FileFingerprint::of(&data));
+    let fingerprints = [
+        fingerprint(&one.0).map_err(of(first.0))?,
+        fingerprint(&other.0).map_err(of(second.0))?,
     ];
     let named = one.1.persist(first.0);
     named.map_err(|unnamed| (first.0, unnamed.error))?;
     let named = other.1.persist(second.0);
     named.map_err(|unnamed| (second.0, unnamed.error))?;
-    Ok(marks)
+    Ok(fingerprints)
 }
 
 fn sync_both(first: &File, second: &File) -> io::Result<()> {
@@ -519,13 +519,16 @@ mod tests {
         let dir = tempfile::TempDir::new().unwrap();
         let path = |name: &str| dir.path().join(name);
         let (first, second) = (path("a.verdict.json"), path("deep/a.xqar"));
-        let marks = write_both((&first, b"verdict"), (&second, b"result"), true).unwrap();
-        let there = [&first, &second].map(|it| FileMark::at(it).unwrap());
-        assert_eq!(there, marks);
-        assert_ne!(marks[0], marks[1]);
-        assert_eq!(FileMark::parse(&marks[0].to_string()), Some(marks[0]));
-        assert_eq!(FileMark::parse("1 2"), None);
-        assert_eq!(FileMark::parse("1 2 3 4"), None);
+        let fingerprints = write_both((&first, b"verdict"), (&second, b"result"), true).unwrap();
+        let there = [&first, &second].map(|it| FileFingerprint::at(it).unwrap());
+        assert_eq!(there, fingerprints);
+        assert_ne!(fingerprints[0], fingerprints[1]);
+        assert_eq!(
+            FileFingerprint::parse(&fingerprints[0].to_string()),
+            Some(fingerprints[0])
+        );
+        assert_eq!(FileFingerprint::parse("1 2"), None);
+        assert_eq!(FileFingerprint::parse("1 2 3 4"), None);
         assert_eq!(std::fs::read(&first).unwrap(), b"verdict");
         assert_eq!(std::fs::read(&second).unwrap(), b"result");
 

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use qcbus_benches::Result;
 use qcbus_benches::figures::{digits, head, micros, quantile, row, size};
 use qcbus_benches::peers::{Broker, publish, runtime, was_started_as_peer};
-use qcbus_bus::Held;
+use qcbus_bus::MappedImage;
 
 const JOB_TIME: Duration = Duration::from_secs(2);
 const RUNS: usize = 3;
@@ -66,7 +66,7 @@ struct Measured {
 async fn jobs(bundles: usize, bytes: usize, in_flight: usize) -> Result<Measured> {
     let mut broker = Broker::with(bundles).await?;
     let documents = broker.host.documents();
-    let mut open: BTreeMap<u64, (Instant, usize, Held)> = BTreeMap::new();
+    let mut open: BTreeMap<u64, (Instant, usize, MappedImage)> = BTreeMap::new();
     let mut latencies = Vec::new();
     let (mut number, start) = (0, Instant::now());
     loop {

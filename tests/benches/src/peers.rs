@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::process::{Child, Command};
 
-use qcbus_bus::{Documents, Held, Host, HostEvent, HostOptions, Instance, Peer, PeerEvent};
+use qcbus_bus::{Documents, Host, HostEvent, HostOptions, Instance, MappedImage, Peer, PeerEvent};
 use qcbus_bus::{PeerId, PeerOptions};
 use qcbus_document::FileKind;
 use qcbus_messages::{
@@ -182,7 +182,7 @@ impl Broker {
 ///
 /// # Errors
 /// When there is no room.
-pub fn publish(documents: &Documents, number: u64, bytes: usize) -> Result<Held> {
+pub fn publish(documents: &Documents, number: u64, bytes: usize) -> Result<MappedImage> {
     let mut loan = documents.loan(bytes)?;
     loan.fill(number as u8);
     Ok(loan.publish(DocId(number), bytes, Digest::default(), FileKind::Xodr)?)

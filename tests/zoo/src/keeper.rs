@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use qcbus_bus::{Claims, Instance, JoinError, Peer, PeerEvent, PeerOptions};
-use qcbus_confine::{After, Fenced, Orders};
+use qcbus_confine::{After, Sandboxed, Orders};
 use qcbus_document::FileKind;
 use qcbus_formats::manifest::May;
 use qcbus_formats::pool::Ending;
@@ -162,7 +162,7 @@ pub fn keep(animal: &'static Animal, args: &Args) -> ExitCode {
     };
     let supervised = args.launch.is_some() || args.die_with_parent;
     let hello = hello(animal, args);
-    let kept = qcbus_confine::keep(!supervised, |number| {
+    let kept = qcbus_confine::run_sessions(!supervised, |number| {
         let stand = Stand {
             instance: &instance,
             may: Some(&may),
@@ -224,12 +224,12 @@ async fn live(animal: &'static Animal, args: &Args, hello: Hello, stand: &Stand<
         Err(error) => return ended(&error.to_string(), 5),
     };
     if let Some(may) = stand.may {
-        let fenced = Fenced {
+        let sandboxed = Sandboxed {
             memory: peer.memory().map(Path::to_path_buf),
             may: may.clone(),
-            ..Fenced::default()
+            ..Sandboxed::default()
         };
-        if let Err(error) = qcbus_confine::confine(&fenced) {
+        if let Err(error) = qcbus_confine::confine(&sandboxed) {
             complain(&format!("not wholly confined: {error}"));
         }
     }

@@ -2,8 +2,8 @@
 
 use qcbus_formats::pool::Ending;
 
-use super::strand::Strand;
-use super::{Outcome, Standing};
+use super::checker_group::CheckerGroup;
+use super::{Outcome, RuleState};
 use crate::plan::Entry;
 use crate::{Backport, Checker, Values, Version};
 
@@ -13,7 +13,7 @@ pub(super) struct Pass<'r> {
     pub not_normative: Option<String>,
 }
 
-impl<'r> Strand<'r> {
+impl<'r> CheckerGroup<'r> {
     /// Parameters, preconditions, version: in this order.
     pub(super) fn gate(&self, index: usize) -> Result<Pass<'r>, Outcome> {
         let plan = self.work.plan;
@@ -40,13 +40,13 @@ impl<'r> Strand<'r> {
         let mut stopped: Option<String> = None;
         let mut by = Vec::new();
         for &index in after {
-            let standing = self.standings[index].unwrap_or(Standing::Waits);
-            let Some(what) = standing.in_the_way() else {
+            let rule_state = self.standings[index].unwrap_or(RuleState::Waits);
+            let Some(what) = rule_state.in_the_way() else {
                 continue;
             };
             let id = &self.work.plan.checkers[index].id;
             stopped.get_or_insert_with(|| format!("`{id}` {what}"));
-            if standing.is_stop() {
+            if rule_state.is_stop() {
                 by.push(id.clone());
             }
         }

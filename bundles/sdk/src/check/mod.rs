@@ -5,9 +5,9 @@
 //! parts of the model and the checkers that look at the whole of it are tasks, which go to as many
 //! threads as there are hands free (`spread.rs`). What is found does not depend on how many there are.
 
+mod checker_group;
 mod gates;
 mod spread;
-mod strand;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -16,11 +16,11 @@ use std::time::Duration;
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::{Issue, Level, Metadata, Param};
 
-use crate::hands::Hands;
+use crate::permits::Permits;
 use crate::plan::Plan;
-use crate::{Subject, hands::Hand};
+use crate::{Subject, permits::Permit};
 
-use strand::{Ended, Strand};
+use checker_group::{CheckerGroup, Ended};
 
 /// How a checker ended, and what is to be said besides its findings.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,15 +55,15 @@ pub trait Listener: Sync {
 /// Runs the plan's checkers on a subject, in this thread. Returns whether it came to its end, that is,
 /// was not cancelled. A panic in a rule or a model is that checker's error and nobody else's.
 pub fn check(plan: &Plan, subject: &Subject<'_>, listener: &mut dyn Listener) -> bool {
-    check_with(plan, subject, &Hands::new(1), listener)
+    check_with(plan, subject, &Permits::new(1), listener)
 }
 
-/// Runs the plan's checkers on a subject as [`check`] does. This thread counts as one of the `hands`;
+/// Runs the plan's checkers on a subject as [`check`] does. This thread counts as one of the `permits`;
 /// of those that are free, a large document gets as many as there are.
 pub fn check_with(
     plan: &Plan,
     subject: &Subject<'_>,
-    hands: &Hands,
+    permits: &Permits,
     listener: &mut dyn Listener,
 ) -> bool {
     let subject = subject.clone().with_resources(plan.resources.clone());
@@ -77,13 +77,13 @@ pub fn check_with(
         let work = Work {
             plan,
             subject,
-            hands,
+            permits,
             listener,
-            spreads: hands.count() > 1 && subject.root().text_len() >= WORTH_SPREADING,
+            spreads: permits.count() > 1 && subject.root().text_len() >= WORTH_SPREADING,
         };
-        let strands = work.side_by_side(batch, &run.standings);
+        let checker_groups = work.side_by_side(batch, &run.standings);
         let cancelled = listener.is_cancelled();
-        for ended in strands.into_iter().flatten() {
+        for ended in checker_groups.into_iter().flatten() {
             run.end(ended, listener);
         }
         if cancelled {
@@ -102,7 +102,7 @@ const WORTH_SPREADING: u32 = 96 << 10;
 struct Work<'r> {
     plan: &'r Plan,
     subject: &'r Subject<'r>,
-    hands: &'r Hands,
+    permits: &'r Permits,
     listener: &'r dyn Listener,
     /// The document is large enough for several threads.
     spreads: bool,
@@ -111,33 +111,38 @@ struct Work<'r> {
 impl<'r> Work<'r> {
     /// Runs strands of which none rests on another: the largest one here, the others beside it where
     /// hands are free. Gives what ended, by strand.
-    fn side_by_side(self, strands: &[usize], standings: &[Option<Standing>]) -> Vec<Vec<Ended>> {
-        let run = move |strand: usize, _hand: Option<Hand<'_>>| {
-            Strand::new(self, standings).run(&self.plan.groups[strand])
+    fn side_by_side(
+        self,
+        checker_groups: &[usize],
+        standings: &[Option<RuleState>],
+    ) -> Vec<Vec<Ended>> {
+        let run = move |checker_group: usize, _permit: Option<Permit<'_>>| {
+            CheckerGroup::new(self, standings).run(&self.plan.groups[checker_group])
         };
         // The longest list of checkers stays here, so that whoever is beside is free for it soon.
-        let Some(here) = (0..strands.len()).max_by_key(|&it| self.plan.groups[strands[it]].len())
+        let Some(here) =
+            (0..checker_groups.len()).max_by_key(|&it| self.plan.groups[checker_groups[it]].len())
         else {
             return Vec::new();
         };
         std::thread::scope(|scope| {
             let mut begun: Vec<Begun<'_>> = Vec::new();
-            for (place, &strand) in strands.iter().enumerate() {
-                let hand = (self.spreads && place != here).then(|| self.hands.spare());
-                begun.push(match hand.flatten() {
-                    Some(hand) => spread::beside(scope, move || run(strand, Some(hand)))
-                        .map_or(Begun::Due(strand), Begun::Beside),
-                    None => Begun::Due(strand),
+            for (place, &checker_group) in checker_groups.iter().enumerate() {
+                let permit = (self.spreads && place != here).then(|| self.permits.spare());
+                begun.push(match permit.flatten() {
+                    Some(permit) => spread::beside(scope, move || run(checker_group, Some(permit)))
+                        .map_or(Begun::Due(checker_group), Begun::Beside),
+                    None => Begun::Due(checker_group),
                 });
             }
             for begun in &mut begun {
-                if let Begun::Due(strand) = begun {
-                    *begun = Begun::Over(run(*strand, None));
+                if let Begun::Due(checker_group) = begun {
+                    *begun = Begun::Over(run(*checker_group, None));
                 }
             }
             let end = || begun.into_iter().map(Begun::end).collect();
             match self.spreads {
-                true => self.hands.wait_for(end),
+                true => self.permits.wait_for(end),
                 false => end(),
             }
         })
@@ -168,14 +173,14 @@ impl Begun<'_> {
 /// What is known of the checkers of all strands that have ended.
 struct Run<'r> {
     plan: &'r Plan,
-    standings: Vec<Option<Standing>>,
+    standings: Vec<Option<RuleState>>,
     /// What undemanded checkers said, as far as they may be in the way of a demanded one.
     aside: BTreeMap<usize, (Vec<Issue>, Outcome)>,
 }
 
 /// What matters of a checker to those that come after it.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Standing {
+enum RuleState {
     /// Not yet at its end: it waits for its turn.
     Waits,
     Clean,
@@ -185,34 +190,34 @@ enum Standing {
     Failed,
 }
 
-impl Standing {
-    fn after(issues: &[Issue], outcome: &Outcome) -> Standing {
+impl RuleState {
+    fn after(issues: &[Issue], outcome: &Outcome) -> RuleState {
         match outcome.ending {
             Ending::Completed if issues.iter().any(|issue| issue.level == Level::Error) => {
-                Standing::FoundErrors
+                RuleState::FoundErrors
             }
-            Ending::Completed => Standing::Clean,
-            Ending::NotApplicable { .. } => Standing::NotApplicable,
-            Ending::Blocked { .. } => Standing::Blocked,
-            Ending::Failed { .. } => Standing::Failed,
+            Ending::Completed => RuleState::Clean,
+            Ending::NotApplicable { .. } => RuleState::NotApplicable,
+            Ending::Blocked { .. } => RuleState::Blocked,
+            Ending::Failed { .. } => RuleState::Failed,
         }
     }
 
     /// What it means for those that rest on the checker; `None`: nothing, they may look.
     fn in_the_way(self) -> Option<&'static str> {
         match self {
-            Standing::Clean => None,
-            Standing::FoundErrors => Some("found errors"),
-            Standing::NotApplicable | Standing::Blocked => Some("was skipped"),
-            Standing::Failed => Some("failed"),
-            Standing::Waits => Some("did not run before it"),
+            RuleState::Clean => None,
+            RuleState::FoundErrors => Some("found errors"),
+            RuleState::NotApplicable | RuleState::Blocked => Some("was skipped"),
+            RuleState::Failed => Some("failed"),
+            RuleState::Waits => Some("did not run before it"),
         }
     }
 
     /// Whether those that rest on the checker could not look because of it. That it does not apply
     /// is no such reason.
     fn is_stop(self) -> bool {
-        self.in_the_way().is_some() && self != Standing::NotApplicable
+        self.in_the_way().is_some() && self != RuleState::NotApplicable
     }
 }
 
@@ -222,12 +227,12 @@ impl Run<'_> {
             index,
             issues,
             outcome,
-            standing,
+            rule_state,
         } = ended;
-        self.standings[index] = Some(standing);
+        self.standings[index] = Some(rule_state);
         if self.plan.entries[index].demanded {
             listener.ended(index, issues, outcome);
-        } else if standing.in_the_way().is_some() {
+        } else if rule_state.in_the_way().is_some() {
             self.aside.insert(index, (issues, outcome));
         }
     }
@@ -238,9 +243,9 @@ impl Run<'_> {
         let demanded = |index: &usize| self.plan.entries[*index].demanded;
         let mut open: Vec<usize> = (0..self.standings.len()).filter(demanded).collect();
         let mut told = BTreeSet::new();
-        let is_stop = |index: usize| self.standings[index].is_none_or(Standing::is_stop);
+        let is_stop = |index: usize| self.standings[index].is_none_or(RuleState::is_stop);
         while let Some(index) = open.pop() {
-            if self.standings[index] == Some(Standing::Blocked) {
+            if self.standings[index] == Some(RuleState::Blocked) {
                 let after = self.plan.entries[index].after.iter().flatten();
                 open.extend(after.filter(|before| is_stop(**before) && told.insert(**before)));
             }

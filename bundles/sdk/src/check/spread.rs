@@ -15,13 +15,13 @@ use qcbus_formats::xqar::Issue;
 
 use super::gates::Pass;
 use super::{Outcome, Work, catch};
-use crate::hands::Hand;
+use crate::permits::Permit;
 use crate::rule::{Built, Facts};
 use crate::sink::WHOLE;
 use crate::{AnyRule, Sink};
 
 /// A checker that may look.
-pub(super) struct Turn<'r> {
+pub(super) struct ScheduledRule<'r> {
     pub index: usize,
     pub rule: &'static dyn AnyRule,
     pub facts: &'r Facts,
@@ -42,8 +42,8 @@ struct Had<'r> {
 /// The tasks, and which of them is next.
 struct Tasks<'t, 'r> {
     work: Work<'r>,
-    turns: &'t [Turn<'r>],
-    /// By place in `turns`: those that go by parts.
+    schedule: &'t [ScheduledRule<'r>],
+    /// By place in `schedule`: those that go by parts.
     by_parts: Vec<usize>,
     /// Those that look at the whole only. The others do so after the parts, and may ask what was found in them.
     wholes: Vec<usize>,
@@ -61,15 +61,19 @@ type Pile<'r> = Vec<Option<Had<'r>>>;
 impl<'r> Work<'r> {
     /// Has checkers look at the parts of the model and at the whole: what they say, in their order. `None`
     /// when the check was cancelled.
-    pub(super) fn look(self, turns: &[Turn<'r>], built: &dyn Built<'r>) -> Option<Vec<Looked>> {
+    pub(super) fn look(
+        self,
+        schedule: &[ScheduledRule<'r>],
+        built: &dyn Built<'r>,
+    ) -> Option<Vec<Looked>> {
         let places = |asked: fn(&dyn AnyRule) -> bool| {
-            let all = turns.iter().enumerate();
-            let asked = all.filter(|(_, turn)| asked(turn.rule));
+            let all = schedule.iter().enumerate();
+            let asked = all.filter(|(_, scheduled)| asked(scheduled.rule));
             asked.map(|(place, _)| place).collect::<Vec<usize>>()
         };
         let tasks = Tasks {
             work: self,
-            turns,
+            schedule,
             by_parts: places(|rule| rule.goes_by_parts()),
             wholes: places(|rule| !rule.goes_by_parts()),
             built,
@@ -88,9 +92,9 @@ impl<'r> Work<'r> {
         let of = |place: usize| {
             let of_all = piles.iter_mut();
             let found = of_all.filter_map(|it| it.get_mut(place)?.take()).collect();
-            tasks.together(&turns[place], found)
+            tasks.together(&schedule[place], found)
         };
-        Some((0..turns.len()).map(of).collect())
+        Some((0..schedule.len()).map(of).collect())
     }
 }
 
@@ -104,9 +108,9 @@ impl<'r> Tasks<'_, 'r> {
             loop {
                 while self.left() > 1
                     && begun.elapsed() >= WORTH_A_THREAD
-                    && let Some(hand) = self.work.hands.spare()
+                    && let Some(permit) = self.work.permits.spare()
                 {
-                    others.extend(beside(scope, move || self.lend(hand)));
+                    others.extend(beside(scope, move || self.lend(permit)));
                 }
                 if !self.one(&mut own) {
                     break;
@@ -114,21 +118,21 @@ impl<'r> Tasks<'_, 'r> {
             }
             let mut piles = vec![own];
             let end = || piles.extend(others.into_iter().map(joined));
-            self.work.hands.wait_for(end);
+            self.work.permits.wait_for(end);
             piles
         })
     }
 
     /// Takes tasks with a hand that is lent: until a job wants it.
-    fn lend(&self, hand: Hand<'_>) -> Pile<'r> {
+    fn lend(&self, permit: Permit<'_>) -> Pile<'r> {
         let mut own = self.empty_pile();
-        while !self.work.hands.are_wanted() && self.one(&mut own) {}
-        drop(hand);
+        while !self.work.permits.are_wanted() && self.one(&mut own) {}
+        drop(permit);
         own
     }
 
     fn empty_pile(&self) -> Pile<'r> {
-        self.turns.iter().map(|_| None).collect()
+        self.schedule.iter().map(|_| None).collect()
     }
 
     fn count(&self) -> usize {
@@ -151,36 +155,46 @@ impl<'r> Tasks<'_, 'r> {
         if task < parts {
             let mut clock = Instant::now();
             for &place in &self.by_parts {
-                let (turn, had) = self.in_pile(own, place);
-                self.look(turn, had, Some(task), &mut clock);
+                let (scheduled, had) = self.in_pile(own, place);
+                self.look(scheduled, had, Some(task), &mut clock);
             }
         } else if let Some(&place) = self.wholes.get(task - parts) {
-            let (turn, had) = self.in_pile(own, place);
-            self.look(turn, had, None, &mut Instant::now());
+            let (scheduled, had) = self.in_pile(own, place);
+            self.look(scheduled, had, None, &mut Instant::now());
         }
         task < self.count()
     }
 
     /// A checker and what this thread has of it.
-    fn in_pile<'p>(&self, pile: &'p mut Pile<'r>, place: usize) -> (&Turn<'r>, &'p mut Had<'r>) {
-        let turn = &self.turns[place];
-        let had = pile[place].get_or_insert_with(|| self.nothing_yet(turn));
-        (turn, had)
+    fn in_pile<'p>(
+        &self,
+        pile: &'p mut Pile<'r>,
+        place: usize,
+    ) -> (&ScheduledRule<'r>, &'p mut Had<'r>) {
+        let scheduled = &self.schedule[place];
+        let had = pile[place].get_or_insert_with(|| self.nothing_yet(scheduled));
+        (scheduled, had)
     }
 
     /// Has a checker look at a part, or at the whole (`None`). `clock` is when that began, and then when it
     /// ended.
-    fn look(&self, turn: &Turn<'r>, had: &mut Had<'r>, part: Option<usize>, clock: &mut Instant) {
+    fn look(
+        &self,
+        scheduled: &ScheduledRule<'r>,
+        had: &mut Had<'r>,
+        part: Option<usize>,
+        clock: &mut Instant,
+    ) {
         if had.ended.is_some() {
             return;
         }
-        self.work.listener.begins(turn.index);
+        self.work.listener.begins(scheduled.index);
         let number = part.map_or(WHOLE, |part| u32::try_from(part).unwrap_or(WHOLE));
         had.sink.turn_to(number);
         let sink = &mut had.sink;
         let looked = catch(|| match part {
-            None => self.built.run(turn.rule, sink),
-            Some(part) => self.built.each(part, turn.rule, sink),
+            None => self.built.run(scheduled.rule, sink),
+            Some(part) => self.built.each(part, scheduled.rule, sink),
         });
         let ending = match looked {
             Ok(()) => had.sink.take_ending(),
@@ -194,27 +208,32 @@ impl<'r> Tasks<'_, 'r> {
         *clock = now;
     }
 
-    fn nothing_yet(&self, turn: &Turn<'r>) -> Had<'r> {
+    fn nothing_yet(&self, scheduled: &ScheduledRule<'r>) -> Had<'r> {
         let Pass {
             values,
             not_normative,
-        } = &turn.pass;
+        } = &scheduled.pass;
         Had {
-            sink: Sink::new(self.work.subject, turn.facts, values, not_normative.clone()),
+            sink: Sink::new(
+                self.work.subject,
+                scheduled.facts,
+                values,
+                not_normative.clone(),
+            ),
             took: Duration::ZERO,
             ended: None,
         }
     }
 
     /// What a checker says, of which several threads may have something.
-    fn together(&self, turn: &Turn<'r>, mut found: Vec<Had<'r>>) -> Looked {
+    fn together(&self, scheduled: &ScheduledRule<'r>, mut found: Vec<Had<'r>>) -> Looked {
         let mut had = match found.len() {
-            0 => self.nothing_yet(turn),
+            0 => self.nothing_yet(scheduled),
             1 => found.remove(0),
-            _ => merged(found).unwrap_or_else(|| self.alone(turn)),
+            _ => merged(found).unwrap_or_else(|| self.alone(scheduled)),
         };
-        if turn.rule.goes_by_parts() {
-            self.look(turn, &mut had, None, &mut Instant::now());
+        if scheduled.rule.goes_by_parts() {
+            self.look(scheduled, &mut had, None, &mut Instant::now());
         }
         let Had {
             mut sink,
@@ -226,7 +245,7 @@ impl<'r> Tasks<'_, 'r> {
         let ending = ended.map_or(Ending::Completed, |(_, ending)| ending);
         let outcome = Outcome {
             ending,
-            params: turn.pass.values.listed(),
+            params: scheduled.pass.values.listed(),
             metadata,
             took,
         };
@@ -234,11 +253,11 @@ impl<'r> Tasks<'_, 'r> {
     }
 
     /// Has a checker look at all parts, in this thread.
-    fn alone(&self, turn: &Turn<'r>) -> Had<'r> {
-        let mut had = self.nothing_yet(turn);
+    fn alone(&self, scheduled: &ScheduledRule<'r>) -> Had<'r> {
+        let mut had = self.nothing_yet(scheduled);
         let mut clock = Instant::now();
         for part in 0..self.built.parts() {
-            self.look(turn, &mut had, Some(part), &mut clock);
+            self.look(scheduled, &mut had, Some(part), &mut clock);
         }
         had
     }

@@ -253,9 +253,9 @@ fn end_tag(element: &Element) -> Result<Range<usize>, String> {
 fn opened(text: &str, element: &Element, xml: &str) -> (Range<usize>, String) {
     let tag = &text[element.start_tag.clone()];
     let slash = tag.rfind('/').unwrap_or(tag.len());
-    let kept = tag[..slash].trim_end().len();
-    let (gap, name) = (gap(&tag[kept..slash]), &text[element.name.clone()]);
-    let range = element.start_tag.start + kept..element.start_tag.end;
+    let cached = tag[..slash].trim_end().len();
+    let (gap, name) = (gap(&tag[cached..slash]), &text[element.name.clone()]);
+    let range = element.start_tag.start + cached..element.start_tag.end;
     (range, format!("{gap}>{xml}</{name}>"))
 }
 

@@ -63,9 +63,9 @@ impl Storage {
             }
             Storage::Cut(count) => {
                 let all: Vec<&str> = text.split('\n').collect();
-                let kept = all.len().checked_sub(*count);
-                let kept = kept.ok_or("it has not so many lines")?;
-                all[..kept].join("\n").into_bytes()
+                let cached = all.len().checked_sub(*count);
+                let cached = cached.ok_or("it has not so many lines")?;
+                all[..cached].join("\n").into_bytes()
             }
         };
         if changed == bytes {

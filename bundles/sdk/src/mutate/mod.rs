@@ -37,13 +37,13 @@ pub fn in_parallel<D: Default, T: Sync, R: Send>(
 ) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let worker = || {
-        let (mut desk, mut done) = (D::default(), Vec::new());
+        let (mut cli, mut done) = (D::default(), Vec::new());
         loop {
             let at = next.fetch_add(1, Ordering::Relaxed);
             let Some(item) = items.get(at) else {
                 return done;
             };
-            done.push((at, work(&mut desk, item)));
+            done.push((at, work(&mut cli, item)));
         }
     };
     let threads = std::thread::available_parallelism().map_or(1, usize::from);

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use lexopt::ValueExt as _;
 
 use super::{BusOptions, Format, Mode};
-use crate::Hands;
+use crate::Permits;
 
 /// What a bundle's arguments are.
 pub const USAGE: &str = "\
@@ -80,7 +80,7 @@ pub(super) fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Mode, U
     if timings && file.is_none() {
         return Err(UsageError::Lacks("--timings", "FILE"));
     }
-    let threads = threads.unwrap_or_else(Hands::available);
+    let threads = threads.unwrap_or_else(Permits::available);
     match (file, config) {
         (Some(_), Some(_)) => Err(UsageError::Conflict("FILE", "-c")),
         (Some(_), None) if on_bus => Err(UsageError::Conflict("FILE", "--instance")),
@@ -107,7 +107,7 @@ pub(super) fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Mode, U
 
 fn threads_of(text: &str) -> Option<usize> {
     let number = text.parse().ok();
-    number.filter(|number| (1..=Hands::MOST).contains(number))
+    number.filter(|number| (1..=Permits::MOST).contains(number))
 }
 
 #[cfg(test)]
@@ -128,7 +128,7 @@ mod tests {
                 format: Format::Json,
                 timings: false,
                 schema_dir: None,
-                threads: Hands::available(),
+                threads: Permits::available(),
             })
         );
         let timed = of(&["a.xodr", "--timings"]);
@@ -141,7 +141,7 @@ mod tests {
             Ok(Mode::Module {
                 config: "c.xml".into(),
                 schema_dir: Some("own".into()),
-                threads: Hands::available(),
+                threads: Permits::available(),
             })
         );
         let Ok(Mode::Bus(options)) =

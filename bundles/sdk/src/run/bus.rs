@@ -21,11 +21,11 @@ use super::Exit;
 use super::batches::{batches, batches_of_ends};
 use super::file::complain;
 use super::module::configured;
-use super::stand::{Ended, Fence, Sessions, Stand, sandboxed};
+use super::stand::{Ended, Sandbox, Sessions, Stand, sandboxed};
 use super::worker::{CheckerAtWork, Finished, Work, Workers};
-use crate::kept::KeptModels;
+use crate::cached::CachedModels;
 use crate::subject::LinkedImage;
-use crate::{Bundle, Hands, Outcome, Plan, UserFiles};
+use crate::{Bundle, Outcome, Permits, Plan, UserFiles};
 
 /// How a bundle joins the bus.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -57,7 +57,7 @@ pub struct OwnFiles {
     pub lists: Vec<PathBuf>,
     /// What its manifest declares is for processes that it has started before it joined: it does without all of
     /// that itself.
-    pub modest: bool,
+    pub restricted: bool,
 }
 
 impl Default for BusOptions {
@@ -69,7 +69,7 @@ impl Default for BusOptions {
             die_with_parent: false,
             schema_dir: None,
             no_sandbox: false,
-            threads: Hands::available(),
+            threads: Permits::available(),
             own: OwnFiles::default(),
         }
     }
@@ -216,9 +216,9 @@ async fn serve(
     // Before the first thread is started: threads that there are already would stay outside.
     let heard = until_configured(&mut peer).await;
     let named = || files_of(bundle, given.as_ref(), &peer, &ready);
-    let fence = stand.confine(peer.memory(), named, own);
+    let sandbox = stand.confine(peer.memory(), named, own);
     let (sender, mut progress) = mpsc::unbounded_channel();
-    let models = KeptModels::default();
+    let models = CachedModels::default();
     let threads = usize::from(threads);
     let workers = match Workers::start(threads, models.clone(), sender) {
         Ok(workers) => workers,
@@ -241,7 +241,7 @@ async fn serve(
         asked_for: None,
         draining: false,
         stopped: false,
-        fence,
+        sandbox,
         outgrown: false,
     };
     for event in heard {
@@ -333,7 +333,7 @@ struct Daemon {
     ready: Ready,
     peer: Peer,
     workers: Workers,
-    models: KeptModels,
+    models: CachedModels,
     /// Each configuration and what it demands; made once, unless files that it names change.
     plans: BTreeMap<Digest, (Option<Config>, Arc<Plan>)>,
     waiting: VecDeque<Job>,
@@ -347,7 +347,7 @@ struct Daemon {
     /// Told to stop by a person.
     stopped: bool,
     /// What it may read, when it is confined.
-    fence: Option<Fence>,
+    sandbox: Option<Sandbox>,
     /// The configuration names files that this process cannot read any more.
     outgrown: bool,
 }
@@ -560,8 +560,8 @@ impl Daemon {
             let (config, given) = (config.as_ref(), self.given.as_ref());
             Arc::new(configured(self.bundle, config, given))
         };
-        if let Some(fence) = &self.fence
-            && let Some(outside) = plan.files().iter().find(|it| fence.keeps_out(it))
+        if let Some(sandbox) = &self.sandbox
+            && let Some(outside) = plan.files().iter().find(|it| sandbox.keeps_out(it))
         {
             let file = outside.display();
             tracing::info!(%file, "the configuration names files that only a fresh process may read");

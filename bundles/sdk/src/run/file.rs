@@ -15,7 +15,7 @@ use qcbus_messages::path_text::to_text;
 use qcbus_messages::shown;
 
 use super::{Exit, Timings};
-use crate::Hands;
+use crate::Permits;
 use crate::pages::level_name;
 use crate::{BUILD_DATE, Bundle, Listener, Loaded, Outcome, Plan, UserFiles, check_with};
 
@@ -43,7 +43,7 @@ pub(super) fn run(
     bundle: &'static Bundle,
     path: &Path,
     (format, timings): (Format, bool),
-    (hands, given): (&Hands, Option<&UserFiles>),
+    (permits, given): (&Permits, Option<&UserFiles>),
 ) -> Exit {
     let boundary = path
         .parent()
@@ -68,7 +68,7 @@ pub(super) fn run(
         pooled,
         reasons,
         took,
-    } = match judge(&plan, &loaded, hands) {
+    } = match judge(&plan, &loaded, permits) {
         Ok(judged) => judged,
         Err(error) => {
             complain(&format!("failed to {error}\n"));
@@ -101,7 +101,7 @@ pub fn findings(
     loaded: &Loaded,
     from: Level,
 ) -> Result<(String, Verdict), crate::LoadError> {
-    let Judged { mut pooled, .. } = judge(plan, loaded, &Hands::new(1))?;
+    let Judged { mut pooled, .. } = judge(plan, loaded, &Permits::new(1))?;
     let verdict = pooled.verdict();
     for bundle in &mut pooled.results.bundles {
         for checker in &mut bundle.checkers {
@@ -119,8 +119,8 @@ struct Judged {
 }
 
 /// Checks a file and pools what was found, as a broker does without a configuration.
-fn judge(plan: &Plan, loaded: &Loaded, hands: &Hands) -> Result<Judged, crate::LoadError> {
-    let (outcome, took) = examine_timed(plan, loaded, hands)?;
+fn judge(plan: &Plan, loaded: &Loaded, permits: &Permits) -> Result<Judged, crate::LoadError> {
+    let (outcome, took) = examine_timed(plan, loaded, permits)?;
     let mut reasons: BTreeMap<Text, String> = outcome
         .checkers
         .iter()
@@ -151,17 +151,17 @@ fn judge(plan: &Plan, loaded: &Loaded, hands: &Hands) -> Result<Judged, crate::L
 /// # Errors
 /// When the image that was built cannot be opened.
 pub fn examine(plan: &Plan, loaded: &Loaded) -> Result<BundleOutcome, crate::LoadError> {
-    examine_timed(plan, loaded, &Hands::new(1)).map(|(outcome, _)| outcome)
+    examine_timed(plan, loaded, &Permits::new(1)).map(|(outcome, _)| outcome)
 }
 
-/// The same as [`examine`] with as many threads as there are `hands`, and what every checker took.
+/// The same as [`examine`] with as many threads as there are `permits`, and what every checker took.
 ///
 /// # Errors
 /// When the image that was built cannot be opened.
 pub fn examine_timed(
     plan: &Plan,
     loaded: &Loaded,
-    hands: &Hands,
+    permits: &Permits,
 ) -> Result<(BundleOutcome, Timings), crate::LoadError> {
     let bundle = plan.bundle();
     let start = Instant::now();
@@ -171,7 +171,7 @@ pub fn examine_timed(
         checkers: Vec::new(),
         timings: Timings::default(),
     };
-    check_with(plan, &subject, hands, &mut collected);
+    check_with(plan, &subject, permits, &mut collected);
     let mut timings = collected.timings;
     timings.whole = start.elapsed();
     collected.checkers.sort_by_key(|(index, _)| *index);

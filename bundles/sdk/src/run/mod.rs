@@ -21,7 +21,7 @@ pub use file::{Format, examine, examine_timed, findings};
 pub use qcbus_bus::lasting_stderr;
 pub use timings::Timings;
 
-use crate::{Bundle, Hands, UserFiles};
+use crate::{Bundle, Permits, UserFiles};
 
 /// How a bundle is to run.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -103,15 +103,15 @@ pub fn run(bundle: &'static Bundle, mode: Mode) -> Exit {
             schema_dir,
             threads,
         } => with_files(bundle, schema_dir.as_deref(), |given| {
-            let hands = Hands::new(threads);
-            file::run(bundle, &path, (format, timings), (&hands, given))
+            let permits = Permits::new(threads);
+            file::run(bundle, &path, (format, timings), (&permits, given))
         }),
         Mode::Module {
             config,
             schema_dir,
             threads,
         } => with_files(bundle, schema_dir.as_deref(), |given| {
-            module::run(bundle, &config, &Hands::new(threads), given)
+            module::run(bundle, &config, &Permits::new(threads), given)
         }),
         Mode::Help => {
             // Whoever asked for it sees that it is not there.

@@ -9,7 +9,7 @@ use qcbus_messages::path_text::to_text;
 
 use super::Exit;
 use super::file::{complain, examine_timed};
-use crate::{BUILD_DATE, Bundle, Checker, Hands, Loaded, Plan, UserFiles};
+use crate::{BUILD_DATE, Bundle, Checker, Loaded, Permits, Plan, UserFiles};
 
 /// The bundle's parameters that name its result, the framework's first.
 const RESULT_PARAMS: [&str; 2] = ["strResultFile", "resultFile"];
@@ -42,10 +42,10 @@ enum ModuleError {
 pub(super) fn run(
     bundle: &'static Bundle,
     config: &Path,
-    hands: &Hands,
+    permits: &Permits,
     given: Option<&UserFiles>,
 ) -> Exit {
-    match module(bundle, config, hands, given) {
+    match module(bundle, config, permits, given) {
         Ok(()) => Exit::Accepted,
         Err(error) => {
             complain(&format!("failed to {error}\n"));
@@ -57,7 +57,7 @@ pub(super) fn run(
 fn module(
     bundle: &'static Bundle,
     path: &Path,
-    hands: &Hands,
+    permits: &Permits,
     given: Option<&UserFiles>,
 ) -> Result<(), ModuleError> {
     let bytes = std::fs::read(path).map_err(|source| ModuleError::Unreadable {
@@ -86,7 +86,7 @@ fn module(
     } else {
         Plan::new(bundle, |_| false, |_, _| None)
     };
-    let bundles = vec![examine_timed(&plan, &loaded, hands)?.0];
+    let bundles = vec![examine_timed(&plan, &loaded, permits)?.0];
     let remarks = if bundle.kinds.contains(&loaded.kind()) {
         loaded.remarks(&bundles)?
     } else {

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use qcbus_bus::{Instance, PeerOptions, Voice};
-use qcbus_confine::{After, Fenced, Orders, keep};
+use qcbus_bus::{Instance, PeerOptions, SendSide};
+use qcbus_confine::{After, Sandboxed, Orders, run_sessions};
 use qcbus_formats::manifest::May;
 
 use super::file::complain;
@@ -52,37 +52,37 @@ impl Stand<'_> {
         memory: Option<&Path>,
         reads: impl FnOnce() -> Vec<PathBuf>,
         own: &OwnFiles,
-    ) -> Option<Fence> {
+    ) -> Option<Sandbox> {
         let may = self.may?;
-        let fenced = Fenced {
+        let sandboxed = Sandboxed {
             memory: memory.map(Path::to_path_buf),
             reads: [reads(), own.reads.clone()].concat(),
             lists: own.lists.clone(),
-            may: if own.modest {
+            may: if own.restricted {
                 May::default()
             } else {
                 may.clone()
             },
         };
         // Before: what comes in between is taken for something else, and a fresh process reads it.
-        let fence = Fence::around(&fenced.reads);
-        if let Err(error) = qcbus_confine::confine(&fenced) {
+        let sandbox = Sandbox::around(&sandboxed.reads);
+        if let Err(error) = qcbus_confine::confine(&sandboxed) {
             tracing::warn!(%error, "this bundle is not wholly confined");
         }
-        Some(fence)
+        Some(sandbox)
     }
 }
 
 /// Files and directories that a confined process may read, as they were when it was confined.
-pub(super) struct Fence(Vec<(PathBuf, Identity)>);
+pub(super) struct Sandbox(Vec<(PathBuf, Identity)>);
 
 /// Device and inode.
 type Identity = (u64, u64);
 
-impl Fence {
-    fn around(paths: &[PathBuf]) -> Fence {
+impl Sandbox {
+    fn around(paths: &[PathBuf]) -> Sandbox {
         let known = |path: &PathBuf| Some((path.clone(), identity(path)?));
-        Fence(paths.iter().filter_map(known).collect())
+        Sandbox(paths.iter().filter_map(known).collect())
     }
 
     /// Whether something lies at the path now that only a fresh process may read. Looking is never forbidden.
@@ -123,7 +123,7 @@ pub(super) fn sandboxed(
             return Exit::Usage;
         }
     };
-    let voice = Voice::take();
+    let voice = SendSide::take();
     let stand = |number, may| Stand {
         instance,
         number,
@@ -142,19 +142,19 @@ pub(super) fn sandboxed(
         return once(Some(may));
     }
     // The process that keeps them outlives the broker; only the first has not been heard yet.
-    voice.iter().for_each(Voice::lasts);
-    let kept = keep(!sessions.supervised, |number| {
+    voice.iter().for_each(SendSide::lasts);
+    let ended = run_sessions(!sessions.supervised, |number| {
         voice
             .iter()
             .filter(|_| number == 0)
-            .for_each(Voice::is_heard);
+            .for_each(SendSide::is_heard);
         match session(stand(number, Some(may))) {
             Ended::With(exit) => After::End(exit.code()),
             Ended::Again => After::Again,
         }
     });
-    match kept {
-        Ok(kept) => kept.end(),
+    match ended {
+        Ok(ended) => ended.end(),
         Err(error) => tracing::warn!(%error, "this bundle is not confined"),
     }
     once(None)

@@ -1,5 +1,5 @@
 //! The threads that check, so that the loop on the bus stays free to talk: each takes one job after the
-//! other. Those that have none lend a hand to large jobs (`crate::hands`).
+//! other. Those that have none lend a hand to large jobs (`crate::permits`).
 
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -12,9 +12,9 @@ use qcbus_formats::xqar::Issue;
 use qcbus_messages::{Link, MissingDocument};
 use tokio::sync::mpsc;
 
+use crate::cached::{CachedModels, JobModels};
 use crate::check::catch;
-use crate::hands::Hands;
-use crate::kept::{JobModels, KeptModels};
+use crate::permits::Permits;
 use crate::subject::LinkedImage;
 use crate::{Listener, Outcome, Plan, Subject, check_with};
 
@@ -65,8 +65,8 @@ pub(super) struct Workers {
 
 struct Shared {
     jobs: Mutex<Receiver<Box<Work>>>,
-    hands: Hands,
-    models: KeptModels,
+    permits: Permits,
+    models: CachedModels,
     progress: mpsc::UnboundedSender<Finished>,
     /// Jobs that were given and are not done.
     busy: AtomicUsize,
@@ -79,14 +79,14 @@ impl Workers {
     /// # Errors
     /// When no thread can be started.
     pub fn start(
-        hands: usize,
-        models: KeptModels,
+        permits: usize,
+        models: CachedModels,
         progress: mpsc::UnboundedSender<Finished>,
     ) -> std::io::Result<Workers> {
         let (jobs, receiver) = channel();
         let shared = Arc::new(Shared {
             jobs: Mutex::new(receiver),
-            hands: Hands::idle(hands),
+            permits: Permits::idle(permits),
             models,
             progress,
             busy: AtomicUsize::new(0),
@@ -102,7 +102,7 @@ impl Workers {
 
     /// How many jobs are checked at the same time.
     pub fn count(&self) -> usize {
-        self.shared.hands.count()
+        self.shared.permits.count()
     }
 
     /// Has a job checked. `false`: there is nobody who could.
@@ -135,14 +135,14 @@ impl Shared {
             let Ok(work) = next else { return };
             // The documents are let go before the broker hears that the job is done, but for those of a
             // few models.
-            let hand = self.hands.take();
+            let permit = self.permits.take();
             // Rules and models may panic, which is theirs. Should anything else, the job has an answer all the same.
             let finished = catch(|| finish(&work, self)).unwrap_or_else(|panic| Finished {
                 run: work.run,
                 micros: 0,
                 outcome: Err(format!("the bundle panicked: {panic}")),
             });
-            drop((hand, work));
+            drop((permit, work));
             self.busy.fetch_sub(1, Ordering::Relaxed);
             if self.progress.send(finished).is_err() {
                 return;
@@ -196,7 +196,7 @@ fn one(
         work,
         ended: Vec::new(),
     };
-    check_with(&work.plan, &subject, &shared.hands, &mut heard);
+    check_with(&work.plan, &subject, &shared.permits, &mut heard);
     Ok(heard.ended)
 }
 

@@ -126,14 +126,14 @@ impl Trial<'_> {
 }
 
 /// What one thread works with.
-pub struct Desk {
+pub struct Cli {
     overlay: Overlay,
     /// By the base's name.
     plans: BTreeMap<&'static str, Plan>,
 }
 
-impl Default for Desk {
-    fn default() -> Desk {
+impl Default for Cli {
+    fn default() -> Cli {
         let plan = |base: &Base| {
             let with = |rule: &str| base.with.iter().any(|start| rule.starts_with(start));
             Plan::new(
@@ -142,14 +142,14 @@ impl Default for Desk {
                 |_, _| None,
             )
         };
-        Desk {
+        Cli {
             overlay: Overlay::of(Path::new(WORLD)).unwrap(),
             plans: BASES.iter().map(|base| (base.name, plan(base))).collect(),
         }
     }
 }
 
-impl Desk {
+impl Cli {
     /// What is said of a base as it is.
     pub fn unedited(&mut self, base: &Base) -> Result<Vec<Said>, String> {
         let file = format!("{}.xosc", base.name);

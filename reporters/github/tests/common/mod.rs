@@ -9,7 +9,7 @@ use qcbus_messages::ResultMessage;
 use qcbus_report_github::{Annotations, Section};
 use qcbus_reporter_sdk::samples;
 pub use qcbus_reporter_sdk::samples::{blocked, checker, result};
-use qcbus_reporter_sdk::{Destination, NoSources, ReportForm as _, Subject};
+use qcbus_reporter_sdk::{Destination, NoSources, ReportFormat as _, Subject};
 
 pub fn issue(level: Level, rule: &str, text: &str, row: u64) -> Issue {
     samples::issue(

@@ -9,7 +9,7 @@ use qcbus_messages::ResultMessage;
 use qcbus_report_junit::Suites;
 use qcbus_reporter_sdk::samples;
 pub use qcbus_reporter_sdk::samples::{blocked, checker, result};
-use qcbus_reporter_sdk::{Destination, NoSources, ReportError, ReportForm as _, Subject};
+use qcbus_reporter_sdk::{Destination, NoSources, ReportError, ReportFormat as _, Subject};
 
 use markup::Element;
 

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use qcbus_bus::{Instance, Process};
 use qcbus_messages::control::{Request, Response};
 
-use super::{SOCKET, others, place, same};
+use super::{SOCKET, file_view, others, place};
 
 /// Why a broker could not be asked.
 #[derive(Debug, thiserror::Error)]
@@ -119,7 +119,7 @@ impl Line {
 
     /// Whether the broker is this very program, with the rights of this process, and sees the files that it sees.
     pub fn is_like_us(&self) -> bool {
-        self.process.as_ref().is_some_and(same::is_like_us)
+        self.process.as_ref().is_some_and(file_view::is_like_us)
     }
 
     /// Asks one thing after the other. Blocks until it is answered.

@@ -126,7 +126,7 @@ impl Clients {
                 self.let_in(number, stream);
             } else {
                 let clients = self.bounds.clients;
-                turn_away(
+                refuse(
                     &stream,
                     format!("the broker serves {clients} clients already"),
                 );
@@ -173,21 +173,21 @@ impl Clients {
             go: go.clone(),
         };
         self.there().insert(number, client);
-        let visit = Visit {
+        let connection = Connection {
             clients: self.clone(),
             number,
         };
-        tokio::spawn(serve(visit, stream, go));
+        tokio::spawn(serve(connection, stream, go));
     }
 }
 
 /// One client among all; it is counted until this is dropped, in whatever way.
-struct Visit {
+struct Connection {
     clients: Arc<Clients>,
     number: u64,
 }
 
-impl Visit {
+impl Connection {
     fn enter(&self, stage: Stage) {
         if let Some(client) = self.clients.there().get_mut(&self.number) {
             (client.stage, client.since) = (stage, Instant::now());
@@ -202,18 +202,18 @@ impl Visit {
     }
 }
 
-impl Drop for Visit {
+impl Drop for Connection {
     fn drop(&mut self) {
         self.clients.there().remove(&self.number);
         self.clients.gone.notify_one();
     }
 }
 
-async fn serve(visit: Visit, stream: UnixStream, go: Arc<Notify>) {
-    let bounds = visit.clients.bounds;
+async fn serve(connection: Connection, stream: UnixStream, go: Arc<Notify>) {
+    let bounds = connection.clients.bounds;
     let mut stream = BufReader::new(stream);
     loop {
-        visit.enter(Stage::Silent);
+        connection.enter(Stage::Silent);
         let read = tokio::select! {
             read = timeout(bounds.request_within, read_line(&mut stream)) => read,
             () = go.notified() => Ok(Err(made_room(&bounds))),
@@ -222,14 +222,14 @@ async fn serve(visit: Visit, stream: UnixStream, go: Arc<Notify>) {
             Ok(Ok(Some(line))) => line,
             Ok(Ok(None)) => return,
             // Whoever says nothing, or what is no request, gets no other chance.
-            Ok(Err(reason)) => return turn_away(stream.get_ref(), reason),
+            Ok(Err(reason)) => return refuse(stream.get_ref(), reason),
             Err(_) => {
                 let seconds = bounds.request_within.as_secs();
                 let reason = format!("no request came within {seconds} s");
-                return turn_away(stream.get_ref(), reason);
+                return refuse(stream.get_ref(), reason);
             }
         };
-        let Some(response) = answer(&visit, &line, stream.get_ref()).await else {
+        let Some(response) = answer(&connection, &line, stream.get_ref()).await else {
             return;
         };
         let Ok(mut text) = serde_json::to_vec(&response) else {
@@ -237,7 +237,7 @@ async fn serve(visit: Visit, stream: UnixStream, go: Arc<Notify>) {
         };
         drop(response);
         text.push(b'\n');
-        visit.enter(Stage::Reading);
+        connection.enter(Stage::Reading);
         let written = tokio::select! {
             written = timeout(bounds.answer_within, stream.get_mut().write_all(&text)) => written,
             () = go.notified() => return,
@@ -270,7 +270,7 @@ async fn read_line(stream: &mut BufReader<UnixStream>) -> Result<Option<Vec<u8>>
 }
 
 /// The answer to a request; `None` when the client has left before there was one.
-async fn answer(visit: &Visit, line: &[u8], stream: &UnixStream) -> Option<Response> {
+async fn answer(connection: &Connection, line: &[u8], stream: &UnixStream) -> Option<Response> {
     let request = match serde_json::from_slice(line) {
         Ok(request) => request,
         Err(error) => {
@@ -282,8 +282,8 @@ async fn answer(visit: &Visit, line: &[u8], stream: &UnixStream) -> Option<Respo
         request,
         Request::Wait { .. } | Request::WaitReported { .. } | Request::Check { .. } | Request::Down
     );
-    if takes_long && !visit.may_wait() {
-        let waiting = visit.clients.bounds.waiting;
+    if takes_long && !connection.may_wait() {
+        let waiting = connection.clients.bounds.waiting;
         let reason = format!(
             "{waiting} clients wait for verdicts already, as many as this broker may have; ask again when \
              some have theirs, or start the broker with a higher limit of open files (`ulimit -n`)"
@@ -296,13 +296,18 @@ async fn answer(visit: &Visit, line: &[u8], stream: &UnixStream) -> Option<Respo
             _ => {}
         }
     }
-    visit.enter(if takes_long {
+    connection.enter(if takes_long {
         Stage::Waiting
     } else {
         Stage::Asking
     });
     let (answer, mut answered) = oneshot::channel();
-    if visit.clients.inbox.send(Asked { request, answer }).is_err() {
+    if connection
+        .clients
+        .inbox
+        .send(Asked { request, answer })
+        .is_err()
+    {
         return Some(Response::Stopped);
     }
     loop {
@@ -326,7 +331,7 @@ fn has_left(stream: &UnixStream) -> bool {
 }
 
 /// Says why, if the client is there to read it, and does not wait for that.
-fn turn_away(stream: &UnixStream, reason: String) {
+fn refuse(stream: &UnixStream, reason: String) {
     if let Ok(mut text) = serde_json::to_vec(&Response::Failed { reason }) {
         text.push(b'\n');
         // Whoever does not read has itself to blame.

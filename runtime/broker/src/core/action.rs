@@ -8,9 +8,9 @@ use std::time::Duration;
 use qcbus_messages::control::Response;
 use qcbus_messages::{JobId, ToPeer};
 
-use super::jury::Member;
 use super::notice::Notice;
-use super::types::{ChildSpec, Delivery, FinishedJob, Judged, Launch, SessionId, Stamp, Ticket};
+use super::required_set::Member;
+use super::types::{ChildSpec, Delivery, FinishedJob, Judged, Launch, RequestId, SessionId, Stamp};
 
 /// Everything that the state machine wants done.
 #[derive(Debug)]
@@ -78,7 +78,7 @@ pub enum Action {
         launch: Launch,
     },
     /// Kill what former brokers of this instance started and what has not come to this one.
-    KillFormer {
+    KillStaleChildren {
         /// The starts of those that have joined.
         joined: BTreeSet<Launch>,
     },
@@ -137,7 +137,7 @@ pub enum Action {
     /// Answer a client.
     Answer {
         /// The client.
-        ticket: Ticket,
+        request_id: RequestId,
         /// The answer.
         response: Response,
     },

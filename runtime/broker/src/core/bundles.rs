@@ -8,11 +8,11 @@ use qcbus_messages::shown::moves;
 use qcbus_messages::{Catalogue, DocId, FromPeer, Hello, IS_STOPPING, JobId, Role, ToPeer};
 
 use super::action::Action;
-use super::announcing::Announced;
-use super::jury::{Mark, Member, Origin};
-use super::leaving::LEAVE_LIMIT;
+use super::draining::LEAVE_LIMIT;
 use super::notice::Notice;
 use super::queue::Queue;
+use super::registration::Registration;
+use super::required_set::{Member, Origin, VersionDigest};
 use super::types::{Launch, SessionId};
 use super::{Actions, State};
 
@@ -26,15 +26,15 @@ pub(super) struct Bundle {
     pub launch: Option<Launch>,
     pub catalogue: Option<Arc<Catalogue>>,
     /// What it says that it is, while it is not believed.
-    pub announced: Option<Announced>,
+    pub registered: Option<Registration>,
     /// What was started when it was believed last.
-    pub believed: Option<u64>,
+    pub accepted_spec: Option<u64>,
     /// Documents that it lacked, and when it said so last.
     pub lacks: BTreeMap<DocId, Duration>,
     /// What brought it onto the roster; `None`: it is not on it, and nobody misses it.
     pub origin: Option<Origin>,
     /// Of the version and the catalogue that it is on the roster with.
-    pub mark: Option<Mark>,
+    pub version_digest: Option<VersionDigest>,
     pub ready: bool,
     pub capacity: usize,
     /// As it says; only told.
@@ -45,7 +45,7 @@ pub(super) struct Bundle {
     pub proved: bool,
     pub active: BTreeMap<JobId, Given>,
     pub queue: Queue,
-    pub suspects: VecDeque<JobId>,
+    pub quarantine: VecDeque<JobId>,
     /// The highest job that this session was given.
     pub highest: Option<JobId>,
     /// Jobs given in this session.
@@ -58,7 +58,7 @@ pub(super) struct Bundle {
     /// Since when nobody of this name is there.
     pub away_since: Option<Duration>,
     /// It leaves by drain and takes no part in new jobs.
-    pub leaving: bool,
+    pub draining: bool,
     pub done: u64,
     pub offences: u32,
     pub note: String,
@@ -104,8 +104,8 @@ impl Bundle {
     }
 
     /// A job waits for this bundle.
-    pub fn expect(&mut self, id: JobId, is_errand: bool) {
-        self.queue.push(id, is_errand);
+    pub fn expect(&mut self, id: JobId, is_on_demand: bool) {
+        self.queue.push(id, is_on_demand);
     }
 
     /// Notes that the bundle has got a job.
@@ -154,7 +154,7 @@ impl State {
             actions.push(Action::Refuse { session, reason });
             return;
         }
-        if let Some(reason) = self.turn_away(hello) {
+        if let Some(reason) = self.refuse(hello) {
             self.notice(Notice::TurnedAway(reason.clone()), actions);
             actions.push(Action::Refuse { session, reason });
             return;
@@ -165,7 +165,7 @@ impl State {
         }
     }
 
-    fn turn_away(&self, hello: &Hello) -> Option<String> {
+    fn refuse(&self, hello: &Hello) -> Option<String> {
         let ours = qcbus_messages::PROTOCOL_VERSION;
         let good = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
         let known = || match hello.role {
@@ -253,13 +253,13 @@ impl State {
         bundle.pid = hello.pid;
         bundle.launch = launch;
         bundle.ready = false;
-        bundle.announced = None;
+        bundle.registered = None;
         bundle.lacks.clear();
         bundle.capacity = usize::from(hello.capacity).clamp(1, 64);
         bundle.threads = hello.threads;
         bundle.fresh_process = true;
         bundle.proved = false;
-        bundle.leaving = false;
+        bundle.draining = false;
         (bundle.highest, bundle.given) = (None, 0);
         (bundle.heard, bundle.moved, bundle.joined) = (now, now, now);
         bundle.away_since = None;
@@ -376,7 +376,7 @@ impl State {
         }
         (bundle.ready, bundle.away_since) = (false, Some(self.now));
         bundle.note = "it has left".to_owned();
-        let stays = bundle.origin == Some(Origin::Supervised) && !bundle.leaving;
+        let stays = bundle.origin == Some(Origin::Supervised) && !bundle.draining;
         self.take_back(name, false);
         self.child_left(name);
         // At the broker's own end nobody leaves the roster, nor does a child whose manifest is there.
@@ -421,11 +421,11 @@ impl State {
         bundle.away_since = Some(self.now);
         bundle.note = notice.why();
         let (proved, why) = (bundle.proved, bundle.note.clone());
-        let nobody_misses_it = bundle.origin.is_none() || bundle.leaving;
+        let nobody_misses_it = bundle.origin.is_none() || bundle.draining;
         self.notice(notice, actions);
         self.take_back(name, true);
         self.condemn(name, &why);
-        self.turn_away_suspects(actions);
+        self.refuse_quarantined(actions);
         self.child_down(name, proved, &why, actions);
         if nobody_misses_it && !self.children.contains_key(name) {
             self.drop_bundle(name, actions);
@@ -446,10 +446,10 @@ impl State {
         let since = |then: Duration| self.now.saturating_sub(then);
         let (deadline, silence) = (self.settings.job_deadline, self.settings.silence_limit);
         let still = since(bundle.moved);
-        if bundle.leaving && bundle.active.is_empty() && still > LEAVE_LIMIT {
+        if bundle.draining && bundle.active.is_empty() && still > LEAVE_LIMIT {
             return Some("it was told to go and did not".to_owned());
         }
-        if bundle.announced.is_some() {
+        if bundle.registered.is_some() {
             return None;
         }
         if !bundle.ready {

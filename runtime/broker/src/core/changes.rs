@@ -60,8 +60,8 @@ impl State {
         for dependent in self.files.dependents(path) {
             let read = self.reading_of(dependent, path);
             if matches!(read, Some(Dependence::Read { stamp: read, .. }) if read != stamp) {
-                self.shut(dependent, actions);
-                self.doubt_until_settled(dependent);
+                self.unpublish(dependent, actions);
+                self.stale_until_settled(dependent);
             }
         }
         let Some(id) = self.files.id(path) else {
@@ -70,20 +70,20 @@ impl State {
         let judged = self.files.get(id).and_then(|it| it.judged.as_ref());
         let read = judged.and_then(|it| it.inputs.first()?.content.stamp());
         if read != stamp {
-            self.shut(id, actions);
+            self.unpublish(id, actions);
             if let Some(entry) = self.files.get_mut(id) {
-                entry.doubted = true;
+                entry.stale = true;
             }
         }
     }
 
     /// Something that a verdict depends on is being written to: nobody is told the verdict before that has settled.
     /// A job that is under way finds out by itself, when it is stored.
-    fn doubt_until_settled(&mut self, id: FileId) {
+    fn stale_until_settled(&mut self, id: FileId) {
         if let Some(entry) = self.files.get_mut(id)
             && !matches!(entry.stage(), Stage::Active(_))
         {
-            entry.doubted = true;
+            entry.stale = true;
         }
     }
 
@@ -101,11 +101,11 @@ impl State {
                 Some(Dependence::ByLink) => {}
                 Some(Dependence::Read { stamp: read, racy }) if read == Some(stamp) => {
                     let entry = self.files.get(dependent);
-                    if racy || entry.is_some_and(|it| it.doubted) {
+                    if racy || entry.is_some_and(|it| it.stale) {
                         self.look_again(dependent);
                     }
                 }
-                Some(Dependence::Read { .. }) | None => self.doubt(dependent, actions),
+                Some(Dependence::Read { .. }) | None => self.make_stale(dependent, actions),
             }
         }
     }
@@ -146,7 +146,7 @@ impl State {
         {
             entry.touched = true;
             let read = self.jobs.get(&job).and_then(|job| job.prepared.as_ref());
-            entry.doubted |= read.is_some_and(|it| it.racy);
+            entry.stale |= read.is_some_and(|it| it.racy);
         }
         self.settled(path, stamp, actions);
     }
@@ -168,14 +168,14 @@ impl State {
         let as_judged = read == Some(stamp);
         let at_work = !matches!(entry.stage(), Stage::Idle);
         let same = entry.present && entry.stamp == stamp && (as_judged || at_work);
-        let is_doubted = entry.doubted && !at_work;
+        let is_stale = entry.stale && !at_work;
         entry.stamp = stamp;
         entry.asked = self.now;
         self.is_there(id);
         if !as_judged {
-            self.shut(id, actions);
+            self.unpublish(id, actions);
         }
-        if !same || racy || is_doubted {
+        if !same || racy || is_stale {
             self.changed(id);
         }
         if !same {
@@ -186,8 +186,8 @@ impl State {
 
     /// Something that the verdict on a file depends on is not what it was. The file's own stamp
     /// does not tell, so the verdict is doubted: it stands only after everything was read again.
-    fn doubt(&mut self, id: FileId, actions: &mut Actions) {
-        self.shut(id, actions);
+    fn make_stale(&mut self, id: FileId, actions: &mut Actions) {
+        self.unpublish(id, actions);
         self.look_again(id);
         self.wait_no_longer(id, actions);
     }
@@ -195,7 +195,7 @@ impl State {
     /// Everything that a verdict depends on is to be read again, whatever the file's stamp says.
     fn look_again(&mut self, id: FileId) {
         if let Some(entry) = self.files.get_mut(id) {
-            entry.doubted = true;
+            entry.stale = true;
         }
         self.changed(id);
     }
@@ -211,11 +211,11 @@ impl State {
     }
 
     /// What was accepted goes from behind the gate at once, before there is a new verdict.
-    fn shut(&mut self, id: FileId, actions: &mut Actions) {
+    fn unpublish(&mut self, id: FileId, actions: &mut Actions) {
         let accepted = |judged: &Judged| judged.verdict == Verdict::Accepted;
         if let Some(entry) = self.files.get_mut(id)
             && entry.judged.as_deref().is_some_and(accepted)
-            && !std::mem::replace(&mut entry.shut, true)
+            && !std::mem::replace(&mut entry.unpublished, true)
         {
             let path = entry.path.clone();
             actions.push(Action::CloseGate { path });
@@ -232,14 +232,14 @@ impl State {
         }
         entry.not_before = Duration::ZERO;
         match entry.stage() {
-            Stage::Active(_) => entry.doubted = true,
+            Stage::Active(_) => entry.stale = true,
             Stage::Idle | Stage::Waiting(..) => self.files.enqueue(id, Priority::Fresh, self.now),
         }
     }
 
     pub(super) fn vanished(&mut self, path: &Arc<Path>, actions: &mut Actions) {
         for dependent in self.files.dependents(path) {
-            self.doubt(dependent, actions);
+            self.make_stale(dependent, actions);
         }
         match self.files.id(path) {
             Some(id) => self.vanished_file(id, actions),
@@ -256,7 +256,7 @@ impl State {
         entry.present = false;
         if let Stage::Active(job) = *entry.stage() {
             // The result stays until the job is over, what lies behind the gate does not.
-            self.shut(id, actions);
+            self.unpublish(id, actions);
             // Nothing is stored for a file that is not there; a job at the writers' will notice.
             if self
                 .jobs
@@ -303,7 +303,7 @@ impl State {
     }
 
     fn write_again(&mut self, id: FileId, actions: &mut Actions) {
-        self.shut(id, actions);
+        self.unpublish(id, actions);
         let Some(entry) = self.files.get_mut(id).filter(|it| it.present) else {
             return;
         };
@@ -312,7 +312,7 @@ impl State {
                 let job = self.jobs.get(&job);
                 // Before that its result is still to be written.
                 let is_late = job.is_some_and(|job| job.stage == JobStage::Storing);
-                (entry.anew, entry.doubted) = (true, entry.doubted || is_late);
+                (entry.anew, entry.stale) = (true, entry.stale || is_late);
             }
             Stage::Idle | Stage::Waiting(..) => self.judge_anew(id),
         }

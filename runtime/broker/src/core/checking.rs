@@ -5,7 +5,7 @@ use std::time::Duration;
 use qcbus_messages::{DocId, JobId, ToPeer};
 
 use super::action::Action;
-use super::jobs::{ActiveJob, JobStage, ShareState};
+use super::jobs::{ActiveJob, JobStage, TaskState};
 use super::{Actions, State};
 
 /// How soon a bundle may lack the same document again: each time, it is published.
@@ -19,7 +19,7 @@ impl State {
             job.config = self.config;
         }
         self.reseat(id, actions);
-        self.fail_absent();
+        self.fail_missing();
     }
 
     /// Gives a bundle its next jobs: suspects one at a time and alone, others up to its capacity.
@@ -29,10 +29,10 @@ impl State {
             let Some(bundle) = self.bundles.get_mut(name) else {
                 return;
             };
-            let (Some(session), true) = (bundle.session, bundle.ready && !bundle.leaving) else {
+            let (Some(session), true) = (bundle.session, bundle.ready && !bundle.draining) else {
                 return;
             };
-            let room = if bundle.suspects.is_empty() {
+            let room = if bundle.quarantine.is_empty() {
                 bundle.capacity
             } else {
                 1
@@ -40,24 +40,24 @@ impl State {
             if bundle.active.len() >= room {
                 return;
             }
-            let Some((id, suspect)) = bundle.next_job(findings) else {
+            let Some((id, quarantined)) = bundle.next_job(findings) else {
                 return;
             };
             let fresh = bundle.fresh_process;
             let Some(job) = self.jobs.get_mut(&id) else {
                 continue;
             };
-            let Some(share) = job.shares.get_mut(name) else {
+            let Some(task) = job.tasks.get_mut(name) else {
                 continue;
             };
-            if share.state != ShareState::Queued {
+            if task.state != TaskState::Queued {
                 continue;
             }
             let Some(prepared) = job.prepared.clone() else {
                 continue;
             };
-            share.state = ShareState::Sent {
-                alone_and_fresh: suspect && fresh,
+            task.state = TaskState::Sent {
+                alone_and_fresh: quarantined && fresh,
             };
             let message = super::types::job_message(id, self.config, job.kind, &prepared);
             bundle.give(id, self.now);
@@ -73,7 +73,7 @@ impl State {
         let waiting = self
             .bundles
             .iter()
-            .filter(|(_, it)| !(it.queue.is_empty() && it.suspects.is_empty()));
+            .filter(|(_, it)| !(it.queue.is_empty() && it.quarantine.is_empty()));
         let names: Vec<String> = waiting.map(|(name, _)| name.clone()).collect();
         for name in names {
             self.dispatch(&name, actions);
@@ -108,18 +108,18 @@ impl State {
         micros: u64,
         actions: &mut Actions,
     ) -> bool {
-        let Some(share) = self
+        let Some(task) = self
             .jobs
             .get_mut(&id)
-            .and_then(|job| job.shares.get_mut(name))
+            .and_then(|job| job.tasks.get_mut(name))
         else {
             return false;
         };
-        if !matches!(share.state, ShareState::Sent { .. }) {
+        if !matches!(task.state, TaskState::Sent { .. }) {
             return false;
         }
-        share.state = ShareState::Done;
-        share.micros = micros;
+        task.state = TaskState::Done;
+        task.micros = micros;
         if let Some(bundle) = self.bundles.get_mut(name) {
             bundle.take(id, self.now);
         }
@@ -129,19 +129,19 @@ impl State {
     }
 
     /// Takes one bundle's share of a job away.
-    pub(super) fn cancel_share(&mut self, id: JobId, name: &str, actions: &mut Actions) {
+    pub(super) fn cancel_task(&mut self, id: JobId, name: &str, actions: &mut Actions) {
         let job = self.jobs.get_mut(&id);
-        let Some(share) = job.and_then(|job| job.shares.remove(name)) else {
+        let Some(task) = job.and_then(|job| job.tasks.remove(name)) else {
             return;
         };
-        if matches!(share.state, ShareState::Sent { .. }) {
+        if matches!(task.state, TaskState::Sent { .. }) {
             self.call_back(id, name, actions);
         }
     }
 
-    pub(super) fn cancel_shares(&mut self, id: JobId, job: &ActiveJob, actions: &mut Actions) {
-        for (name, share) in &job.shares {
-            if matches!(share.state, ShareState::Sent { .. }) {
+    pub(super) fn cancel_tasks(&mut self, id: JobId, job: &ActiveJob, actions: &mut Actions) {
+        for (name, task) in &job.tasks {
+            if matches!(task.state, TaskState::Sent { .. }) {
                 self.call_back(id, name, actions);
             }
         }

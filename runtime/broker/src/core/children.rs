@@ -6,7 +6,7 @@ use std::time::Duration;
 use qcbus_messages::Role;
 
 use super::action::Action;
-use super::leaving::Retired;
+use super::draining::Retired;
 use super::notice::Notice;
 use super::types::{ChildEnd, ChildSpec, Launch, Restart, SessionId};
 use super::upgrades::Upgrade;
@@ -24,7 +24,7 @@ pub(super) struct Child {
     /// Why it does not get as far as to join; nobody waits for it meanwhile.
     stuck: Option<String>,
     /// Why the process that is wanted was last not ready, since it was last ready or became wanted.
-    pub trouble: Option<String>,
+    pub failure: Option<String>,
     pub restarts: u32,
     /// A newer process that will take over once it has joined.
     pub upgrade: Option<Upgrade>,
@@ -61,7 +61,7 @@ impl Child {
             starts: VecDeque::new(),
             failures: 0,
             stuck: None,
-            trouble: None,
+            failure: None,
             restarts: 0,
             upgrade: None,
         }
@@ -80,7 +80,7 @@ impl Child {
         self.spec = spec;
         self.failures = 0;
         self.stuck = None;
-        self.trouble = None;
+        self.failure = None;
         self.starts.clear();
         let is_wanted = runs.is_some_and(|it| it.is_of(&self.spec));
         match self.state {
@@ -194,8 +194,8 @@ impl State {
             child.upgrade = None;
         } else if child.state != ChildState::Joined {
             let as_wanted = child.spec.version.as_deref().is_none_or(|it| it == version);
-            let former = |it: Launch| it < first && it.is_of(&child.spec) && as_wanted;
-            let goes_on = launch.is_some_and(former);
+            let stale_children = |it: Launch| it < first && it.is_of(&child.spec) && as_wanted;
+            let goes_on = launch.is_some_and(stale_children);
             if goes_on {
                 actions.extend(starting.map(|(launch, _)| Action::kill_unjoined(launch)));
             }
@@ -212,7 +212,7 @@ impl State {
             return;
         };
         if child.upgrade.take().is_none() {
-            child.trouble = Some("it took its leave".to_owned());
+            child.failure = Some("it took its leave".to_owned());
         }
         child.state = if child.spec.restart == Restart::Always && !draining {
             ChildState::Due(self.now + self.settings.backoff)
@@ -239,7 +239,7 @@ impl State {
             Some(Upgrade::Starting(launch, _)) => actions.push(Action::kill_unjoined(launch)),
             Some(Upgrade::Due(_)) => {}
             // It was the one that is wanted.
-            None => child.trouble = Some(why.to_owned()),
+            None => child.failure = Some(why.to_owned()),
         }
         if child.spec.restart == Restart::Never || draining {
             child.state = ChildState::Ended;
@@ -263,7 +263,7 @@ impl State {
             "failed {times} times within {seconds} s and is tried again in {seconds} s: {why}"
         );
         self.notice(Notice::GaveUp { name, why }, actions);
-        self.fail_absent();
+        self.fail_missing();
     }
 
     /// A child process has ended or could not be started.
@@ -327,7 +327,7 @@ impl State {
         if gives_up {
             child.stuck = Some(end.how().to_owned());
         }
-        child.trouble = Some(end.how().to_owned());
+        child.failure = Some(end.how().to_owned());
         if matches!(end, ChildEnd::Done(_)) && child.spec.restart != Restart::Always {
             child.state = ChildState::Due(now + most);
         } else {
@@ -336,7 +336,7 @@ impl State {
             }
             self.child_down(name, false, end.how(), actions);
         }
-        self.fail_absent();
+        self.fail_missing();
     }
 
     /// Starts what is due, and kills what does not get going or does not go.
@@ -384,7 +384,7 @@ impl State {
             child.stuck = Some(why.to_owned());
         }
         self.child_down(name, false, why, actions);
-        self.fail_absent();
+        self.fail_missing();
     }
 
     /// Whether a child of this name is being started, or will be soon.

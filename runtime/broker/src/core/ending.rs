@@ -35,7 +35,7 @@ impl State {
         }
         match self.phase {
             Phase::Draining(since) => {
-                self.turn_away_waiting_errands(actions);
+                self.refuse_waiting_on_demand(actions);
                 self.end_held_up(actions);
                 self.end_trials(actions);
                 let overdue = self.now.saturating_sub(since) > self.settings.drain_limit;
@@ -51,7 +51,7 @@ impl State {
                 if alone || self.now.saturating_sub(since) > GOODBYE_LIMIT {
                     self.phase = Phase::Stopped;
                     self.end_waits(actions);
-                    self.dismiss_errands("the broker has stopped", actions);
+                    self.dismiss_on_demand("the broker has stopped", actions);
                     actions.push(Action::Stop);
                 }
             }

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use qcbus_messages::{Digest, FromPeer, Hello, JobId};
 
-use super::errands::{Errand, ErrandOutcome};
+use super::on_demand::{OnDemand, OnDemandOutcome};
 use super::types::{
-    ChildEnd, ChildSpec, Demand, Launch, LostOutput, PrepareFailure, PreparedJob, SessionId, Stamp,
-    StoreOutcome, Ticket,
+    ChildEnd, ChildSpec, Demand, Launch, LostOutput, PrepareFailure, PreparedJob, RequestId,
+    SessionId, Stamp, StoreOutcome,
 };
 use super::waits::Until;
 
@@ -135,7 +135,7 @@ pub enum Event {
     /// A client waits for a verdict.
     Wait {
         /// The client.
-        ticket: Ticket,
+        request_id: RequestId,
         /// The file.
         path: Arc<Path>,
         /// What `stat` says of it now, if it is there and at rest. Otherwise an event will tell.
@@ -150,24 +150,24 @@ pub enum Event {
         /// The file.
         path: Arc<Path>,
         /// Who wants it, and by whom.
-        errand: Errand,
+        on_demand: OnDemand,
     },
     /// What was found for an errand is pooled.
     Pooled {
         /// The job.
         job: JobId,
         /// What it gave.
-        outcome: ErrandOutcome,
+        outcome: OnDemandOutcome,
     },
     /// A client that waited has left without its answer.
     ClientLeft {
         /// The client.
-        ticket: Ticket,
+        request_id: RequestId,
     },
     /// Somebody wants a bundle off the roster that is there by joining.
     RemoveBundle {
         /// The client.
-        ticket: Ticket,
+        request_id: RequestId,
         /// The bundle.
         name: String,
     },

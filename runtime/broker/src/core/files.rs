@@ -10,7 +10,7 @@ use std::time::Duration;
 use qcbus_document::FileKind;
 use qcbus_messages::JobId;
 
-use super::errands::Errand;
+use super::on_demand::OnDemand;
 use super::types::{Judged, Reported, Stamp};
 
 /// Index of a file in the table; never reused within a generation.
@@ -20,7 +20,7 @@ pub type FileId = u32;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Priority {
     /// Asked for by somebody who waits for it and for nothing else.
-    Errand,
+    OnDemand,
     /// New or changed: somebody waits for the verdict.
     Fresh,
     /// Judged already, to be judged again because bundles or configuration changed.
@@ -52,12 +52,12 @@ pub struct FileEntry {
     stage: Stage,
     /// It changed while it was being checked, or something that it depends on changed at any time:
     /// its verdict must not be taken to stand because its stamp is the same.
-    pub doubted: bool,
+    pub stale: bool,
     /// An event told of it while it was being read, under the stamp that it has: of a young file that
     /// is what another write looks like.
     pub touched: bool,
     /// What it is accepted for was taken from behind the gate, until it is known to stand.
-    pub shut: bool,
+    pub unpublished: bool,
     /// How many times it is about to be published again: nobody is told before that it is accepted.
     pub opening: u32,
     /// Not before then, after something failed for want of room or disk.
@@ -81,7 +81,7 @@ pub struct FileEntry {
     /// What reporters have said of it, by index into the reporters' table.
     pub delivered: Vec<(u32, Reported)>,
     /// It is here for a client that waits for its result, and nothing of it is kept.
-    pub errand: Option<Errand>,
+    pub on_demand: Option<OnDemand>,
 }
 
 impl FileEntry {
@@ -100,12 +100,12 @@ pub struct Files {
     /// Paths that nobody depends on any more, until somebody asks.
     forgotten: BTreeSet<Arc<Path>>,
     next: FileId,
-    errands: VecDeque<FileId>,
+    on_demand_checks: VecDeque<FileId>,
     fresh: VecDeque<FileId>,
     background: VecDeque<FileId>,
     since_background: u8,
     /// The last that was taken was an errand.
-    was_errand: bool,
+    was_on_demand: bool,
     counts: Counts,
 }
 
@@ -126,7 +126,7 @@ impl Counts {
     fn of(&mut self, stage: &Stage) -> &mut u64 {
         match stage {
             Stage::Idle => &mut self.idle,
-            Stage::Waiting(Priority::Errand | Priority::Fresh, _) => &mut self.fresh,
+            Stage::Waiting(Priority::OnDemand | Priority::Fresh, _) => &mut self.fresh,
             Stage::Waiting(Priority::Background, _) => &mut self.background,
             Stage::Active(_) => &mut self.active,
         }
@@ -141,9 +141,9 @@ impl FileEntry {
             stamp,
             present: true,
             stage: Stage::Idle,
-            doubted: false,
+            stale: false,
             touched: false,
-            shut: false,
+            unpublished: false,
             opening: 0,
             anew: false,
             half_written: false,
@@ -154,7 +154,7 @@ impl FileEntry {
             judged: None,
             depends_on: Vec::new(),
             delivered: Vec::new(),
-            errand: None,
+            on_demand: None,
         }
     }
 
@@ -197,9 +197,14 @@ impl Files {
     }
 
     /// Adds a file for an errand. Nobody finds it by its path, under which another may be watched.
-    pub fn insert_errand(&mut self, path: &Arc<Path>, kind: FileKind, errand: Errand) -> FileId {
+    pub fn insert_on_demand(
+        &mut self,
+        path: &Arc<Path>,
+        kind: FileKind,
+        on_demand: OnDemand,
+    ) -> FileId {
         self.add(FileEntry {
-            errand: Some(errand),
+            on_demand: Some(on_demand),
             ..FileEntry::new(path, kind, Stamp::default())
         })
     }
@@ -270,7 +275,7 @@ impl Files {
 
     fn queue(&mut self, priority: Priority) -> &mut VecDeque<FileId> {
         match priority {
-            Priority::Errand => &mut self.errands,
+            Priority::OnDemand => &mut self.on_demand_checks,
             Priority::Fresh => &mut self.fresh,
             Priority::Background => &mut self.background,
         }
@@ -284,9 +289,9 @@ impl Files {
             order.reverse();
         }
         let [first, second] = order;
-        let order = match self.was_errand {
-            true => [first, second, Priority::Errand],
-            false => [Priority::Errand, first, second],
+        let order = match self.was_on_demand {
+            true => [first, second, Priority::OnDemand],
+            false => [Priority::OnDemand, first, second],
         };
         order
             .into_iter()
@@ -302,9 +307,9 @@ impl Files {
             match entry.stage {
                 Stage::Waiting(at, _) if at == priority && entry.not_before <= now => {
                     self.set_stage(id, Stage::Idle);
-                    self.was_errand = priority == Priority::Errand;
+                    self.was_on_demand = priority == Priority::OnDemand;
                     self.since_background = match priority {
-                        Priority::Errand => self.since_background,
+                        Priority::OnDemand => self.since_background,
                         Priority::Fresh => self.since_background.saturating_add(1),
                         Priority::Background => 0,
                     };

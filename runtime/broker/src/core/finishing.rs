@@ -7,9 +7,9 @@ use qcbus_messages::{JobId, Verdict};
 
 use super::action::Action;
 use super::files::{FileId, Priority, Stage};
-use super::jobs::{ActiveJob, JobStage, NOTICE_PAUSE, Share};
+use super::jobs::{ActiveJob, JobStage, NOTICE_PAUSE, Task};
 use super::notice::Notice;
-use super::outcome::{ShareOutcome, not_applicable, outcome};
+use super::outcome::{TaskOutcome, not_applicable, outcome};
 use super::types::{FinishedJob, Judged, StoreOutcome};
 use super::{Actions, State};
 
@@ -19,7 +19,7 @@ impl State {
         let Some(job) = self.jobs.get(&id) else {
             return;
         };
-        if job.stage != JobStage::Checking || !job.shares.values().all(Share::is_over) {
+        if job.stage != JobStage::Checking || !job.tasks.values().all(Task::is_over) {
             return;
         }
         let at = self.storable_at(id);
@@ -45,8 +45,12 @@ impl State {
             .map(|(id, _)| *id)
             .collect();
         for id in ids {
-            if self.jobs.get(&id).is_some_and(|job| job.errand.is_some()) {
-                self.pool_errand(id, actions);
+            if self
+                .jobs
+                .get(&id)
+                .is_some_and(|job| job.on_demand.is_some())
+            {
+                self.pool_on_demand(id, actions);
                 continue;
             }
             if self.storing >= self.settings.max_storing {
@@ -74,13 +78,13 @@ impl State {
             prepared: job.prepared.clone(),
             unreadable: job.unreadable.clone(),
             bundles: job
-                .shares
+                .tasks
                 .iter()
-                .map(|(name, share)| outcome(name, share))
+                .map(|(name, task)| outcome(name, task))
                 .chain(self.inapplicable(job))
                 .collect(),
             rests_on: self.verdicts_under(job),
-            jury: State::jury(&job.shares),
+            required_set: State::required_set(&job.tasks),
             epoch: job.epoch,
             elapsed: self.now.saturating_sub(job.since),
         })
@@ -88,7 +92,7 @@ impl State {
 
     /// Configured bundles that do not take files of this kind: their checkers are listed as
     /// skipped, so that nobody takes them for lost.
-    fn inapplicable(&self, job: &ActiveJob) -> Vec<ShareOutcome> {
+    fn inapplicable(&self, job: &ActiveJob) -> Vec<TaskOutcome> {
         let mut outcomes = Vec::new();
         let kind = job.kind;
         // What others would say of this kind is nothing that a shadow says.
@@ -134,9 +138,9 @@ impl State {
             }
             StoreOutcome::Stale => {
                 if let Some(entry) = self.files.get_mut(file) {
-                    entry.doubted = true;
+                    entry.stale = true;
                 }
-                self.shut_unstored(file, actions);
+                self.unpublish_unstored(file, actions);
                 self.end_job(id, actions);
             }
             StoreOutcome::Outdated if job.config == self.config => {
@@ -150,7 +154,7 @@ impl State {
                 let is_new = entry.is_some_and(|it| !std::mem::replace(&mut it.half_written, true));
                 job.stage = JobStage::Finished(self.now + self.settings.retry_after);
                 let same = job.config == self.config;
-                self.shut_unstored(file, actions);
+                self.unpublish_unstored(file, actions);
                 // On a full disk every file would say the same with every try.
                 if is_new || self.now >= self.mute_unwritten_until {
                     self.mute_unwritten_until = self.now + NOTICE_PAUSE;
@@ -167,14 +171,15 @@ impl State {
 
     /// What was not stored may lie behind the gate all the same, because the journal is written last. It stays only
     /// where the file was accepted before and that stands; nobody would take it away otherwise when the file changes.
-    fn shut_unstored(&mut self, file: FileId, actions: &mut Actions) {
+    fn unpublish_unstored(&mut self, file: FileId, actions: &mut Actions) {
         let Some(entry) = self.files.get_mut(file) else {
             return;
         };
         let accepted = |judged: &Arc<Judged>| judged.verdict == Verdict::Accepted;
-        let stands = !entry.shut && !entry.doubted && entry.judged.as_ref().is_some_and(accepted);
+        let stands =
+            !entry.unpublished && !entry.stale && entry.judged.as_ref().is_some_and(accepted);
         if !stands {
-            entry.shut = true;
+            entry.unpublished = true;
             let path = entry.path.clone();
             actions.push(Action::CloseGate { path });
         }
@@ -184,18 +189,18 @@ impl State {
         self.rate.note(self.now);
         if let Some(entry) = self.files.get_mut(file) {
             entry.judged = Some(judged.clone());
-            (entry.shut, entry.half_written) = (false, false);
+            (entry.unpublished, entry.half_written) = (false, false);
             let (path, fresh) = (entry.path.clone(), true);
-            let doubted = entry.doubted && judged.verdict == Verdict::Accepted;
+            let stale = entry.stale && judged.verdict == Verdict::Accepted;
             let (gated, told, now) = (path.clone(), judged.clone(), judged);
             actions.push(Action::Judged {
                 path,
                 judged: told,
                 fresh,
             });
-            if doubted {
+            if stale {
                 // It changed while its acceptance was on its way.
-                entry.shut = true;
+                entry.unpublished = true;
                 actions.push(Action::CloseGate { path: gated });
             }
             self.counts_for_others(file, &now);
@@ -208,7 +213,7 @@ impl State {
     pub(super) fn begin_anew(&mut self, id: JobId, actions: &mut Actions) {
         let file = self.jobs.get(&id).map(|job| job.file);
         if let Some(entry) = file.and_then(|file| self.files.get_mut(file)) {
-            entry.doubted = true;
+            entry.stale = true;
         }
         self.end_job(id, actions);
     }
@@ -221,15 +226,15 @@ impl State {
         };
         match job.stage {
             JobStage::Preparing | JobStage::Storing | JobStage::Finished(_) => {}
-            JobStage::Checking => self.cancel_shares(id, &job, actions),
+            JobStage::Checking => self.cancel_tasks(id, &job, actions),
         }
         actions.push(Action::Release { job: id });
         if job.prepared.is_some() {
             self.let_one_in();
         }
         self.files.set_stage(job.file, Stage::Idle);
-        if let Some(errand) = &job.errand {
-            return self.errand_is_over(job.file, errand.ticket, actions);
+        if let Some(on_demand) = &job.on_demand {
+            return self.on_demand_is_over(job.file, on_demand.request_id, actions);
         }
         self.what_follows(job.file, actions);
         // It waits again by now, if it does.
@@ -244,7 +249,7 @@ impl State {
         let stands = |judged: &Arc<Judged>| self.stands(entry.kind, judged);
         if !entry.present {
             self.vanished_file(file, actions);
-        } else if entry.doubted || entry.judged.is_none() {
+        } else if entry.stale || entry.judged.is_none() {
             self.files.enqueue(file, Priority::Fresh, self.now);
         } else if entry.judged.as_ref().is_some_and(stands) {
             self.settle_waits(file, actions);

@@ -10,11 +10,11 @@ use qcbus_messages::{Catalogue, Digest, JobId};
 
 use super::action::Action;
 use super::early::ReadingEnd;
-use super::errands::Errand;
 use super::files::{FileId, Priority, Stage};
-use super::jury::{Epoch, Mark, Seat};
 use super::notice::Notice;
-use super::staging::Staged;
+use super::on_demand::OnDemand;
+use super::pending_findings::Pending;
+use super::required_set::{Epoch, Requirement, VersionDigest};
 use super::types::{Input, Judged, PrepareFailure, PreparedJob, Reading};
 use super::{Actions, State};
 
@@ -39,9 +39,9 @@ pub(super) struct ActiveJob {
     /// The configuration under which it is checked.
     pub config: Digest,
     /// By bundle name.
-    pub shares: BTreeMap<String, Share>,
+    pub tasks: BTreeMap<String, Task>,
     /// It is done for a client, and nothing of it is kept.
-    pub errand: Option<Errand>,
+    pub on_demand: Option<OnDemand>,
     /// While it is stored: the file was to be judged anew, and is again if nothing is stored.
     pub anew: bool,
     /// Its bundles have answered and it must wait: of its documents only the root is still on the bus.
@@ -51,7 +51,9 @@ pub(super) struct ActiveJob {
 impl ActiveJob {
     /// Whether it is the trial of a shadow.
     pub fn is_trial(&self) -> bool {
-        self.errand.as_ref().is_some_and(|it| it.ticket.is_trial())
+        self.on_demand
+            .as_ref()
+            .is_some_and(|it| it.request_id.is_trial())
     }
 }
 
@@ -74,61 +76,61 @@ impl JobStage {
 
 /// One bundle's share of a job.
 #[derive(Debug)]
-pub(super) struct Share {
-    pub state: ShareState,
+pub(super) struct Task {
+    pub state: TaskState,
     pub version: String,
     /// As it was when the job was given out; `None` for a bundle that was never seen.
     pub catalogue: Option<Arc<Catalogue>>,
-    pub mark: Option<Mark>,
+    pub version_digest: Option<VersionDigest>,
     pub demanded: Arc<[u32]>,
     /// Nobody else has it before it goes to a writer.
-    pub staged: Arc<BTreeMap<u32, Staged>>,
-    pub staged_bytes: usize,
+    pub pending: Arc<BTreeMap<u32, Pending>>,
+    pub pending_bytes: usize,
     pub micros: u64,
     /// It was with a bundle that died; it is tried alone from now on.
-    pub suspect: bool,
+    pub quarantined: bool,
     /// How often the bundle died with this job alone in a fresh process.
     pub strikes: u8,
     /// The failure means that the bundle was not there, not that it broke on this file.
-    pub absent: bool,
+    pub missing: bool,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum ShareState {
+pub(super) enum TaskState {
     Queued,
     Sent { alone_and_fresh: bool },
     Done,
     Failed(String),
 }
 
-impl Share {
+impl Task {
     /// The share of who sits there. Nobody can check a file that cannot be read; who was never
     /// seen is waited for nevertheless.
-    pub fn of(seat: &Seat, unreadable: Option<&str>) -> Share {
-        let why = unreadable.filter(|_| seat.catalogue.is_some());
-        Share {
-            state: why.map_or(ShareState::Queued, |why| ShareState::Failed(why.to_owned())),
-            version: seat.version.clone(),
-            catalogue: seat.catalogue.clone(),
-            mark: seat.mark,
-            demanded: seat.demanded.clone(),
-            staged: Arc::default(),
-            staged_bytes: 0,
+    pub fn of(requirement: &Requirement, unreadable: Option<&str>) -> Task {
+        let why = unreadable.filter(|_| requirement.catalogue.is_some());
+        Task {
+            state: why.map_or(TaskState::Queued, |why| TaskState::Failed(why.to_owned())),
+            version: requirement.version.clone(),
+            catalogue: requirement.catalogue.clone(),
+            version_digest: requirement.version_digest,
+            demanded: requirement.demanded.clone(),
+            pending: Arc::default(),
+            pending_bytes: 0,
             micros: 0,
-            suspect: false,
+            quarantined: false,
             strikes: 0,
-            absent: false,
+            missing: false,
         }
     }
 
     pub fn is_over(&self) -> bool {
-        matches!(self.state, ShareState::Done | ShareState::Failed(_))
+        matches!(self.state, TaskState::Done | TaskState::Failed(_))
     }
 
     /// Forgets what a session that has ended said.
     pub fn unstage(&mut self) {
-        self.staged = Arc::default();
-        self.staged_bytes = 0;
+        self.pending = Arc::default();
+        self.pending_bytes = 0;
     }
 }
 
@@ -179,7 +181,7 @@ impl State {
         };
         if let Some(judged) = &entry.judged {
             let known = judged.inputs.first().and_then(|root| root.content.stamp());
-            let same_bytes = !judged.racy && !entry.doubted && known == Some(entry.stamp);
+            let same_bytes = !judged.racy && !entry.stale && known == Some(entry.stamp);
             if same_bytes
                 && !entry.half_written
                 && self.stands(entry.kind, judged)
@@ -192,12 +194,12 @@ impl State {
                 return;
             }
         }
-        let (path, kind, errand) = (entry.path.clone(), entry.kind, entry.errand.clone());
+        let (path, kind, on_demand) = (entry.path.clone(), entry.kind, entry.on_demand.clone());
         let waited = self.now.saturating_sub(entry.asked);
         let job = self.next_job();
         self.files.set_stage(id, Stage::Active(job));
         if let Some(entry) = self.files.get_mut(id) {
-            (entry.doubted, entry.touched) = (false, false);
+            (entry.stale, entry.touched) = (false, false);
         }
         self.preparing += 1;
         self.jobs.insert(
@@ -212,8 +214,8 @@ impl State {
                 unreadable: None,
                 epoch: self.epoch,
                 config: self.config,
-                shares: BTreeMap::new(),
-                errand,
+                tasks: BTreeMap::new(),
+                on_demand,
                 anew: false,
                 is_slim: false,
             },
@@ -237,7 +239,7 @@ impl State {
                 // First, so that nobody is told of the verdict that it had. One of which something was
                 // heard meanwhile may be back.
                 if let Some(entry) = file.and_then(|file| self.files.get_mut(file)) {
-                    entry.present &= entry.doubted;
+                    entry.present &= entry.stale;
                 }
                 self.end_job(id, actions);
             }
@@ -327,10 +329,12 @@ impl State {
     /// Whether the file was read as it is now, and judged.
     fn has_verdict_on_these_bytes(&self, id: JobId) -> bool {
         let entry = self.jobs.get(&id).and_then(|job| self.files.get(job.file));
-        entry.filter(|entry| !entry.shut).is_some_and(|entry| {
-            let judged = entry.judged.as_ref().and_then(|it| it.inputs.first());
-            judged.and_then(|root| root.content.stamp()) == Some(entry.stamp)
-        })
+        entry
+            .filter(|entry| !entry.unpublished)
+            .is_some_and(|entry| {
+                let judged = entry.judged.as_ref().and_then(|it| it.inputs.first());
+                judged.and_then(|root| root.content.stamp()) == Some(entry.stamp)
+            })
     }
 
     /// The file cannot be read. That may be known, and said.
@@ -338,11 +342,11 @@ impl State {
         let Some(job) = self.jobs.get_mut(&id) else {
             return;
         };
-        if job.errand.is_some() {
+        if job.on_demand.is_some() {
             return self.send_elsewhere(id, reason, actions);
         }
         let (file, kind) = (job.file, job.kind);
-        let entry = self.files.get(file).filter(|entry| !entry.doubted);
+        let entry = self.files.get(file).filter(|entry| !entry.stale);
         let known = entry.and_then(|entry| entry.judged.as_ref());
         let same = known.is_some_and(|it| it.inputs.is_empty() && it.why == [reason.as_str()]);
         if same && known.is_some_and(|judged| self.stands(kind, judged)) {
@@ -369,7 +373,7 @@ impl State {
         let ids: Vec<FileId> = idle.map(|(id, _)| id).collect();
         for id in ids {
             if let Some(entry) = self.files.get_mut(id) {
-                entry.doubted = true;
+                entry.stale = true;
             }
             self.files.enqueue(id, Priority::Background, self.now);
         }
@@ -389,14 +393,14 @@ impl State {
             entry.stamp = stamp;
         }
         entry.hindered = 0;
-        entry.doubted |= entry.touched && prepared.racy;
-        if entry.doubted || !entry.present {
+        entry.stale |= entry.touched && prepared.racy;
+        if entry.stale || !entry.present {
             self.end_job(id, actions);
             return;
         }
         let (old, anew) = (entry.judged.clone(), entry.anew || entry.half_written);
-        if let Some(errand) = &entry.errand {
-            return match self.errands.contains_key(&errand.ticket) {
+        if let Some(on_demand) = &entry.on_demand {
+            return match self.on_demand_checks.contains_key(&on_demand.request_id) {
                 true => self.give_out(id, actions),
                 false => self.end_job(id, actions),
             };
@@ -447,7 +451,7 @@ impl State {
             return;
         };
         let path = entry.path.clone();
-        if std::mem::take(&mut entry.shut) {
+        if std::mem::take(&mut entry.unpublished) {
             entry.opening += 1;
             let (path, judged) = (path.clone(), judged.clone());
             actions.push(Action::OpenGate { path, judged });
@@ -491,7 +495,7 @@ impl State {
             return;
         };
         if let Some(entry) = self.files.get_mut(file) {
-            entry.doubted = true;
+            entry.stale = true;
             entry.not_before = self.now + pause;
         }
         self.end_job(id, actions);

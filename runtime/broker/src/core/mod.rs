@@ -4,36 +4,36 @@
 //! around it (`crate::engine`) turns the world into events and carries the actions out. Nothing
 //! in here can block, fail or panic on input, and everything can be tested as a table.
 
-mod absent;
 mod action;
-mod announcing;
 mod bundles;
 mod changes;
 mod checking;
 mod children;
 mod delivering;
+mod draining;
 mod early;
 mod ending;
-mod errands;
 mod event;
 mod files;
 mod finishing;
 mod jobs;
-mod jury;
-mod leaving;
+mod missing;
 mod notice;
+mod on_demand;
 mod outcome;
+mod pending_findings;
+mod quarantine;
 mod queue;
+mod readiness;
+mod registration;
+mod registry;
 mod reported;
 mod reporters;
+mod required_set;
 mod rests_on;
 mod retries;
-mod roster;
 mod settings;
-mod staging;
-mod standing;
 mod status;
-mod suspects;
 mod trials;
 mod types;
 mod upgrades;
@@ -53,27 +53,27 @@ use qcbus_document::FileKind;
 use qcbus_messages::{Digest, JobId, Role};
 
 pub use action::Action;
-pub use errands::{Errand, ErrandOutcome};
 pub use event::Event;
-pub use jury::{Epoch, Juror, Jury, Mark, Member, Origin};
 pub use notice::Notice;
-pub use outcome::ShareOutcome;
+pub use on_demand::{OnDemand, OnDemandOutcome};
+pub use outcome::TaskOutcome;
 pub(crate) use outcome::{facts_weight, weight};
+pub use required_set::{Epoch, Member, Origin, RequiredBundle, RequiredSet, VersionDigest};
 pub use settings::Settings;
 pub use trials::TrialEnd;
 pub use types::*;
 pub use waits::Until;
 
-use announcing::Unrest;
 use bundles::Bundle;
 use children::Child;
+use draining::Retired;
 use early::ReadingEnd;
-use errands::Errands;
 use files::Files;
 use jobs::ActiveJob;
-use leaving::Retired;
+use on_demand::OnDemandChecks;
+use registration::Changes;
+use registry::Requirements;
 use reporters::Reporter;
-use roster::Seats;
 use status::Rate;
 use trials::Trials;
 use waits::Waiter;
@@ -91,19 +91,19 @@ pub struct State {
     bundles: BTreeMap<String, Bundle>,
     reporters: Vec<Reporter>,
     /// By name, how often bundles have changed lately.
-    unrest: BTreeMap<String, Unrest>,
+    changes: BTreeMap<String, Changes>,
     sessions: BTreeMap<SessionId, (Role, Arc<str>)>,
     children: BTreeMap<String, Child>,
     retired: BTreeMap<SessionId, Retired>,
     /// What former brokers started has joined or been killed.
-    former_are_gone: bool,
+    stale_children_are_gone: bool,
     waiters: Vec<Waiter>,
-    errands: Errands,
+    on_demand_checks: OnDemandChecks,
     trials: Trials,
     config: Digest,
     demand: Arc<dyn Demand>,
     epoch: Epoch,
-    seats: Seats,
+    requirements: Requirements,
     /// The roster has changed, or somebody on it has come back: jobs under way follow.
     reseat: bool,
     phase: Phase,
@@ -159,18 +159,18 @@ impl State {
             jobs: BTreeMap::new(),
             bundles: BTreeMap::new(),
             reporters: Vec::new(),
-            unrest: BTreeMap::new(),
+            changes: BTreeMap::new(),
             sessions: BTreeMap::new(),
             children: BTreeMap::new(),
             retired: BTreeMap::new(),
-            former_are_gone: false,
+            stale_children_are_gone: false,
             waiters: Vec::new(),
-            errands: Errands::new(),
+            on_demand_checks: OnDemandChecks::new(),
             trials: Trials::default(),
             config,
             demand,
             epoch,
-            seats: Seats::new(),
+            requirements: Requirements::new(),
             reseat: false,
             phase: Phase::Running,
             scanned: false,
@@ -220,10 +220,10 @@ impl State {
 
     /// The acceptance of a file that was remembered does not lie behind the gate: it is published when it is known
     /// that it stands.
-    pub fn remember_shut(&mut self, path: &Path) {
+    pub fn remember_unpublished(&mut self, path: &Path) {
         let id = self.files.id(path);
         if let Some(entry) = id.and_then(|id| self.files.get_mut(id)) {
-            entry.shut = true;
+            entry.unpublished = true;
         }
     }
 
@@ -259,29 +259,31 @@ impl State {
             Event::Configured { digest, demand } => self.configured(digest, demand, &mut actions),
             Event::Children { specs } => {
                 self.set_children(specs, &mut actions);
-                self.dismiss_errands("its bundles have changed", &mut actions);
+                self.dismiss_on_demand("its bundles have changed", &mut actions);
             }
             Event::Wait {
-                ticket,
+                request_id,
                 path,
                 stamp,
                 unwatched,
                 until,
             } => {
-                self.wait(ticket, &path, stamp, unwatched, until, &mut actions);
+                self.wait(request_id, &path, stamp, unwatched, until, &mut actions);
             }
-            Event::Check { path, errand } => self.errand(&path, errand, &mut actions),
+            Event::Check { path, on_demand } => self.on_demand(&path, on_demand, &mut actions),
             Event::Pooled { job, outcome } => self.pooled(job, outcome, &mut actions),
-            Event::ClientLeft { ticket } => {
-                self.waiters.retain(|it| it.ticket() != ticket);
-                self.abandon(ticket, &mut actions);
+            Event::ClientLeft { request_id } => {
+                self.waiters.retain(|it| it.request_id() != request_id);
+                self.abandon(request_id, &mut actions);
             }
-            Event::RemoveBundle { ticket, name } => self.removal(ticket, &name, &mut actions),
+            Event::RemoveBundle { request_id, name } => {
+                self.removal(request_id, &name, &mut actions)
+            }
             Event::Drain => self.drain(),
             Event::Tick => self.tick(&mut actions),
         }
         self.hear_what_was_read_early(&mut actions);
-        self.follow_roster(&mut actions);
+        self.follow_registry(&mut actions);
         self.dispatch_all(&mut actions);
         self.pump(&mut actions);
         self.pump_trials(&mut actions);
@@ -356,7 +358,7 @@ impl State {
         }
         self.config = digest;
         self.demand = demand;
-        self.dismiss_errands("its configuration has changed", actions);
+        self.dismiss_on_demand("its configuration has changed", actions);
         self.begin_epoch();
         // What is being checked is checked under the old configuration: it starts anew.
         for id in self.under_way() {
@@ -381,10 +383,10 @@ impl State {
     fn tick(&mut self, actions: &mut Actions) {
         self.watch_children(actions);
         self.kill_what_did_not_return(actions);
-        self.believe_announced(actions);
+        self.accept_registrations(actions);
         self.watch_bundles(actions);
         self.watch_reporters(actions);
-        self.fail_absent();
+        self.fail_missing();
         self.read_again_what_was_unreadable();
         self.settle_reported(actions);
         self.expire_waits(actions);

@@ -25,7 +25,7 @@ pub enum Notice {
         why: String,
     },
     /// A bundle changes what it is all the time, and is not believed for a while.
-    Restless {
+    Flapping {
         /// Its name.
         name: String,
         /// How often, and until when.
@@ -98,7 +98,7 @@ impl Notice {
             Notice::TurnedAway(_) => "turned-away",
             Notice::Ended { .. } => "ended",
             Notice::Killed { .. } => "killed",
-            Notice::Restless { .. } => "restless",
+            Notice::Flapping { .. } => "restless",
             Notice::GaveUp { .. } => "gave-up",
             Notice::NotUpgraded { .. } => "not-upgraded",
             Notice::NoRoom(_) => "no-room",
@@ -121,7 +121,7 @@ impl Notice {
         match self {
             Notice::Ended { name, .. }
             | Notice::Killed { name, .. }
-            | Notice::Restless { name, .. }
+            | Notice::Flapping { name, .. }
             | Notice::GaveUp { name, .. }
             | Notice::NotUpgraded { name, .. }
             | Notice::NotReported { name, .. } => Some(name),
@@ -134,7 +134,7 @@ impl Notice {
         match self {
             Notice::Ended { why, .. }
             | Notice::Killed { why, .. }
-            | Notice::Restless { why, .. }
+            | Notice::Flapping { why, .. }
             | Notice::GaveUp { why, .. }
             | Notice::NotUpgraded { why, .. }
             | Notice::NotReported { why, .. } => why.clone(),
@@ -156,7 +156,7 @@ impl Notice {
             Notice::TurnedAway(reason) => format!("turned away: {reason}"),
             Notice::Ended { name, why }
             | Notice::Killed { name, why }
-            | Notice::Restless { name, why } => format!("{name}: {why}"),
+            | Notice::Flapping { name, why } => format!("{name}: {why}"),
             Notice::GaveUp { name, why } => format!("{name} {why}"),
             Notice::NotUpgraded { name, why } => {
                 format!("{name} is not upgraded, the process before goes on: {why}")

@@ -8,12 +8,12 @@ use qcbus_formats::pool::{Asked, BundleOutcome, CheckerOutcome, Ending, in_the_a
 use qcbus_formats::xqar::{DomainInfo, InfoElement, Issue, Location, Locations, Metadata, Param};
 use qcbus_messages::{Catalogue, CheckerInfo};
 
-use super::jobs::{Share, ShareState};
-use super::staging::Staged;
+use super::jobs::{Task, TaskState};
+use super::pending_findings::Pending;
 
 /// What one bundle's share of a job came to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ShareOutcome {
+pub struct TaskOutcome {
     /// The bundle.
     pub name: String,
     /// Its version.
@@ -22,7 +22,7 @@ pub struct ShareOutcome {
     pub failure: Option<String>,
     /// The checkers that had to look, as the catalogue numbers them.
     pub demanded: Arc<[u32]>,
-    /// What it said; see [`ShareOutcome::said`].
+    /// What it said; see [`TaskOutcome::said`].
     pub answer: Answer,
     /// What it offers; `None` for a bundle that was demanded and never seen.
     pub catalogue: Option<Arc<Catalogue>>,
@@ -34,24 +34,24 @@ pub struct ShareOutcome {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Answer {
     /// By checker.
-    Said(Arc<BTreeMap<u32, Staged>>),
+    Said(Arc<BTreeMap<u32, Pending>>),
     /// It was not asked, for it does not take files of this kind.
     OtherKind(FileKind),
 }
 
 /// What one share comes to. It is put in the form of a result by whoever stores it, and not in the loop.
-pub(super) fn outcome(name: &str, share: &Share) -> ShareOutcome {
-    ShareOutcome {
+pub(super) fn outcome(name: &str, task: &Task) -> TaskOutcome {
+    TaskOutcome {
         name: name.to_owned(),
-        version: share.version.clone(),
-        failure: match &share.state {
-            ShareState::Failed(why) => Some(why.clone()),
+        version: task.version.clone(),
+        failure: match &task.state {
+            TaskState::Failed(why) => Some(why.clone()),
             _ => None,
         },
-        demanded: share.demanded.clone(),
-        answer: Answer::Said(share.staged.clone()),
-        catalogue: share.catalogue.clone(),
-        micros: share.micros,
+        demanded: task.demanded.clone(),
+        answer: Answer::Said(task.pending.clone()),
+        catalogue: task.catalogue.clone(),
+        micros: task.micros,
     }
 }
 
@@ -62,8 +62,8 @@ pub(super) fn not_applicable(
     catalogue: &Arc<Catalogue>,
     demanded: Vec<u32>,
     kind: FileKind,
-) -> ShareOutcome {
-    ShareOutcome {
+) -> TaskOutcome {
+    TaskOutcome {
         name: name.to_owned(),
         version: version.to_owned(),
         failure: None,
@@ -74,14 +74,14 @@ pub(super) fn not_applicable(
     }
 }
 
-impl ShareOutcome {
+impl TaskOutcome {
     /// In the form of a result: every demanded checker, and those besides that kept one from looking.
     pub fn said(&self) -> BundleOutcome {
         let mut demanded = self.demanded.to_vec();
         demanded.sort_unstable();
         demanded.dedup();
         let checkers = match &self.answer {
-            Answer::Said(staged) => self.of_staged(staged, &demanded),
+            Answer::Said(pending) => self.of_pending(pending, &demanded),
             Answer::OtherKind(kind) => self.of_other_kind(*kind, &demanded),
         };
         let mut said = bundle(self, &demanded, checkers);
@@ -93,12 +93,16 @@ impl ShareOutcome {
         said
     }
 
-    fn of_staged(&self, staged: &BTreeMap<u32, Staged>, demanded: &[u32]) -> Vec<CheckerOutcome> {
+    fn of_pending(
+        &self,
+        pending: &BTreeMap<u32, Pending>,
+        demanded: &[u32],
+    ) -> Vec<CheckerOutcome> {
         let failure = self.failure.as_deref();
         // A bundle that has failed has said nothing.
-        let staged_of = |index| staged.get(&index).filter(|_| failure.is_none());
+        let pending_of = |index| pending.get(&index).filter(|_| failure.is_none());
         let is_demanded = |index: &u32| demanded.binary_search(index).is_ok();
-        let told = staged.iter().filter(|(_, staged)| staged.done.is_some());
+        let told = pending.iter().filter(|(_, pending)| pending.done.is_some());
         let told = told.map(|(checker, _)| *checker);
         let mut besides: Vec<u32> = told.filter(|index| !is_demanded(index)).collect();
         if failure.is_some() {
@@ -116,7 +120,7 @@ impl ShareOutcome {
             if !besides.is_empty() && is_demanded(&index) {
                 asked.insert(&*offered.id);
             }
-            checkers.push(said(offered, staged_of(index), failure));
+            checkers.push(said(offered, pending_of(index), failure));
         }
         if !besides.is_empty() {
             let mut kept = in_the_answer(&checkers, |id| asked.contains(id)).into_iter();
@@ -153,12 +157,12 @@ fn described(offered: &CheckerInfo) -> CheckerOutcome {
     }
 }
 
-fn bundle(share: &ShareOutcome, demanded: &[u32], checkers: Vec<CheckerOutcome>) -> BundleOutcome {
-    let catalogue = share.catalogue.as_deref();
+fn bundle(task: &TaskOutcome, demanded: &[u32], checkers: Vec<CheckerOutcome>) -> BundleOutcome {
+    let catalogue = task.catalogue.as_deref();
     BundleOutcome {
-        name: share.name.clone(),
+        name: task.name.clone(),
         alias: catalogue.map_or_else(String::new, |it| it.alias.clone()),
-        version: share.version.clone(),
+        version: task.version.clone(),
         build_date: catalogue.map_or_else(String::new, |it| it.build_date.clone()),
         description: catalogue.map_or_else(String::new, |it| it.description.clone()),
         params: Vec::new(),
@@ -180,14 +184,14 @@ fn in_question(catalogue: &Catalogue, demanded: &[u32]) -> usize {
 }
 
 /// What one checker said, or why it said nothing.
-fn said(offered: &CheckerInfo, staged: Option<&Staged>, failure: Option<&str>) -> CheckerOutcome {
-    let done = staged.and_then(|staged| staged.done.clone());
+fn said(offered: &CheckerInfo, pending: Option<&Pending>, failure: Option<&str>) -> CheckerOutcome {
+    let done = pending.and_then(|pending| pending.done.clone());
     let (mut ending, params, metadata) = done.unwrap_or_else(|| {
         let silent = "the bundle said that it was done without a word on this checker";
         let reason = failure.unwrap_or(silent).to_owned();
         (Ending::Failed { reason }, Vec::new(), Vec::new())
     });
-    let (kept, withheld) = staged.map_or((0, 0), |it| (it.issues.len(), it.withheld));
+    let (kept, withheld) = pending.map_or((0, 0), |it| (it.issues.len(), it.withheld));
     if withheld > 0 {
         ending = Ending::Failed {
             reason: format!(
@@ -197,7 +201,7 @@ fn said(offered: &CheckerInfo, staged: Option<&Staged>, failure: Option<&str>) -
     }
     CheckerOutcome {
         // Whatever it says of its end: pooling makes a failure of findings by one that did not look.
-        issues: staged.map_or_else(Vec::new, |staged| staged.issues.clone()),
+        issues: pending.map_or_else(Vec::new, |pending| pending.issues.clone()),
         ending: Some(ending),
         params,
         metadata,

@@ -24,19 +24,19 @@ fn offers() -> Arc<Catalogue> {
     })
 }
 
-fn share(staged: BTreeMap<u32, Staged>) -> Share {
-    Share {
-        state: ShareState::Done,
+fn task(pending: BTreeMap<u32, Pending>) -> Task {
+    Task {
+        state: TaskState::Done,
         version: "1".to_owned(),
         catalogue: Some(offers()),
-        mark: None,
+        version_digest: None,
         demanded: [0].into(),
-        staged: Arc::new(staged),
-        staged_bytes: 0,
+        pending: Arc::new(pending),
+        pending_bytes: 0,
         micros: 7,
-        suspect: false,
+        quarantined: false,
         strikes: 0,
-        absent: false,
+        missing: false,
     }
 }
 
@@ -51,13 +51,13 @@ fn a_result_has_what_a_checker_said_and_what_is_known_of_it() {
         value: "3".to_owned(),
         description: "how many there are".to_owned(),
     };
-    let staged = Staged {
+    let pending = Pending {
         issues: Vec::new(),
         withheld: 0,
         done_bytes: 0,
         done: Some((Ending::Completed, vec![param.clone()], vec![fact.clone()])),
     };
-    let outcome = outcome("Bundle", &share(BTreeMap::from([(0, staged)])));
+    let outcome = outcome("Bundle", &task(BTreeMap::from([(0, pending)])));
     let expected = CheckerOutcome {
         id: "first".into(),
         description: "what first looks at".into(),
@@ -90,13 +90,13 @@ fn an_issue(text: &str) -> Issue {
 /// What stands in the result of a checker that ends so with these findings: its status, why, and
 /// what it found.
 fn in_the_result(ending: Ending, issues: Vec<Issue>) -> (Status, String, Vec<String>) {
-    let staged = Staged {
+    let pending = Pending {
         issues,
         withheld: 0,
         done_bytes: 0,
         done: Some((ending, Vec::new(), Vec::new())),
     };
-    let outcome = outcome("Bundle", &share(BTreeMap::from([(0, staged)])));
+    let outcome = outcome("Bundle", &task(BTreeMap::from([(0, pending)])));
     let input = PoolInput {
         input_file: "/farm/a.xodr",
         config: None,

@@ -8,34 +8,34 @@ use qcbus_messages::JobId;
 /// a row, so that nothing else waits for ever while clients ask and ask.
 #[derive(Debug, Default)]
 pub(super) struct Queue {
-    errands: VecDeque<JobId>,
+    on_demand_checks: VecDeque<JobId>,
     others: VecDeque<JobId>,
     /// The last that was taken was an errand.
-    was_errand: bool,
+    was_on_demand: bool,
 }
 
 impl Queue {
     /// Puts a job at the end.
-    pub fn push(&mut self, id: JobId, is_errand: bool) {
-        self.of(is_errand).push_back(id);
+    pub fn push(&mut self, id: JobId, is_on_demand: bool) {
+        self.of(is_on_demand).push_back(id);
     }
 
     /// Puts a job where it was before it was taken.
-    pub fn put_back(&mut self, id: JobId, is_errand: bool) {
-        self.of(is_errand).push_front(id);
+    pub fn put_back(&mut self, id: JobId, is_on_demand: bool) {
+        self.of(is_on_demand).push_front(id);
     }
 
     /// Takes the next job.
     pub fn pop(&mut self) -> Option<JobId> {
-        let mut kinds = [!self.was_errand, self.was_errand].into_iter();
-        let (id, is_errand) = kinds.find_map(|kind| Some((self.of(kind).pop_front()?, kind)))?;
-        self.was_errand = is_errand;
+        let mut kinds = [!self.was_on_demand, self.was_on_demand].into_iter();
+        let (id, is_on_demand) = kinds.find_map(|kind| Some((self.of(kind).pop_front()?, kind)))?;
+        self.was_on_demand = is_on_demand;
         Some(id)
     }
 
     /// Takes this job, if it is there.
     pub fn take(&mut self, id: JobId) -> Option<JobId> {
-        [&mut self.errands, &mut self.others]
+        [&mut self.on_demand_checks, &mut self.others]
             .into_iter()
             .find_map(|queue| {
                 let at = queue.iter().position(|it| *it == id)?;
@@ -45,13 +45,13 @@ impl Queue {
 
     /// Forgets all of them.
     pub fn clear(&mut self) {
-        self.errands.clear();
+        self.on_demand_checks.clear();
         self.others.clear();
     }
 
     /// How many there are.
     pub fn len(&self) -> usize {
-        self.errands.len() + self.others.len()
+        self.on_demand_checks.len() + self.others.len()
     }
 
     /// Whether there are none.
@@ -59,9 +59,9 @@ impl Queue {
         self.len() == 0
     }
 
-    fn of(&mut self, is_errand: bool) -> &mut VecDeque<JobId> {
-        match is_errand {
-            true => &mut self.errands,
+    fn of(&mut self, is_on_demand: bool) -> &mut VecDeque<JobId> {
+        match is_on_demand {
+            true => &mut self.on_demand_checks,
             false => &mut self.others,
         }
     }

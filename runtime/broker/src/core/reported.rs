@@ -37,12 +37,12 @@ impl State {
     fn why_unreported(&self, name: &str) -> String {
         let reporter = self.reporter_named(name);
         let remark = reporter.map_or(String::new(), |it| it.remark(self.now));
-        let trouble = self.children.get(name).and_then(|it| it.trouble.clone());
+        let failure = self.children.get(name).and_then(|it| it.failure.clone());
         let is_there = reporter.is_some_and(|it| it.session.is_some());
         match (is_there, remark.is_empty()) {
             (true, true) => format!("{name} has not answered yet"),
             (true, false) => format!("{name}: {remark}"),
-            (false, _) => match trouble.unwrap_or(remark) {
+            (false, _) => match failure.unwrap_or(remark) {
                 why if why.is_empty() => format!("{name} is down"),
                 why => format!("{name} is down: {why}"),
             },

@@ -16,15 +16,15 @@ use crate::InForce;
 const TEXT: &str = "text";
 
 /// A state machine that knows one judged file from the journal.
-struct Desk {
+struct Requests {
     state: State,
     path: Arc<Path>,
     sessions: u64,
 }
 
-impl Desk {
+impl Requests {
     /// `delivered`: the journal says that the reporter has it.
-    fn new(delivered: bool) -> Desk {
+    fn new(delivered: bool) -> Requests {
         let in_force = InForce::new(None, SearchPath::default()).unwrap();
         let mut state = State::new(Settings::default(), in_force.digest, in_force.demand());
         let path: Arc<Path> = Path::new("/x/a.xodr").into();
@@ -37,7 +37,7 @@ impl Desk {
             digest: Digest::default(),
             basis: Digest::default(),
             config: Digest::default(),
-            jury: Arc::default(),
+            required_set: Arc::default(),
             epoch: Epoch::default(),
             inputs: Vec::new(),
             racy: false,
@@ -47,7 +47,7 @@ impl Desk {
         };
         let by = [(TEXT.to_owned(), Reported::Of(JobId(7)))];
         state.remember(&path, judged, if delivered { &by } else { &[] });
-        Desk {
+        Requests {
             state,
             path,
             sessions: 0,
@@ -166,51 +166,51 @@ fn is_over(actions: &[Action]) -> bool {
 
 #[test]
 fn a_reporter_that_is_there_is_told_at_once() {
-    let mut desk = Desk::new(true);
-    let (session, _) = desk.join();
-    let actions = desk.vanish();
+    let mut requests = Requests::new(true);
+    let (session, _) = requests.join();
+    let actions = requests.vanish();
     assert!(is_told(&actions), "{actions:?}");
     let named =
         |it: &Action| matches!(it, Action::Withdraw { reporters, .. } if reporters == &[TEXT]);
     assert!(actions.iter().any(named), "the journal knows: {actions:?}");
-    assert!(is_over(&desk.say(session, withdrawn())));
-    assert!(!is_over(&desk.say(session, withdrawn())), "only once");
+    assert!(is_over(&requests.say(session, withdrawn())));
+    assert!(!is_over(&requests.say(session, withdrawn())), "only once");
 }
 
 /// Were the broker killed in between, the next one would take the report for there.
 #[test]
 fn nothing_is_taken_back_that_the_journal_knows_to_be_there() {
-    let mut desk = Desk::new(true);
-    let (session, _) = desk.join();
-    let actions = desk.vanish_unrecorded();
+    let mut requests = Requests::new(true);
+    let (session, _) = requests.join();
+    let actions = requests.vanish_unrecorded();
     assert!(!is_told(&actions), "{actions:?}");
     // It comes back, and goes again.
-    let path = desk.path.clone();
+    let path = requests.path.clone();
     let stamp = Stamp::default();
-    let actions = desk.event(Event::Settled { path, stamp });
+    let actions = requests.event(Event::Settled { path, stamp });
     let [Action::Prepare { job, .. }] = actions[..] else {
         panic!("{actions:?}");
     };
-    desk.vanish_unrecorded();
+    requests.vanish_unrecorded();
     let result = Err(PrepareFailure::Vanished);
-    desk.event(Event::Prepared { job, result });
-    let path = desk.path.clone();
-    let once = desk.event(Event::Withdrawn { path: path.clone() });
+    requests.event(Event::Prepared { job, result });
+    let path = requests.path.clone();
+    let once = requests.event(Event::Withdrawn { path: path.clone() });
     assert!(
         !is_told(&once),
         "the second time may still be lost: {once:?}"
     );
-    assert!(is_told(&desk.event(Event::Withdrawn { path })));
-    assert!(is_over(&desk.say(session, withdrawn())));
+    assert!(is_told(&requests.event(Event::Withdrawn { path })));
+    assert!(is_over(&requests.say(session, withdrawn())));
 }
 
 #[test]
 fn what_a_reporter_has_is_not_sent_to_it_again() {
     for has in [true, false] {
-        let mut desk = Desk::new(has);
-        let path = desk.path.clone();
-        desk.event(Event::Present { path });
-        let (_, actions) = desk.join();
+        let mut requests = Requests::new(has);
+        let path = requests.path.clone();
+        requests.event(Event::Present { path });
+        let (_, actions) = requests.join();
         let sent = |it: &Action| matches!(it, Action::Deliver { .. });
         assert_eq!(actions.iter().any(sent), !has, "{actions:?}");
     }
@@ -218,75 +218,75 @@ fn what_a_reporter_has_is_not_sent_to_it_again() {
 
 #[test]
 fn a_reporter_that_is_away_is_told_when_it_comes() {
-    let mut desk = Desk::new(true);
-    assert!(!is_told(&desk.vanish()));
-    let (_, actions) = desk.join();
+    let mut requests = Requests::new(true);
+    assert!(!is_told(&requests.vanish()));
+    let (_, actions) = requests.join();
     assert!(is_told(&actions), "{actions:?}");
 }
 
 #[test]
 fn a_reporter_that_dies_before_it_has_done_so_is_told_again() {
-    let mut desk = Desk::new(true);
-    let (session, _) = desk.join();
-    assert!(is_told(&desk.vanish()));
-    desk.event(Event::Gone { session });
-    let (session, actions) = desk.join();
+    let mut requests = Requests::new(true);
+    let (session, _) = requests.join();
+    assert!(is_told(&requests.vanish()));
+    requests.event(Event::Gone { session });
+    let (session, actions) = requests.join();
     assert!(is_told(&actions), "{actions:?}");
-    assert!(is_over(&desk.say(session, withdrawn())));
-    let (_, actions) = desk.join();
+    assert!(is_over(&requests.say(session, withdrawn())));
+    let (_, actions) = requests.join();
     assert!(!is_told(&actions), "{actions:?}");
 }
 
 #[test]
 fn a_result_under_way_is_not_sent_after_its_file_has_gone() {
-    let mut desk = Desk::new(false);
-    let (session, actions) = desk.join();
+    let mut requests = Requests::new(false);
+    let (session, actions) = requests.join();
     let sent = |it: &Action| matches!(it, Action::Deliver { .. });
     assert!(actions.iter().any(sent), "{actions:?}");
-    assert!(desk.state.awaits_result(session, JobId(7)));
-    assert!(is_told(&desk.vanish()));
-    assert!(!desk.state.awaits_result(session, JobId(7)));
+    assert!(requests.state.awaits_result(session, JobId(7)));
+    assert!(is_told(&requests.vanish()));
+    assert!(!requests.state.awaits_result(session, JobId(7)));
 }
 
 #[test]
 fn what_a_former_broker_sent_unheard_is_taken_back_too() {
-    let mut desk = Desk::new(false);
-    let launch = desk.wants(1);
-    desk.vanish();
-    let (_, actions) = desk.join_as(Some(launch.0));
+    let mut requests = Requests::new(false);
+    let launch = requests.wants(1);
+    requests.vanish();
+    let (_, actions) = requests.join_as(Some(launch.0));
     assert!(is_told(&actions), "{actions:?}");
 }
 
 #[test]
 fn nobody_joins_by_hand_as_a_child() {
-    let mut desk = Desk::new(false);
-    let launch = desk.wants(1);
+    let mut requests = Requests::new(false);
+    let launch = requests.wants(1);
     let is_refused = |actions: &[Action]| {
         let mut actions = actions.iter();
         actions.any(|it| matches!(it, Action::Refuse { .. }))
     };
-    assert!(is_refused(&desk.join().1), "it is just being started");
-    let (session, actions) = desk.join_as(Some(launch.0));
+    assert!(is_refused(&requests.join().1), "it is just being started");
+    let (session, actions) = requests.join_as(Some(launch.0));
     assert!(!is_refused(&actions), "{actions:?}");
-    assert!(is_refused(&desk.join().1), "it runs");
-    desk.event(Event::Gone { session });
-    assert!(is_refused(&desk.join().1), "it has died");
+    assert!(is_refused(&requests.join().1), "it runs");
+    requests.event(Event::Gone { session });
+    assert!(is_refused(&requests.join().1), "it has died");
 }
 
 #[test]
 fn what_the_journal_remembers_is_said_after_a_restart() {
-    let mut desk = Desk::new(false);
+    let mut requests = Requests::new(false);
     let gone: Arc<Path> = Path::new("/x/gone.xodr").into();
-    desk.state.remember_void(&gone, TEXT);
-    let (_, actions) = desk.join();
+    requests.state.remember_void(&gone, TEXT);
+    let (_, actions) = requests.join();
     let told = |it: &Action| matches!(it, Action::Void { path, .. } if *path == gone);
     assert!(actions.iter().any(told), "{actions:?}");
 }
 
 #[test]
 fn a_newer_result_waits_until_the_one_before_it_has_arrived() {
-    let mut desk = Desk::new(false);
-    let (session, actions) = desk.join();
+    let mut requests = Requests::new(false);
+    let (session, actions) = requests.join();
     let sent = |actions: &[Action]| {
         let of = |it: &Action| match it {
             Action::Deliver { delivery, .. } => Some(delivery.job),
@@ -295,43 +295,44 @@ fn a_newer_result_waits_until_the_one_before_it_has_arrived() {
         actions.iter().filter_map(of).collect::<Vec<_>>()
     };
     assert_eq!(sent(&actions), [JobId(7)]);
-    let (id, _) = desk.state.files.iter().next().unwrap();
-    let entry = desk.state.files.get_mut(id).unwrap();
+    let (id, _) = requests.state.files.iter().next().unwrap();
+    let entry = requests.state.files.get_mut(id).unwrap();
     Arc::make_mut(entry.judged.as_mut().unwrap()).job = JobId(8);
     let mut actions = Actions::default();
-    desk.state.deliver_to_all(id, &mut actions);
+    requests.state.deliver_to_all(id, &mut actions);
     assert_eq!(sent(&actions), [], "both would be read back side by side");
     let done = |job| FromPeer::ResultDone {
         job,
         report: PeerReport::Written,
     };
-    assert_eq!(sent(&desk.say(session, done(JobId(7)))), [JobId(8)]);
-    assert_eq!(sent(&desk.say(session, done(JobId(8)))), []);
-    assert!(desk.state.all_delivered());
+    assert_eq!(sent(&requests.say(session, done(JobId(7)))), [JobId(8)]);
+    assert_eq!(sent(&requests.say(session, done(JobId(8)))), []);
+    assert!(requests.state.all_delivered());
 }
 
 #[test]
 fn a_reporter_that_is_upgraded_finishes_what_it_has_begun() {
     // It goes as it was told, or is killed meanwhile: its end may be known before its session's.
-    let leaves: fn(&mut Desk, SessionId, Launch) -> Vec<Action> =
-        |desk, session, _| desk.say(session, FromPeer::Leaving);
-    let is_killed: fn(&mut Desk, SessionId, Launch) -> Vec<Action> = |desk, session, launch| {
-        let end = ChildEnd::Failed("it was killed by signal 9".to_owned());
-        let mut actions = desk.event(Event::Exited { launch, end });
-        actions.extend(desk.event(Event::Gone { session }));
-        actions
-    };
+    let leaves: fn(&mut Requests, SessionId, Launch) -> Vec<Action> =
+        |requests, session, _| requests.say(session, FromPeer::Leaving);
+    let is_killed: fn(&mut Requests, SessionId, Launch) -> Vec<Action> =
+        |requests, session, launch| {
+            let end = ChildEnd::Failed("it was killed by signal 9".to_owned());
+            let mut actions = requests.event(Event::Exited { launch, end });
+            actions.extend(requests.event(Event::Gone { session }));
+            actions
+        };
     for ends in [leaves, is_killed] {
         an_upgraded_reporter_finishes(ends);
     }
 }
 
-fn an_upgraded_reporter_finishes(ends: fn(&mut Desk, SessionId, Launch) -> Vec<Action>) {
-    let mut desk = Desk::new(false);
-    let first = desk.wants(1);
-    let (old, _) = desk.join_as(Some(first.0));
-    let second = desk.wants(2);
-    let (new, actions) = desk.join_as(Some(second.0));
+fn an_upgraded_reporter_finishes(ends: fn(&mut Requests, SessionId, Launch) -> Vec<Action>) {
+    let mut requests = Requests::new(false);
+    let first = requests.wants(1);
+    let (old, _) = requests.join_as(Some(first.0));
+    let second = requests.wants(2);
+    let (new, actions) = requests.join_as(Some(second.0));
     let drained = |it: &Action| matches!(it, Action::Send { session, message: ToPeer::Drain } if *session == old);
     assert!(
         actions.iter().any(drained),
@@ -344,25 +345,25 @@ fn an_upgraded_reporter_finishes(ends: fn(&mut Desk, SessionId, Launch) -> Vec<A
         !actions.iter().any(given),
         "the older may still write the same report"
     );
-    let actions = desk.event(exited(Launch(first.0 + 1)));
+    let actions = requests.event(exited(Launch(first.0 + 1)));
     assert!(!actions.iter().any(given), "that was another: {actions:?}");
-    let actions = ends(&mut desk, old, first);
+    let actions = ends(&mut requests, old, first);
     assert!(actions.iter().any(given), "{actions:?}");
 }
 
 /// Further judged files, each with as many findings as said, that the reporter does not have.
-fn more(desk: &mut Desk, findings: &[u64]) {
+fn more(requests: &mut Requests, findings: &[u64]) {
     for (number, count) in (8..).zip(findings) {
         let path: Arc<Path> = Path::new(&format!("/x/{number}.xodr")).into();
-        let known = desk.state.files.iter().next();
+        let known = requests.state.files.iter().next();
         let known = known.and_then(|(_, entry)| entry.judged.clone());
         let judged = Judged {
             job: JobId(number),
             counts: [0, 0, *count],
             ..(*known.unwrap()).clone()
         };
-        desk.state.remember(&path, judged, &[]);
-        desk.event(Event::Present { path });
+        requests.state.remember(&path, judged, &[]);
+        requests.event(Event::Present { path });
     }
 }
 
@@ -384,75 +385,75 @@ fn written(job: u64) -> FromPeer {
 
 #[test]
 fn results_with_many_findings_travel_one_after_the_other() {
-    let mut desk = Desk::new(true);
-    more(&mut desk, &[1_500, 500, 1, 3_000, 1]);
-    let (session, actions) = desk.join();
+    let mut requests = Requests::new(true);
+    more(&mut requests, &[1_500, 500, 1, 3_000, 1]);
+    let (session, actions) = requests.join();
     assert_eq!(sent(&actions), [8, 9], "2,000 are the most under way");
-    assert_eq!(sent(&desk.say(session, written(8))), [10]);
-    assert!(sent(&desk.say(session, written(9))).is_empty());
-    assert_eq!(sent(&desk.say(session, written(10))), [11], "alone");
-    assert_eq!(sent(&desk.say(session, written(11))), [12]);
+    assert_eq!(sent(&requests.say(session, written(8))), [10]);
+    assert!(sent(&requests.say(session, written(9))).is_empty());
+    assert_eq!(sent(&requests.say(session, written(10))), [11], "alone");
+    assert_eq!(sent(&requests.say(session, written(11))), [12]);
 }
 
 /// Large results are read back and kept, and there may be many reporters: a broker with eight of them took
 /// 600 MiB while a bundle reported far too much.
 #[test]
 fn few_reporters_have_a_large_result_at_once() {
-    let mut desk = Desk::new(true);
-    more(&mut desk, &[3_000]);
+    let mut requests = Requests::new(true);
+    more(&mut requests, &[3_000]);
     let mut sessions = Vec::new();
     let mut given = Vec::new();
     for name in ["one", "two", "three", "four"] {
-        desk.sessions += 1;
-        let session = SessionId(desk.sessions);
-        let mut hello = hello(desk.sessions, None);
+        requests.sessions += 1;
+        let session = SessionId(requests.sessions);
+        let mut hello = hello(requests.sessions, None);
         hello.name = name.to_owned();
-        let actions = desk.event(Event::Hello { session, hello });
+        let actions = requests.event(Event::Hello { session, hello });
         sessions.push(session);
         assert_eq!(sent(&actions), [7], "the small one reaches everybody");
-        let next = desk.say(session, written(7));
+        let next = requests.say(session, written(7));
         given.push(sent(&next) == [8]);
     }
     assert_eq!(given, [true, true, false, false]);
-    let next = desk.say(sessions[0], written(8));
+    let next = requests.say(sessions[0], written(8));
     assert_eq!(sent(&next), [8], "the third has it when the first is done");
-    assert!(sent(&desk.event(Event::Tick)).is_empty());
-    let next = desk.say(sessions[2], written(8));
+    assert!(sent(&requests.event(Event::Tick)).is_empty());
+    let next = requests.say(sessions[2], written(8));
     assert_eq!(sent(&next), [8], "then the fourth");
 }
 
 #[test]
 fn a_reporter_has_no_more_under_way_than_it_said() {
-    let mut desk = Desk::new(true);
-    more(&mut desk, &[1; 6]);
-    desk.vanish();
-    let (session, actions) = desk.join();
+    let mut requests = Requests::new(true);
+    more(&mut requests, &[1; 6]);
+    requests.vanish();
+    let (session, actions) = requests.join();
     assert!(is_told(&actions));
     assert_eq!(sent(&actions), [8, 9, 10], "and what it is to take back");
-    assert_eq!(sent(&desk.say(session, withdrawn())), [11]);
+    assert_eq!(sent(&requests.say(session, withdrawn())), [11]);
 }
 
 #[test]
 fn a_result_under_way_is_not_sent_twice() {
-    let mut desk = Desk::new(false);
-    let path = desk.path.clone();
-    desk.event(Event::Present { path });
-    let (_, actions) = desk.join();
+    let mut requests = Requests::new(false);
+    let path = requests.path.clone();
+    requests.event(Event::Present { path });
+    let (_, actions) = requests.join();
     assert_eq!(sent(&actions), [7]);
     let mut again = Vec::new();
-    desk.state.reporters[0].queue.push_back(0);
-    desk.state.deliver(0, &mut again);
+    requests.state.reporters[0].queue.push_back(0);
+    requests.state.deliver(0, &mut again);
     assert!(sent(&again).is_empty());
 }
 
 #[test]
 fn a_reporter_that_does_not_leave_at_the_end_is_killed() {
-    let mut desk = Desk::new(true);
-    let launch = desk.wants(1);
-    desk.join_as(Some(launch.0));
-    desk.event(Event::Drain);
-    desk.event(Event::Tick);
-    let late = desk.state.handle(Duration::from_secs(5), Event::Tick);
+    let mut requests = Requests::new(true);
+    let launch = requests.wants(1);
+    requests.join_as(Some(launch.0));
+    requests.event(Event::Drain);
+    requests.event(Event::Tick);
+    let late = requests.state.handle(Duration::from_secs(5), Event::Tick);
     let killed = |it: &Action| matches!(it, Action::Kill { launch: of } if *of == launch);
     assert!(late.iter().any(killed), "{late:?}");
     assert!(late.iter().any(|it| matches!(it, Action::Stop)));
@@ -470,17 +471,17 @@ fn not(mut report: FromPeer, why: &str) -> FromPeer {
 
 #[test]
 fn what_a_reporter_did_and_could_not_do_is_in_its_status() {
-    let mut desk = Desk::new(true);
-    more(&mut desk, &[1, 1, 1]);
-    desk.vanish();
-    let (session, _) = desk.join();
-    desk.say(session, written(8));
-    let actions = desk.say(session, not(written(9), "no room"));
+    let mut requests = Requests::new(true);
+    more(&mut requests, &[1, 1, 1]);
+    requests.vanish();
+    let (session, _) = requests.join();
+    requests.say(session, written(8));
+    let actions = requests.say(session, not(written(9), "no room"));
     let said = |it: &Action| matches!(it, Action::Notice(Notice::NotReported { name, .. }) if name == TEXT);
     assert!(actions.iter().any(said), "{actions:?}");
-    desk.say(session, not(withdrawn(), "no rights"));
-    desk.say(session, written(10));
-    let status = desk.state.status();
+    requests.say(session, not(withdrawn(), "no rights"));
+    requests.say(session, written(10));
+    let status = requests.state.status();
     let peer = status.peers.iter().find(|it| it.name == TEXT).unwrap();
     assert_eq!(peer.done, 3);
     assert_eq!(peer.note, "2 not reported: no rights; tried again in 1 s");
@@ -488,24 +489,24 @@ fn what_a_reporter_did_and_could_not_do_is_in_its_status() {
 
 #[test]
 fn what_one_reporter_has_written_does_not_touch_what_another_has() {
-    let mut desk = Desk::new(false);
-    let path = desk.path.clone();
-    desk.event(Event::Present { path });
-    let (session, _) = desk.join();
-    let entry = desk.state.files.get_mut(0).unwrap();
+    let mut requests = Requests::new(false);
+    let path = requests.path.clone();
+    requests.event(Event::Present { path });
+    let (session, _) = requests.join();
+    let entry = requests.state.files.get_mut(0).unwrap();
     entry.delivered.push((5, Reported::Of(JobId(7))));
-    desk.say(session, written(7));
-    let entry = desk.state.files.get(0).unwrap();
+    requests.say(session, written(7));
+    let entry = requests.state.files.get(0).unwrap();
     assert!(entry.has(5, JobId(7)) && entry.has(0, JobId(7)));
 }
 
 #[test]
 fn a_result_that_cannot_be_read_back_is_said_and_makes_room_for_the_next() {
-    let mut desk = Desk::new(true);
-    more(&mut desk, &[3_000, 1]);
-    let (session, actions) = desk.join();
+    let mut requests = Requests::new(true);
+    more(&mut requests, &[3_000, 1]);
+    let (session, actions) = requests.join();
     assert_eq!(sent(&actions), [8]);
-    let actions = desk.event(Event::Undeliverable {
+    let actions = requests.event(Event::Undeliverable {
         session,
         job: JobId(8),
         why: "the disk is in trouble".to_owned(),
@@ -526,53 +527,53 @@ fn named(actions: &[Action]) -> Vec<String> {
 
 #[test]
 fn who_never_had_a_report_is_not_told_that_its_file_has_gone() {
-    let mut desk = Desk::new(false);
-    desk.state.reporter_index(TEXT);
-    assert!(named(&desk.vanish()).is_empty());
-    let (_, actions) = desk.join();
+    let mut requests = Requests::new(false);
+    requests.state.reporter_index(TEXT);
+    assert!(named(&requests.vanish()).is_empty());
+    let (_, actions) = requests.join();
     assert!(!is_told(&actions), "{actions:?}");
 }
 
 #[test]
 fn a_file_that_goes_twice_before_its_report_is_taken_back_stays_to_be_taken_back() {
     for there in [false, true] {
-        let mut desk = Desk::new(true);
-        desk.judges_nothing();
+        let mut requests = Requests::new(true);
+        requests.judges_nothing();
         if there {
-            desk.join();
+            requests.join();
         }
-        assert_eq!(named(&desk.vanish()), [TEXT]);
-        let path = desk.path.clone();
+        assert_eq!(named(&requests.vanish()), [TEXT]);
+        let path = requests.path.clone();
         let stamp = Stamp::default();
-        desk.event(Event::Settled { path, stamp });
-        assert_eq!(named(&desk.vanish()), [TEXT], "it has not yet done so");
+        requests.event(Event::Settled { path, stamp });
+        assert_eq!(named(&requests.vanish()), [TEXT], "it has not yet done so");
     }
 }
 
 #[test]
 fn a_reporter_that_leaves_goes_without_a_word_and_gets_the_rest_when_it_comes_back() {
-    let mut desk = Desk::new(false);
-    let path = desk.path.clone();
-    desk.event(Event::Present { path });
-    let (session, actions) = desk.join();
+    let mut requests = Requests::new(false);
+    let path = requests.path.clone();
+    requests.event(Event::Present { path });
+    let (session, actions) = requests.join();
     assert_eq!(sent(&actions), [7]);
-    let actions = desk.say(session, FromPeer::Leaving);
+    let actions = requests.say(session, FromPeer::Leaving);
     let closed = |it: &Action| matches!(it, Action::Disconnect { session: of } if *of == session);
     assert!(actions.iter().any(closed), "{actions:?}");
-    assert!(desk.state.sessions.is_empty());
-    assert_eq!(sent(&desk.join().1), [7]);
+    assert!(requests.state.sessions.is_empty());
+    assert_eq!(sent(&requests.join().1), [7]);
 }
 
 /// A reporter, told to take something back or sent a result, and what happens to it after a while.
 fn waited(owes: bool, beats: bool, limit: fn(&Settings) -> Duration) -> Vec<bool> {
-    let mut desk = Desk::new(true);
-    let launch = desk.wants(1);
-    let (session, _) = desk.join_as(Some(launch.0));
+    let mut requests = Requests::new(true);
+    let launch = requests.wants(1);
+    let (session, _) = requests.join_as(Some(launch.0));
     if owes {
-        desk.vanish();
+        requests.vanish();
     }
     let start = Duration::from_secs(1);
-    let end = start + limit(&desk.state.settings);
+    let end = start + limit(&requests.state.settings);
     let mut now = start;
     while beats && now + Duration::from_secs(1) < end {
         now += Duration::from_secs(1);
@@ -580,10 +581,12 @@ fn waited(owes: bool, beats: bool, limit: fn(&Settings) -> Duration) -> Vec<bool
             job: None,
             checker: None,
         };
-        desk.state.handle(now, Event::Message { session, message });
+        requests
+            .state
+            .handle(now, Event::Message { session, message });
     }
     let killed = |it: &Action| matches!(it, Action::Kill { launch: of } if *of == launch);
-    let ended = |now| desk.state.handle(now, Event::Tick).iter().any(killed);
+    let ended = |now| requests.state.handle(now, Event::Tick).iter().any(killed);
     [end, end + Duration::from_millis(1)].map(ended).into()
 }
 
@@ -596,33 +599,36 @@ fn a_reporter_that_owes_an_answer_is_waited_for_so_long_and_no_longer() {
 
 #[test]
 fn a_run_does_not_end_before_every_report_is_written() {
-    let mut desk = Desk::new(false);
-    desk.judges_nothing();
-    let path = desk.path.clone();
-    desk.event(Event::Present { path });
-    let (session, _) = desk.join();
-    assert!(!desk.state.all_delivered(), "a result is under way");
-    desk.say(session, written(7));
-    assert!(desk.state.all_delivered());
-    desk.vanish();
-    assert!(!desk.state.all_delivered(), "a report is to be taken back");
-    desk.say(session, withdrawn());
-    assert!(desk.state.all_delivered());
-    desk.state.reporters[0].queue.push_back(0);
-    assert!(!desk.state.all_delivered(), "a result waits");
-    desk.say(session, FromPeer::Leaving);
-    assert!(desk.state.all_delivered(), "nobody is there");
+    let mut requests = Requests::new(false);
+    requests.judges_nothing();
+    let path = requests.path.clone();
+    requests.event(Event::Present { path });
+    let (session, _) = requests.join();
+    assert!(!requests.state.all_delivered(), "a result is under way");
+    requests.say(session, written(7));
+    assert!(requests.state.all_delivered());
+    requests.vanish();
+    assert!(
+        !requests.state.all_delivered(),
+        "a report is to be taken back"
+    );
+    requests.say(session, withdrawn());
+    assert!(requests.state.all_delivered());
+    requests.state.reporters[0].queue.push_back(0);
+    assert!(!requests.state.all_delivered(), "a result waits");
+    requests.say(session, FromPeer::Leaving);
+    assert!(requests.state.all_delivered(), "nobody is there");
 }
 
 #[test]
 fn a_reporter_whose_process_has_ended_is_away_at_once() {
-    let mut desk = Desk::new(true);
-    let launch = desk.wants(1);
-    desk.join_as(Some(launch.0));
-    desk.event(exited(Launch(launch.0 + 1)));
-    assert!(desk.state.reporters[0].session.is_some(), "another one");
-    let actions = desk.event(exited(launch));
-    assert!(desk.state.reporters[0].session.is_none());
+    let mut requests = Requests::new(true);
+    let launch = requests.wants(1);
+    requests.join_as(Some(launch.0));
+    requests.event(exited(Launch(launch.0 + 1)));
+    assert!(requests.state.reporters[0].session.is_some(), "another one");
+    let actions = requests.event(exited(launch));
+    assert!(requests.state.reporters[0].session.is_none());
     let said =
         |it: &Action| matches!(it, Action::Notice(Notice::Ended { name, .. }) if name == TEXT);
     assert!(actions.iter().any(said), "{actions:?}");
@@ -630,52 +636,52 @@ fn a_reporter_whose_process_has_ended_is_away_at_once() {
 
 #[test]
 fn failed_report_is_tried_again_after_a_pause_and_then_the_rest() {
-    let mut desk = Desk::new(true);
-    more(&mut desk, &[1; 20]);
-    let (session, _) = desk.join();
+    let mut requests = Requests::new(true);
+    more(&mut requests, &[1; 20]);
+    let (session, _) = requests.join();
     let mut given: Vec<u64> = (8..12).collect();
     while let Some(job) = given.pop() {
-        given.extend(sent(&desk.say(session, not(written(job), "no room"))));
+        given.extend(sent(&requests.say(session, not(written(job), "no room"))));
     }
-    let remark = |desk: &Desk| desk.state.status().peers[0].note.clone();
+    let remark = |requests: &Requests| requests.state.status().peers[0].note.clone();
     assert_eq!(
-        remark(&desk),
+        remark(&requests),
         "20 not reported: no room; tried again in 1 s"
     );
-    let after = Duration::from_secs(1) + desk.state.settings.retry_after;
-    let early = desk
+    let after = Duration::from_secs(1) + requests.state.settings.retry_after;
+    let early = requests
         .state
         .handle(after - Duration::from_millis(1), Event::Tick);
     assert!(sent(&early).is_empty(), "{early:?}");
-    let mut given = sent(&desk.state.handle(after, Event::Tick));
+    let mut given = sent(&requests.state.handle(after, Event::Tick));
     assert_eq!(given.len(), 4, "as many as it takes at once");
     let mut all = 0;
     while let Some(job) = given.pop() {
         all += 1;
-        given.extend(sent(&desk.say(session, written(job))));
+        given.extend(sent(&requests.say(session, written(job))));
     }
-    assert_eq!((all, remark(&desk)), (20, String::new()));
-    assert!(desk.state.status().notices.is_empty());
+    assert_eq!((all, remark(&requests)), (20, String::new()));
+    assert!(requests.state.status().notices.is_empty());
 }
 
 #[test]
 fn result_that_cannot_be_read_back_is_delivered_later() {
-    let mut desk = Desk::new(false);
-    let path = desk.path.clone();
-    desk.event(Event::Present { path });
-    let (session, _) = desk.join();
+    let mut requests = Requests::new(false);
+    let path = requests.path.clone();
+    requests.event(Event::Present { path });
+    let (session, _) = requests.join();
     let (job, why) = (JobId(7), "the disk is in trouble".to_owned());
-    desk.event(Event::Undeliverable { session, job, why });
-    let after = Duration::from_secs(1) + desk.state.settings.retry_after;
-    assert_eq!(sent(&desk.state.handle(after, Event::Tick)), [7]);
+    requests.event(Event::Undeliverable { session, job, why });
+    let after = Duration::from_secs(1) + requests.state.settings.retry_after;
+    assert_eq!(sent(&requests.state.handle(after, Event::Tick)), [7]);
 }
 
 /// A client waits for the verdict and the reports; what it is answered.
-fn waits(desk: &mut Desk, timeout: Option<Duration>) -> Vec<Action> {
-    let path = desk.path.clone();
+fn waits(requests: &mut Requests, timeout: Option<Duration>) -> Vec<Action> {
+    let path = requests.path.clone();
     let reports = true;
-    desk.event(Event::Wait {
-        ticket: Ticket(1),
+    requests.event(Event::Wait {
+        request_id: RequestId(1),
         path,
         stamp: Some(Stamp::default()),
         unwatched: None,
@@ -692,17 +698,17 @@ fn answer(actions: &[Action]) -> Option<&Response> {
 
 #[test]
 fn client_that_waits_for_reports_is_answered_when_every_one_is_written() {
-    let mut desk = Desk::new(false);
-    desk.makes_it_stand();
-    let launch = desk.wants(1);
-    let actions = waits(&mut desk, None);
+    let mut requests = Requests::new(false);
+    requests.makes_it_stand();
+    let launch = requests.wants(1);
+    let actions = waits(&mut requests, None);
     assert_eq!(answer(&actions), None, "the reporter is still to come");
-    let (session, _) = desk.join_as(Some(launch.0));
-    let failed = desk.say(session, not(written(7), "no room"));
+    let (session, _) = requests.join_as(Some(launch.0));
+    let failed = requests.say(session, not(written(7), "no room"));
     assert_eq!(answer(&failed), None, "it is tried again");
-    let after = Duration::from_secs(1) + desk.state.settings.retry_after;
-    assert_eq!(sent(&desk.state.handle(after, Event::Tick)), [7]);
-    let done = desk.say(session, written(7));
+    let after = Duration::from_secs(1) + requests.state.settings.retry_after;
+    assert_eq!(sent(&requests.state.handle(after, Event::Tick)), [7]);
+    let done = requests.say(session, written(7));
     assert!(
         matches!(answer(&done), Some(Response::Verdict(_))),
         "{done:?}"
@@ -711,15 +717,15 @@ fn client_that_waits_for_reports_is_answered_when_every_one_is_written() {
 
 #[test]
 fn client_is_told_at_its_timeout_which_report_is_missing_and_why() {
-    let mut desk = Desk::new(false);
-    desk.makes_it_stand();
-    let launch = desk.wants(1);
-    let (session, _) = desk.join_as(Some(launch.0));
+    let mut requests = Requests::new(false);
+    requests.makes_it_stand();
+    let launch = requests.wants(1);
+    let (session, _) = requests.join_as(Some(launch.0));
     let timeout = Duration::from_millis(500);
-    waits(&mut desk, Some(timeout));
-    desk.say(session, not(written(7), "no room"));
+    waits(&mut requests, Some(timeout));
+    requests.say(session, not(written(7), "no room"));
     let over = Duration::from_secs(1) + timeout;
-    let actions = desk.state.handle(over, Event::Tick);
+    let actions = requests.state.handle(over, Event::Tick);
     let Some(Response::Unreported { reporters, .. }) = answer(&actions) else {
         panic!("{actions:?}");
     };
@@ -729,9 +735,9 @@ fn client_is_told_at_its_timeout_which_report_is_missing_and_why() {
 
 #[test]
 fn client_that_waits_for_reports_does_not_wait_where_there_is_no_reporter() {
-    let mut desk = Desk::new(false);
-    desk.makes_it_stand();
-    let actions = waits(&mut desk, None);
+    let mut requests = Requests::new(false);
+    requests.makes_it_stand();
+    let actions = waits(&mut requests, None);
     assert!(
         matches!(answer(&actions), Some(Response::Verdict(_))),
         "{actions:?}"
@@ -740,12 +746,12 @@ fn client_that_waits_for_reports_does_not_wait_where_there_is_no_reporter() {
 
 #[test]
 fn client_is_answered_when_the_reporter_that_owes_is_removed() {
-    let mut desk = Desk::new(false);
-    desk.makes_it_stand();
-    desk.wants(1);
-    assert_eq!(answer(&waits(&mut desk, None)), None);
-    desk.event(Event::Children { specs: Vec::new() });
-    let actions = desk.event(Event::Tick);
+    let mut requests = Requests::new(false);
+    requests.makes_it_stand();
+    requests.wants(1);
+    assert_eq!(answer(&waits(&mut requests, None)), None);
+    requests.event(Event::Children { specs: Vec::new() });
+    let actions = requests.event(Event::Tick);
     assert!(
         matches!(answer(&actions), Some(Response::Verdict(_))),
         "{actions:?}"

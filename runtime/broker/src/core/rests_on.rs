@@ -47,7 +47,7 @@ impl State {
         let Some(job) = self.jobs.get(&id) else {
             return Vec::new();
         };
-        if job.errand.is_some() {
+        if job.on_demand.is_some() {
             // A client's run knows no verdicts of others.
             return Vec::new();
         }
@@ -69,8 +69,8 @@ impl State {
         let is_known = judged.is_some_and(|it| is_of(it, file, prepared));
         match entry.stage() {
             Stage::Active(_) => true,
-            Stage::Waiting(..) => !is_known || entry.doubted || !self.is_of_now(entry),
-            Stage::Idle => !is_known || entry.doubted,
+            Stage::Waiting(..) => !is_known || entry.stale || !self.is_of_now(entry),
+            Stage::Idle => !is_known || entry.stale,
         }
     }
 
@@ -117,7 +117,7 @@ impl State {
 
     /// The files that a job rests on, each with the verdict on it.
     pub(super) fn verdicts_under(&self, job: &ActiveJob) -> Vec<(Referenced, RestsOn)> {
-        if job.errand.is_some() {
+        if job.on_demand.is_some() {
             return Vec::new();
         }
         let Some(prepared) = &job.prepared else {
@@ -131,7 +131,7 @@ impl State {
     fn verdict_under(&self, file: &Referenced, prepared: &PreparedJob) -> RestsOn {
         let entry = self
             .entry_of(&file.path)
-            .filter(|it| it.present && !it.doubted);
+            .filter(|it| it.present && !it.stale);
         // What others have judged who need not judge now counts for nobody.
         let entry = entry.filter(|it| self.is_of_now(it));
         let judged = entry.and_then(|it| it.judged.as_ref());
@@ -153,7 +153,7 @@ impl State {
         let firm = |it: &RestsOn| {
             self.entry_of(&it.path).is_some_and(|entry| {
                 let same = entry.judged.as_ref().is_some_and(|judged| says(judged, it));
-                same && entry.present && !entry.doubted && self.is_of_now(entry)
+                same && entry.present && !entry.stale && self.is_of_now(entry)
             })
         };
         judged
@@ -234,7 +234,7 @@ impl State {
         let Some(entry) = self.files.get_mut(id) else {
             return;
         };
-        (entry.doubted, entry.anew) = (true, true);
+        (entry.stale, entry.anew) = (true, true);
         let path = entry.path.clone();
         let priority = self.priority_of(&path);
         self.files.enqueue(id, priority, self.now);
@@ -299,7 +299,7 @@ impl State {
                     let is_late = job.is_some_and(|job| {
                         job.stage == JobStage::Storing && referenced(job).any(|it| it.path == path)
                     });
-                    entry.doubted |= is_late;
+                    entry.stale |= is_late;
                     entry.anew |= is_late;
                 }
                 Stage::Idle | Stage::Waiting(..) => {

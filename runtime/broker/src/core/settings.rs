@@ -39,10 +39,10 @@ pub struct Settings {
     pub restart_window: Duration,
     /// Changes of what a bundle is or checks, by its own will, that are believed at once.
     pub changes_forgiven: u32,
-    /// Pause before the first change beyond them is believed; doubles up to `disbelief_max`.
-    pub disbelief: Duration,
+    /// Pause before the first change beyond them is believed; doubles up to `distrust_max`.
+    pub distrust: Duration,
     /// Longest such pause.
-    pub disbelief_max: Duration,
+    pub distrust_max: Duration,
     /// After this long without a change, earlier ones are forgotten.
     pub calm_after: Duration,
     /// Issues kept per checker and job.
@@ -50,7 +50,7 @@ pub struct Settings {
     /// Bytes of parameters and metadata kept per checker and job.
     pub max_facts: usize,
     /// Bytes of all that is kept per bundle and job.
-    pub max_staged_bytes: usize,
+    pub max_pending_bytes: usize,
     /// Bytes of findings of all jobs that are not stored yet, beyond which no further job is given
     /// out: what a bundle that reports far too much can make the broker hold.
     pub max_findings_bytes: usize,
@@ -97,12 +97,12 @@ impl Default for Settings {
             max_restarts: 20,
             restart_window: Duration::from_secs(60),
             changes_forgiven: 8,
-            disbelief: Duration::from_secs(2),
-            disbelief_max: Duration::from_secs(300),
+            distrust: Duration::from_secs(2),
+            distrust_max: Duration::from_secs(300),
             calm_after: Duration::from_secs(600),
             max_issues: 10_000,
             max_facts: 64 << 10,
-            max_staged_bytes: 16 << 20,
+            max_pending_bytes: 16 << 20,
             max_findings_bytes: 16 << 20,
             max_text: 8 << 10,
             retry_after: Duration::from_secs(1),

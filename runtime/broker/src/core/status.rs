@@ -76,12 +76,12 @@ impl State {
 
     /// Why files cannot be accepted, whatever is in them.
     pub fn hindrances(&self) -> Vec<String> {
-        let missing = self.absent_by_name().into_iter();
+        let missing = self.missing_by_name().into_iter();
         let missing = missing.filter_map(|name| self.hopeless(&name));
         let is_unseated = |kind: &FileKind| {
             let files = self.files.iter();
-            let mut there = files.filter(|(_, it)| it.present && it.errand.is_none());
-            self.seats(*kind).is_empty() && there.any(|(_, it)| it.kind == *kind)
+            let mut there = files.filter(|(_, it)| it.present && it.on_demand.is_none());
+            self.requirements(*kind).is_empty() && there.any(|(_, it)| it.kind == *kind)
         };
         let unseated = FileKind::ALL.into_iter().filter(is_unseated);
         let unseated = unseated.map(|kind| format!("nobody must check .{} files", kind.as_str()));
@@ -91,7 +91,7 @@ impl State {
     /// The files that are there, in the order of their paths.
     pub fn present_files(&self) -> Vec<Arc<Path>> {
         let files = self.files.iter();
-        let present = files.filter(|(_, entry)| entry.present && entry.errand.is_none());
+        let present = files.filter(|(_, entry)| entry.present && entry.on_demand.is_none());
         let mut paths: Vec<Arc<Path>> = present.map(|(_, entry)| entry.path.clone()).collect();
         paths.sort();
         paths
@@ -110,7 +110,7 @@ impl State {
     fn file_counts(&self) -> FileCounts {
         let mut counts = FileCounts::default();
         let files = self.files.iter();
-        for (_, entry) in files.filter(|(_, entry)| entry.present && entry.errand.is_none()) {
+        for (_, entry) in files.filter(|(_, entry)| entry.present && entry.on_demand.is_none()) {
             counts.total += 1;
             let idle = matches!(
                 entry.stage(),
@@ -199,14 +199,14 @@ impl State {
     }
 
     fn bundle_status(&self, name: &str, bundle: &Bundle) -> PeerStatus {
-        let waiting = bundle.queue.len() + bundle.suspects.len();
+        let waiting = bundle.queue.len() + bundle.quarantine.len();
         let silent = !bundle.active.is_empty()
             && self.now.saturating_sub(bundle.heard) > Duration::from_secs(3);
         let state = if self.child_gave_up(name) && bundle.session.is_none() {
             "gave up"
         } else if bundle.session.is_none() {
             "down"
-        } else if bundle.leaving {
+        } else if bundle.draining {
             "draining"
         } else if !bundle.ready {
             "starting"

@@ -11,23 +11,23 @@ use qcbus_messages::{FromPeer, JobId, ToPeer, Verdict};
 use super::*;
 use crate::InForce;
 
-mod acts;
+mod actions;
 mod behind_the_gate;
 mod children;
 mod clients;
 mod dependencies;
 mod early;
 mod ending;
-mod errands;
 mod exits;
-mod hands;
+mod flapping;
+mod invariants;
 mod limits;
 mod membership;
+mod on_demand;
 mod outputs;
 mod outside;
 mod processes;
 mod reporting;
-mod restless;
 mod rests_on;
 mod things;
 mod trials;
@@ -72,9 +72,9 @@ enum Step {
     ChildEnds(u8),
     Restart,
     RestartAfter(u8, bool),
-    Errand(u8, bool),
+    OnDemand(u8, bool),
     ClientLeaves(u8),
-    PoolErrand(u8, bool),
+    PoolOnDemand(u8, bool),
     TellPooled,
 }
 
@@ -112,9 +112,9 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
         1 => (0..4_u8).prop_map(Step::ChildEnds),
         1 => Just(Step::Restart),
         1 => ((0..8_u8), any::<bool>()).prop_map(|(file, late)| Step::RestartAfter(file, late)),
-        4 => ((2..10_u8), prop::bool::weighted(0.8)).prop_map(|(file, known)| Step::Errand(file, known)),
+        4 => ((2..10_u8), prop::bool::weighted(0.8)).prop_map(|(file, known)| Step::OnDemand(file, known)),
         1 => any::<u8>().prop_map(Step::ClientLeaves),
-        4 => (any::<u8>(), prop::bool::weighted(0.8)).prop_map(|(n, well)| Step::PoolErrand(n, well)),
+        4 => (any::<u8>(), prop::bool::weighted(0.8)).prop_map(|(n, well)| Step::PoolOnDemand(n, well)),
         3 => Just(Step::TellPooled),
     ];
     prop::collection::vec(step, 1..120)
@@ -167,9 +167,9 @@ impl World {
             }),
             Step::Restart => self.restart(),
             Step::RestartAfter(file, unsettled) => self.restart_after(file, unsettled),
-            Step::Errand(file, known) => self.somebody_asks(file, known),
+            Step::OnDemand(file, known) => self.somebody_asks(file, known),
             Step::ClientLeaves(n) => self.client_leaves(n),
-            Step::PoolErrand(n, well) => self.pool(n, well),
+            Step::PoolOnDemand(n, well) => self.pool(n, well),
             Step::TellPooled => self.tell_pooled(),
             Step::Reconfigure(n) => self.reconfigure(n),
         }
@@ -214,7 +214,7 @@ proptest! {
         for file in world.judged.keys() {
             let id = world.state.files.id(&path_of(*file)).unwrap();
             let judged = world.state.files.get(id).unwrap().judged.clone().unwrap();
-            prop_assert_eq!(named(&judged.jury), world.expected_jury());
+            prop_assert_eq!(named(&judged.required_set), world.expected_set());
             prop_assert_eq!(&world.journal[file], &*judged, "the journal knows the same");
             prop_assert_eq!(judged.verdict, world.verdict_with_all(*file, judged.own));
             // Once all are there, only a file that kills bundles keeps them from a judgement.
@@ -265,9 +265,12 @@ impl World {
             .iter()
             .map(|(file, it)| (*file, it.job))
             .collect();
-        assert_eq!(self.desk.reports, newest, "the reporter has every result");
-        assert_eq!(self.desk.delivered, newest, "and the journal knows");
-        assert_eq!(self.desk.voids, BTreeSet::new());
+        assert_eq!(
+            self.requests.reports, newest,
+            "the reporter has every result"
+        );
+        assert_eq!(self.requests.delivered, newest, "and the journal knows");
+        assert_eq!(self.requests.voids, BTreeSet::new());
         let judged = self.judged.keys();
         let needed: BTreeSet<u8> = judged
             .flat_map(|file| dependencies_of(*file).iter().copied())
@@ -445,7 +448,7 @@ fn what_a_former_broker_started_and_did_not_come_back_is_killed_once() {
     world.generation = 2;
     world.state = fresh_state(2, 0);
     world.manifest(Some(1));
-    world.child_of_a_former_broker_joins(1, &child(1));
+    world.stale_child_joins(1, &child(1));
     let launch = world.state.bundles[CHILD].launch.unwrap();
     let session = world.nth_peer(0).unwrap();
     let mut killed = Vec::new();
@@ -458,7 +461,7 @@ fn what_a_former_broker_started_and_did_not_come_back_is_killed_once() {
         world.now = Duration::from_secs(seconds);
         let actions = world.state.handle(world.now, Event::Tick);
         killed.extend(actions.into_iter().filter_map(|action| match action {
-            Action::KillFormer { joined } => Some((seconds, joined)),
+            Action::KillStaleChildren { joined } => Some((seconds, joined)),
             _ => None,
         }));
     }
@@ -499,8 +502,8 @@ fn jobs_wait_while_findings_take_up_the_room() {
     }
     let held = |world: &World| -> usize {
         let jobs = world.state.jobs.values();
-        let shares = jobs.flat_map(|job| job.shares.values());
-        shares.map(|share| share.staged_bytes).sum()
+        let tasks = jobs.flat_map(|job| job.tasks.values());
+        tasks.map(|task| task.pending_bytes).sum()
     };
     // Both given jobs are answered with more than there is room for, and nothing is stored.
     world.answer(2);

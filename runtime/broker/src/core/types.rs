@@ -13,8 +13,8 @@ use qcbus_messages::{
 
 use sha2::{Digest as _, Sha256};
 
-use super::jury::{Epoch, Jury};
-use super::outcome::ShareOutcome;
+use super::outcome::TaskOutcome;
+use super::required_set::{Epoch, RequiredSet};
 
 /// A peer's session on the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -56,7 +56,7 @@ impl Launch {
 
 /// A client of the control socket that waits for an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Ticket(pub u64);
+pub struct RequestId(pub u64);
 
 /// What `stat` says of a file: enough to see that it has changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
@@ -229,7 +229,7 @@ pub struct Judged {
     /// Configuration it was given under.
     pub config: Digest,
     /// Those who had to judge, and did.
-    pub jury: Arc<Jury>,
+    pub required_set: Arc<RequiredSet>,
     /// The epoch in which they were called.
     pub epoch: Epoch,
     /// Everything it depends on.
@@ -281,11 +281,11 @@ pub struct FinishedJob {
     /// Why it could not be read.
     pub unreadable: Option<String>,
     /// By bundle.
-    pub bundles: Vec<ShareOutcome>,
+    pub bundles: Vec<TaskOutcome>,
     /// The files that it rests on, each with the verdict on it.
     pub rests_on: Vec<(Referenced, RestsOn)>,
     /// Those who had to judge, and did.
-    pub jury: Arc<Jury>,
+    pub required_set: Arc<RequiredSet>,
     /// The epoch in which they were called: in a later one the job is not to be stored.
     pub epoch: Epoch,
     /// Time since the job was taken from the queue.

@@ -60,7 +60,7 @@ impl State {
             return;
         };
         child.failures += 1;
-        child.trouble = Some(why.to_owned());
+        child.failure = Some(why.to_owned());
         let pause = child.pause(settings.backoff, settings.backoff_max);
         let again = child.spec.restart != Restart::Never && !draining;
         child.upgrade = again.then(|| Upgrade::Due(now + pause));

@@ -11,7 +11,7 @@ use qcbus_messages::path_text::to_text;
 
 use super::action::Action;
 use super::files::{FileEntry, FileId, Priority, Stage};
-use super::types::{Judged, Stamp, Ticket, file_verdict};
+use super::types::{Judged, RequestId, Stamp, file_verdict};
 use super::{Actions, State};
 
 /// For what a client of the control socket waits, and when it gives up.
@@ -26,7 +26,7 @@ pub struct Until {
 /// One client.
 #[derive(Debug)]
 pub(super) struct Waiter {
-    ticket: Ticket,
+    request_id: RequestId,
     path: Arc<Path>,
     until: Option<Duration>,
     /// It waits for the reports, too.
@@ -37,8 +37,8 @@ pub(super) struct Waiter {
 }
 
 impl Waiter {
-    pub fn ticket(&self) -> Ticket {
-        self.ticket
+    pub fn request_id(&self) -> RequestId {
+        self.request_id
     }
 }
 
@@ -47,7 +47,7 @@ impl State {
     /// change nobody has reported yet is judged anew before the answer.
     pub(super) fn wait(
         &mut self,
-        ticket: Ticket,
+        request_id: RequestId,
         path: &Arc<Path>,
         stamp: Option<Stamp>,
         unwatched: Option<String>,
@@ -56,13 +56,13 @@ impl State {
     ) {
         if let Some(reason) = unwatched {
             actions.push(Action::Answer {
-                ticket,
+                request_id,
                 response: Response::Unwatched { reason },
             });
             return;
         }
         self.waiters.push(Waiter {
-            ticket,
+            request_id,
             path: path.clone(),
             until: until.timeout.map(|timeout| self.now + timeout),
             reports: until.reports,
@@ -135,7 +135,7 @@ impl State {
         let stands = |judged: &Arc<Judged>| {
             settled
                 && entry.present
-                && !entry.doubted
+                && !entry.stale
                 && entry.opening == 0
                 && self.stands(entry.kind, judged)
                 && self.rests_firmly(judged)
@@ -165,12 +165,15 @@ impl State {
     }
 
     /// A person wants a bundle off the roster.
-    pub(super) fn removal(&mut self, ticket: Ticket, name: &str, actions: &mut Actions) {
+    pub(super) fn removal(&mut self, request_id: RequestId, name: &str, actions: &mut Actions) {
         let response = match self.remove_bundle(name, actions) {
             Ok(what) => Response::Removed { what },
             Err(reason) => Response::Failed { reason },
         };
-        actions.push(Action::Answer { ticket, response });
+        actions.push(Action::Answer {
+            request_id,
+            response,
+        });
     }
 
     pub(super) fn answer_gone(&mut self, path: &Path, actions: &mut Actions) {
@@ -192,7 +195,7 @@ impl State {
         let answered: Vec<Waiter> = answered;
         for waiter in answered {
             actions.push(Action::Answer {
-                ticket: waiter.ticket,
+                request_id: waiter.request_id,
                 response: response(),
             });
         }
@@ -206,7 +209,7 @@ impl State {
         self.waiters = rest;
         for waiter in over {
             actions.push(Action::Answer {
-                ticket: waiter.ticket,
+                request_id: waiter.request_id,
                 response: self.in_vain(&waiter),
             });
         }
@@ -216,8 +219,8 @@ impl State {
     fn in_vain(&self, waiter: &Waiter) -> Response {
         let id = self.files.id(&waiter.path);
         let id = id.filter(|_| waiter.reports && waiter.seen);
-        let standing = id.and_then(|id| Some((id, self.standing_verdict(id)?)));
-        let Some((id, (path, judged))) = standing else {
+        let readiness = id.and_then(|id| Some((id, self.standing_verdict(id)?)));
+        let Some((id, (path, judged))) = readiness else {
             return Response::TimedOut;
         };
         Response::Unreported {
@@ -230,7 +233,7 @@ impl State {
     pub(super) fn end_waits(&mut self, actions: &mut Actions) {
         for waiter in std::mem::take(&mut self.waiters) {
             actions.push(Action::Answer {
-                ticket: waiter.ticket,
+                request_id: waiter.request_id,
                 response: Response::Stopped,
             });
         }

@@ -11,9 +11,9 @@ use super::{Announcement, Broker, Ready, Told};
 use crate::core::{
     Action, Delivery, Event, FinishedJob, Judged, Notice, PrepareFailure, SessionId,
 };
+use crate::environment::{now, spawn_blocking};
 use crate::intake::Within;
 use crate::journal::Entry;
-use crate::seams::{now, spawn_blocking};
 use crate::stages::reached;
 use crate::writers::Order;
 
@@ -31,9 +31,9 @@ impl Broker {
             }
             Action::Spawn { launch, spec } => self.children.spawn(launch, &spec),
             Action::Kill { launch } => self.children.kill(launch),
-            Action::KillFormer { joined } => self.kill_former(joined),
+            Action::KillStaleChildren { joined } => self.kill_stale_children(joined),
             Action::Store(job) => self.order_store(job),
-            Action::Pool(job) => self.pool_errand(job),
+            Action::Pool(job) => self.pool_on_demand(job),
             Action::Withdraw { ref path, .. } => {
                 if let Some(watcher) = &self.watcher {
                     watcher.forget(path.clone());
@@ -51,8 +51,11 @@ impl Broker {
             | Action::Disconnect { .. }
             | Action::Void { .. }
             | Action::Deliver { .. } => self.act_on_peer(action),
-            Action::Answer { ticket, response } => {
-                if let Some(answer) = self.tickets.remove(&ticket) {
+            Action::Answer {
+                request_id,
+                response,
+            } => {
+                if let Some(answer) = self.request_ids.remove(&request_id) {
                     // A client that has left needs no answer.
                     let _ = answer.send(response);
                 }
@@ -123,7 +126,7 @@ impl Broker {
     }
 
     /// Whoever asked is not held up by what is to be written for others.
-    fn pool_errand(&mut self, mut job: Box<FinishedJob>) {
+    fn pool_on_demand(&mut self, mut job: Box<FinishedJob>) {
         let root = self.intake.root(job.job);
         let config = self.in_force.config.clone();
         let (store, events) = (self.store.clone(), self.inbox.events_in.clone());
@@ -132,7 +135,7 @@ impl Broker {
             let (config, document) = (config.as_deref(), root.as_deref());
             let outcome = match shadow {
                 Some(shadow) => store.pool_trial(&shadow, &mut job, config, document),
-                None => store.pool_errand(&mut job, config, document),
+                None => store.pool_on_demand(&mut job, config, document),
             };
             drop(root);
             // After the end of the loop nobody waits for this.
@@ -227,15 +230,15 @@ impl Broker {
         let begin = now();
         let asked = begin.checked_sub(waited).unwrap_or(begin);
         let (intake, events) = (self.intake.clone(), self.inbox.events_in.clone());
-        let lookout = self.looks.lookout();
+        let io_watchdog = self.looks.io_watchdog();
         // A run of its own watches nothing.
-        let within = match self.state.is_errand(job) {
+        let within = match self.state.is_on_demand(job) {
             true => Within::Beside,
             false => Within::Watched,
         };
         spawn_blocking(move || {
             reached("taken", &path);
-            let attendance = lookout.attend(job.0);
+            let attendance = io_watchdog.attend(job.0);
             let mut result = intake.prepare(job, &path, asked, within);
             if attendance.was_given_up() {
                 // The job has ended meanwhile.

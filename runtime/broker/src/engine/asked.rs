@@ -5,18 +5,18 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use qcbus_document::FileKind;
-use qcbus_messages::control::{BundleStanding, Request, Response, Terms};
+use qcbus_messages::control::{BundleReadiness, CheckContext, Request, Response};
 use qcbus_messages::path_text::to_text;
 use tokio::sync::oneshot;
 
-use super::looks::{Around, Look, Seen, Sighted};
+use super::looks::{Around, Look, LookedUp, Seen};
 use super::{Broker, Told};
+use crate::check_context::{check_context, differs};
 use crate::control::Asked;
-use crate::core::{Errand, Event, Notice, Stamp, Ticket, Until};
+use crate::core::{Event, Notice, OnDemand, RequestId, Stamp, Until};
 use crate::demand::InForce;
 use crate::own_program::OwnProgram;
 use crate::reload::{Fingerprint, LoadError, command_of, differences};
-use crate::terms::{differs, terms};
 
 impl Broker {
     pub(super) fn asked(&mut self, asked: Asked) -> bool {
@@ -45,7 +45,10 @@ impl Broker {
             Request::WaitReported { file, timeout_ms } => {
                 self.wait_for(file, timeout_ms, true, asked.answer)
             }
-            Request::Check { file, terms } => self.check(&file, &terms, asked.answer),
+            Request::Check {
+                file,
+                check_context,
+            } => self.check(&file, &check_context, asked.answer),
             Request::Down => {
                 self.downs.push(asked.answer);
                 self.notify_stopping();
@@ -56,8 +59,8 @@ impl Broker {
                 answer(asked.answer, response)
             }
             Request::RemoveBundle { name } => {
-                let ticket = self.ticket(asked.answer);
-                self.handle(Event::RemoveBundle { ticket, name })
+                let request_id = self.request_id(asked.answer);
+                self.handle(Event::RemoveBundle { request_id, name })
             }
             Request::Bundle { name } => {
                 let bundle = self.standing(&name).map(Box::new);
@@ -105,9 +108,9 @@ impl Broker {
     }
 
     /// How a bundle stands, with what the manifest in force says of it.
-    fn standing(&self, name: &str) -> Option<BundleStanding> {
-        let mut standing = self.state.standing(name)?;
-        standing.said = self.children.last_words(name);
+    fn standing(&self, name: &str) -> Option<BundleReadiness> {
+        let mut standing = self.state.readiness(name)?;
+        standing.said = self.children.final_output(name);
         if let Some(spec) = self.loaded.children.iter().find(|it| it.name == name) {
             standing.command = command_of(&spec.command).map(str::to_owned);
             standing.spec = spec.digest();
@@ -116,43 +119,51 @@ impl Broker {
     }
 
     /// A client wants a file checked as it would do it itself.
-    fn check(&mut self, file: &Path, asked: &Terms, answer: oneshot::Sender<Response>) -> bool {
-        let ours = terms(&self.options, self.in_force.digest, &self.loaded.children);
+    fn check(
+        &mut self,
+        file: &Path,
+        asked: &CheckContext,
+        answer: oneshot::Sender<Response>,
+    ) -> bool {
+        let ours = check_context(&self.options, self.in_force.digest, &self.loaded.children);
         if let Some(why) = differs(&ours, asked) {
             let reason = why.to_owned();
             let _ = answer.send(Response::Elsewhere { reason });
             return true;
         }
-        let ticket = self.ticket(answer);
+        let request_id = self.request_id(answer);
         let bundles = asked.bundles.keys().cloned().collect();
         self.handle(Event::Check {
             path: file.into(),
-            errand: Errand { ticket, bundles },
+            on_demand: OnDemand {
+                request_id,
+                bundles,
+            },
         })
     }
 
     /// Forgets clients that have left without their answer.
     pub(super) fn forget_clients(&mut self) {
         self.downs.retain(|it| !it.is_closed());
-        let left = self.tickets.iter().filter(|(_, it)| it.is_closed());
-        let left: Vec<Ticket> = left.map(|(ticket, _)| *ticket).collect();
-        for ticket in left {
-            self.tickets.remove(&ticket);
-            self.handle(Event::ClientLeft { ticket });
+        let left = self.request_ids.iter().filter(|(_, it)| it.is_closed());
+        let left: Vec<RequestId> = left.map(|(request_id, _)| *request_id).collect();
+        for request_id in left {
+            self.request_ids.remove(&request_id);
+            self.handle(Event::ClientLeft { request_id });
         }
     }
 
     /// Keeps what somebody waits for until the state machine answers.
-    fn ticket(&mut self, answer: oneshot::Sender<Response>) -> Ticket {
-        self.next_ticket += 1;
-        let ticket = Ticket(self.next_ticket);
-        self.tickets.insert(ticket, answer);
-        ticket
+    fn request_id(&mut self, answer: oneshot::Sender<Response>) -> RequestId {
+        self.next_request_id += 1;
+        let request_id = RequestId(self.next_request_id);
+        self.request_ids.insert(request_id, answer);
+        request_id
     }
 
     /// A client waits for the verdict on a file that has just been looked at.
-    pub(super) fn wait(&mut self, look: Look, seen: Sighted) -> bool {
-        let Sighted {
+    pub(super) fn wait(&mut self, look: Look, seen: LookedUp) -> bool {
+        let LookedUp {
             file,
             stamp,
             inputs,
@@ -171,7 +182,7 @@ impl Broker {
         }
         let (file, until) = (&*file, look.until);
         let mut at_rest = stamp;
-        let ticket = self.ticket(look.answer);
+        let request_id = self.request_id(look.answer);
         if let (None, Some(watcher)) = (&unwatched, &self.watcher) {
             match stamp {
                 // The watcher may not have come to it, and must tell when it goes.
@@ -191,7 +202,7 @@ impl Broker {
             self.handle(Event::Present { path: file.into() });
         }
         self.handle(Event::Wait {
-            ticket,
+            request_id,
             path: file.into(),
             stamp: at_rest,
             unwatched,
@@ -295,7 +306,7 @@ impl Broker {
             };
             Seen::Sources(sources.fingerprint(&read), around)
         };
-        self.looks.changes = self.scout(look).ok();
+        self.looks.changes = self.probe(look).ok();
     }
 
     /// Somebody may have removed the state directory, or put another one in its place.

@@ -5,9 +5,9 @@ use qcbus_bus::SharedMemory;
 use super::start::{children, shape};
 use super::{Inbox, StartError};
 use crate::descriptors::Descriptors;
+use crate::environment::Children;
 use crate::options::Options;
 use crate::reload::Loaded;
-use crate::seams::Children;
 
 /// The first generation of an instance that nobody has used.
 const FIRST_GENERATION: u64 = 1;

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use qcbus_disk::foreign::{self, Lookout, Overdue};
+use qcbus_disk::foreign::{self, IoWatchdog, Overdue};
 use qcbus_messages::JobId;
 use qcbus_messages::control::{Response, ScratchStatus, Unseen};
 use qcbus_messages::path_text::to_text;
@@ -13,19 +13,19 @@ use tokio::sync::oneshot;
 
 use super::Broker;
 use crate::core::{Event, Input, LostOutput, PrepareFailure, Stamp, Until};
+use crate::probes::{PATIENCE, Probes};
 use crate::reload::Fingerprint;
 use crate::result_paths::ResultPaths;
-use crate::scouts::{PATIENCE, Scouts};
 use crate::stamp::{stamp_of, stamp_through_links};
 use crate::watch::{
-    NoFile, Sight, hidden_above, is_behind_a_link, is_left_alone, is_looked_at, look_at,
+    FileLookup, NoFile, hidden_above, is_behind_a_link, is_left_alone, is_looked_at, look_at,
 };
 
 /// Who looks at files, and for whom.
 pub(super) struct Looks {
     /// Sees who waits for which file.
-    lookout: Arc<Lookout>,
-    scouts: Scouts,
+    io_watchdog: Arc<IoWatchdog>,
+    probes: Probes,
     /// Files that did not answer when they were last asked for.
     hanging: BTreeSet<PathBuf>,
     /// Who waits for a look at a file, by the number of the scout.
@@ -39,10 +39,10 @@ pub(super) struct Looks {
 
 impl Default for Looks {
     fn default() -> Looks {
-        let lookout = Arc::new(Lookout::default());
+        let io_watchdog = Arc::new(IoWatchdog::default());
         Looks {
-            scouts: Scouts::new(lookout.clone(), PATIENCE),
-            lookout,
+            probes: Probes::new(io_watchdog.clone(), PATIENCE),
+            io_watchdog,
             hanging: BTreeSet::new(),
             pending: HashMap::new(),
             missed: HashMap::new(),
@@ -54,12 +54,12 @@ impl Default for Looks {
 
 impl Looks {
     /// For whoever else looks at files.
-    pub(super) fn scouts(&self) -> Scouts {
-        self.scouts.clone()
+    pub(super) fn probes(&self) -> Probes {
+        self.probes.clone()
     }
 
-    pub(super) fn lookout(&self) -> Arc<Lookout> {
-        self.lookout.clone()
+    pub(super) fn io_watchdog(&self) -> Arc<IoWatchdog> {
+        self.io_watchdog.clone()
     }
 
     pub(super) fn is_hanging(&self, path: &Path) -> bool {
@@ -80,7 +80,7 @@ pub(super) struct Look {
 type Changed = (Arc<Path>, Option<Stamp>);
 
 /// What a scout has seen.
-pub(super) struct Sighted {
+pub(super) struct LookedUp {
     /// The file as it is watched: a link from elsewhere to a watched file means that file.
     pub file: PathBuf,
     pub stamp: Option<Stamp>,
@@ -96,7 +96,7 @@ pub(super) struct Sighted {
 
 /// What a scout says, and which one.
 pub(super) struct Looked {
-    scout: u64,
+    probe: u64,
     seen: Seen,
 }
 
@@ -115,7 +115,7 @@ pub(super) enum Seen {
     Sources(Fingerprint, Around),
     /// The path means another file.
     Elsewhere(PathBuf),
-    Sighted(Sighted),
+    LookedUp(LookedUp),
     /// What there is of a file that was missed, and what its verdict depends on that is not what it was.
     Again {
         stamp: Option<Stamp>,
@@ -129,7 +129,7 @@ impl Broker {
         let (file, is_led) = (look.file.clone(), look.is_led);
         let inputs = self.state.inputs_of(&file).into_iter().skip(1).collect();
         let (store, roots) = (self.store.clone(), self.options.roots.clone());
-        self.send_scout(look, move || {
+        self.send_probe(look, move || {
             if let Some(file) = meant(&file, &store.places, &roots).filter(|_| !is_led) {
                 return Seen::Elsewhere(file);
             }
@@ -141,7 +141,7 @@ impl Broker {
             let unwatched = why_unwatched(&file, stamp, &store.places, &roots)
                 .or_else(|| what_instead(&file, stamp, &roots));
             let lost = store.lost_outputs(&file.as_path().into());
-            Seen::Sighted(Sighted {
+            Seen::LookedUp(LookedUp {
                 file,
                 lost,
                 stamp,
@@ -157,15 +157,15 @@ impl Broker {
     pub(super) fn look_whether_it_is_back(&mut self, path: Arc<Path>) -> bool {
         let (at, roots) = (path.clone(), self.options.roots.clone());
         let inputs = self.state.inputs_of(&path).into_iter().skip(1).collect();
-        let scout = self.scout(move || {
+        let probe = self.probe(move || {
             let stamp = stamp_of(&at).ok().flatten();
             let stamp = stamp.filter(|_| is_looked_at(&roots, &at));
             let inputs = moved(inputs);
             Seen::Again { stamp, inputs }
         });
-        match scout {
-            Ok(scout) => {
-                self.looks.missed.insert(scout, path);
+        match probe {
+            Ok(probe) => {
+                self.looks.missed.insert(probe, path);
                 true
             }
             Err(_) => self.missed(path, None),
@@ -185,24 +185,24 @@ impl Broker {
     }
 
     /// Sends a scout, who tells the loop what he sees; gives his number.
-    pub(super) fn scout(&self, see: impl FnOnce() -> Seen + Send + 'static) -> io::Result<u64> {
+    pub(super) fn probe(&self, see: impl FnOnce() -> Seen + Send + 'static) -> io::Result<u64> {
         let (tell, told) = std::sync::mpsc::channel();
         let inbox = self.inbox.looked_in.clone();
-        let sent = self.looks.scouts.send(move || {
+        let sent = self.looks.probes.send(move || {
             let seen = see();
             // It is told its number right after it was sent. After the end of the loop nobody listens.
-            if let Ok(scout) = told.recv() {
-                let _ = inbox.send(Looked { scout, seen });
+            if let Ok(probe) = told.recv() {
+                let _ = inbox.send(Looked { probe, seen });
             }
         })?;
         let _ = tell.send(sent);
         Ok(sent)
     }
 
-    fn send_scout(&mut self, look: Look, see: impl FnOnce() -> Seen + Send + 'static) -> bool {
-        match self.scout(see) {
-            Ok(scout) => {
-                self.looks.pending.insert(scout, look);
+    fn send_probe(&mut self, look: Look, see: impl FnOnce() -> Seen + Send + 'static) -> bool {
+        match self.probe(see) {
+            Ok(probe) => {
+                self.looks.pending.insert(probe, look);
             }
             Err(error) => {
                 let reason = format!("cannot look at {}: {error}", to_text(&look.file));
@@ -214,7 +214,7 @@ impl Broker {
     }
 
     pub(super) fn looked(&mut self, looked: Looked) -> bool {
-        let Looked { scout, seen } = looked;
+        let Looked { probe, seen } = looked;
         match seen {
             Seen::Sources(now, around) => {
                 self.look_at_state(around.state_is_gone);
@@ -223,12 +223,12 @@ impl Broker {
                 true
             }
             Seen::Again { stamp, inputs } => {
-                let path = self.looks.missed.remove(&scout);
+                let path = self.looks.missed.remove(&probe);
                 self.take_in(inputs);
                 path.is_none_or(|path| self.missed(path, stamp))
             }
             // A look that is not there any more was given up, and answered.
-            Seen::Elsewhere(file) => match self.looks.pending.remove(&scout) {
+            Seen::Elsewhere(file) => match self.looks.pending.remove(&probe) {
                 Some(look) => {
                     let is_led = true;
                     self.look_at(Look {
@@ -239,7 +239,7 @@ impl Broker {
                 }
                 None => true,
             },
-            Seen::Sighted(seen) => match self.looks.pending.remove(&scout) {
+            Seen::LookedUp(seen) => match self.looks.pending.remove(&probe) {
                 Some(look) => self.wait(look, seen),
                 None => true,
             },
@@ -248,10 +248,10 @@ impl Broker {
 
     /// Ends what waits for a file that does not answer, and says so as long as it is so.
     pub(super) fn give_up_the_overdue(&mut self) {
-        for overdue in self.looks.lookout.overdue(PATIENCE) {
+        for overdue in self.looks.io_watchdog.overdue(PATIENCE) {
             self.give_up(&overdue);
         }
-        let hanging = self.looks.lookout.hanging();
+        let hanging = self.looks.io_watchdog.hanging();
         if self.looks.hanging.is_empty() && hanging.is_empty() {
             return;
         }
@@ -321,7 +321,7 @@ fn led_to(file: &Path, is_meant: impl Fn(&Path) -> bool) -> Option<PathBuf> {
         if is_meant(&at) {
             return Some(at);
         }
-        next = foreign::visit(&at, || Ok(directory.join(std::fs::read_link(&at)?))).ok()?;
+        next = foreign::access(&at, || Ok(directory.join(std::fs::read_link(&at)?))).ok()?;
     }
     None
 }
@@ -349,11 +349,11 @@ fn what_instead(file: &Path, stamp: Option<Stamp>, roots: &[PathBuf]) -> Option<
         return None;
     }
     let what = match look_at(file, roots) {
-        Sight::Directory | Sight::Known => "it is a directory".to_owned(),
+        FileLookup::Directory | FileLookup::Known => "it is a directory".to_owned(),
         // What it leads to may come.
-        Sight::NoFile(NoFile::Dangling(_)) => return None,
-        Sight::NoFile(what) => what.to_string(),
-        Sight::File(_) | Sight::Nothing | Sight::Hidden(_) => return None,
+        FileLookup::NoFile(NoFile::Dangling(_)) => return None,
+        FileLookup::NoFile(what) => what.to_string(),
+        FileLookup::File(_) | FileLookup::Nothing | FileLookup::Hidden(_) => return None,
     };
     Some(format!("{} cannot be checked: {what}", to_text(file)))
 }

@@ -30,16 +30,16 @@ use tokio::sync::{mpsc, oneshot};
 use self::stores::StateDirectory;
 use self::watching::Watching;
 use crate::control::Asked;
-use crate::core::{Event, Judged, Launch, Notice, SessionId, State, Ticket};
+use crate::core::{Event, Judged, Launch, Notice, RequestId, SessionId, State};
 use crate::demand::InForce;
 use crate::directory_lock::LockError;
+use crate::environment::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::gate::GateError;
 use crate::intake::Intake;
 use crate::journal::JournalError;
 use crate::options::Options;
 use crate::outputs::OutputWatch;
 use crate::reload::{Fingerprint, LoadError, Loaded, Sources};
-use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::stages::reached;
 use crate::store::Store;
 use crate::watch::{Seen, Watcher, Why};
@@ -138,9 +138,9 @@ pub struct Broker {
     unfinished: BTreeMap<Arc<Path>, Why>,
     looks: Looks,
     sessions: Sessions,
-    tickets: HashMap<Ticket, oneshot::Sender<Response>>,
+    request_ids: HashMap<RequestId, oneshot::Sender<Response>>,
     downs: Vec<oneshot::Sender<Response>>,
-    next_ticket: u64,
+    next_request_id: u64,
     /// Where the results of files lay that have been withdrawn, by reporter and file, until the
     /// reporter has taken back its report.
     left: HashMap<(String, Arc<Path>), PathBuf>,
@@ -285,7 +285,7 @@ impl Broker {
                 self.look_for_changes();
                 self.forget_clients();
                 self.notify_watchdog();
-                self.children.look_for_orphans();
+                self.children.look_for_descendants();
             }
             if lasts && now() >= next_prune {
                 next_prune = now() + PRUNE_INTERVAL;
@@ -320,7 +320,7 @@ impl Broker {
             // A client that has left needs no answer.
             let _ = down.send(Response::Stopped);
         }
-        self.tickets.clear();
+        self.request_ids.clear();
         self.control.flush().await;
         // Nothing is to outlive the process, which ends now: its documents go with it, too.
         if self.options.die_with_broker && self.host.end_with_process() {
@@ -375,13 +375,13 @@ impl Broker {
     }
 
     /// Looks through all processes of the machine, off the loop.
-    fn kill_former(&self, joined: BTreeSet<Launch>) {
-        let Some(former) = self.children.former() else {
+    fn kill_stale_children(&self, joined: BTreeSet<Launch>) {
+        let Some(stale_children) = self.children.stale_children() else {
             return;
         };
         let notices = self.inbox.notices_in.clone();
         spawn_blocking(move || {
-            for (pid, name) in former.kill_but(&joined) {
+            for (pid, name) in stale_children.kill_but(&joined) {
                 let why = format!(
                     "process {pid}, which an earlier broker had started, did not join this one"
                 );

@@ -41,7 +41,7 @@ fn is_held(error: &StartError) -> bool {
         | StartError::Gate(GateError::Lock(lock)) => lock,
         _ => return false,
     };
-    matches!(lock, LockError::Held { .. })
+    matches!(lock, LockError::Taken { .. })
 }
 
 impl Broker {

@@ -20,12 +20,12 @@ use crate::core::{Event, Member, Notice, Stamp, State};
 use crate::demand::InForce;
 use crate::descriptors::Descriptors;
 use crate::directory_lock::open_to_others;
+use crate::environment::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::intake::{Intake, JudgedAs, judged_in_a_run};
 use crate::journal::Void;
 use crate::launches::Launches;
 use crate::options::Options;
 use crate::reload::{Loaded, Sources};
-use crate::seams::{Children, ControlSocket, Host, now, spawn_blocking};
 use crate::stamp::stamp_of;
 use crate::state_identity::difference_of;
 use crate::store::Reconciled;
@@ -82,9 +82,9 @@ impl Broker {
             unfinished: BTreeMap::new(),
             looks,
             sessions: Sessions::default(),
-            tickets: HashMap::new(),
+            request_ids: HashMap::new(),
             downs: Vec::new(),
-            next_ticket: 0,
+            next_request_id: 0,
             left: HashMap::new(),
             journal_is_behind: false,
             untrimmed: false,
@@ -122,7 +122,7 @@ impl Broker {
                 .remember(&file.path, file.judged, &file.delivered);
         }
         for path in found.unpublished {
-            self.state.remember_shut(&path);
+            self.state.remember_unpublished(&path);
         }
         found.stamps.into_iter().collect()
     }
@@ -164,9 +164,9 @@ impl Broker {
             return self.look_at_outputs();
         }
         let (roots, files) = (self.options.roots.clone(), self.options.files.clone());
-        let lookout = self.looks.lookout();
+        let io_watchdog = self.looks.io_watchdog();
         spawn_blocking(move || {
-            let _attendance = lookout.attend_for_good();
+            let _attendance = io_watchdog.attend_for_good();
             look_once(&roots, &files, &seen);
         });
         Ok(())

@@ -13,14 +13,14 @@ use super::start::system;
 use super::{Inbox, StartError};
 use crate::core::{Member, Notice};
 use crate::directory_lock::{DirectoryLock, LockError, Purpose};
+use crate::environment::is_simulated;
 use crate::gate::{Gate, GateError, GateOptions};
 use crate::journal::{Journal, JournalError, SharedJournal};
 use crate::options::Options;
 use crate::outputs::Outputs;
+use crate::probes::Probes;
 use crate::reload::Loaded;
 use crate::result_paths::ResultPaths;
-use crate::scouts::Scouts;
-use crate::seams::is_simulated;
 use crate::store::{Reconciled, Store, TrialResults, remove_earlier_results};
 use crate::watch::is_looked_at;
 use crate::writers::Writers;
@@ -79,7 +79,7 @@ pub(super) fn store(
     looks: &Looks,
     notices: &mpsc::UnboundedSender<Notice>,
 ) -> Result<Store, StartError> {
-    let (outputs, scouts) = (outputs_of(options)?, looks.scouts());
+    let (outputs, probes) = (outputs_of(options)?, looks.probes());
     let (out, roots) = (options.out.clone(), options.roots.clone());
     let mut places = match &options.here {
         Some(here) => ResultPaths::of_run(out, here.clone(), roots, &options.files),
@@ -88,9 +88,9 @@ pub(super) fn store(
     places.single.clone_from(&options.single_result);
     let gate = options.gate.as_ref();
     let gate = gate.map(|directory| {
-        let (scouts, notices) = (scouts.clone(), notices.clone());
+        let (probes, notices) = (probes.clone(), notices.clone());
         let to = (directory.as_path(), &places, &outputs);
-        gate_of(options, to, scouts, notices)
+        gate_of(options, to, probes, notices)
     });
     Ok(Store {
         places,
@@ -103,7 +103,7 @@ pub(super) fn store(
         gate: gate.transpose()?,
         outputs,
         lock,
-        scouts,
+        probes,
         trials: options.state.as_deref().map(TrialResults::anew),
         journal: journal.map(SharedJournal::from),
         epoch: AtomicU64::new(0),
@@ -124,13 +124,13 @@ pub(super) fn writers(
 fn gate_of(
     options: &Options,
     (directory, paths, outputs): (&Path, &ResultPaths, &Outputs),
-    scouts: Scouts,
+    probes: Probes,
     notices: mpsc::UnboundedSender<Notice>,
 ) -> Result<Gate, GateError> {
     let roots = options.roots.clone();
     let gate = GateOptions {
         max_file: options.limits.max_file,
-        scouts,
+        probes,
         outputs: outputs.clone(),
         directory: directory.to_path_buf(),
         paths: paths.clone(),

@@ -66,7 +66,7 @@ impl Broker {
             }
         };
         watching.current.store(own, Ordering::Release);
-        let started = Watcher::start(options, (self.looks.lookout(), own), known, tell);
+        let started = Watcher::start(options, (self.looks.io_watchdog(), own), known, tell);
         if started.is_err() {
             watching.current.store(own - 1, Ordering::Release);
         }

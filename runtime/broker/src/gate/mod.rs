@@ -8,8 +8,8 @@
 //! file gets its name last and loses it first, so that it is never there without what it needs.
 //! Only files that refer to each other come one after the other.
 
-mod claims;
 mod contents;
+mod publications;
 
 use std::collections::{HashMap, VecDeque};
 use std::fmt;
@@ -23,17 +23,17 @@ use qcbus_messages::path_text::to_text;
 
 use crate::core::{Input, Judged, Reading, RestsOn};
 use crate::directory_lock::{DirectoryLock, Purpose};
+use crate::environment::step;
 use crate::journal::Remembered;
 use crate::outputs::Outputs;
+use crate::probes::Probes;
 use crate::result_paths::{ResultPaths, leads_upwards};
-use crate::scouts::Scouts;
-use crate::seams::step;
 use crate::stamp::is_listing;
 use crate::store::digest_of;
 use qcbus_disk::{foreign, is_for_good, write_ahead};
 
-use claims::{Claim, Claims, Copies, Need, Plan, Standing};
 pub use contents::GateError;
+use publications::{Copies, Need, Plan, Publication, PublicationState, Publications};
 
 /// What becomes of an accepted file that depends on one outside of the watched directories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -64,7 +64,7 @@ pub struct GateOptions {
     /// Most bytes of a file; one that has more is not what was accepted.
     pub max_file: u64,
     /// Who looks at files.
-    pub scouts: Scouts,
+    pub probes: Probes,
     /// Keeps what lies there.
     pub outputs: Outputs,
     /// Whether a file gets a verdict of its own.
@@ -76,7 +76,7 @@ pub struct GateOptions {
 /// The gate. Shared by the threads that write.
 pub struct Gate {
     options: GateOptions,
-    claims: Mutex<Claims>,
+    publications: Mutex<Publications>,
     lock: DirectoryLock,
 }
 
@@ -96,14 +96,14 @@ impl Gate {
     pub fn open(options: GateOptions, instance: &str) -> Result<Gate, GateError> {
         contents::refuse_foreign(&options.directory)?;
         let lock = DirectoryLock::take(&options.directory, Purpose::Gate, instance)?;
-        let claims = Claims::new(
+        let publications = Publications::new(
             options.directory.clone(),
             options.paths.clone(),
             options.outputs.clone(),
         );
         Ok(Gate {
             options,
-            claims: Mutex::new(claims),
+            publications: Mutex::new(publications),
             lock,
         })
     }
@@ -133,26 +133,29 @@ impl Gate {
     ///
     /// # Errors
     /// When the directory cannot be read, or something in it cannot be removed.
-    pub fn take_over(&self, standing: &[Remembered]) -> Result<Vec<Arc<Path>>, GateError> {
-        let taken = self.clear(standing);
+    pub fn take_over(
+        &self,
+        state_of_publication: &[Remembered],
+    ) -> Result<Vec<Arc<Path>>, GateError> {
+        let taken = self.clear(state_of_publication);
         taken.map_err(|source| GateError::Contents {
             directory: self.options.directory.clone(),
             source,
         })
     }
 
-    fn clear(&self, standing: &[Remembered]) -> io::Result<Vec<Arc<Path>>> {
-        let mut claims = self.claims();
-        for file in standing {
+    fn clear(&self, state_of_publication: &[Remembered]) -> io::Result<Vec<Arc<Path>>> {
+        let mut publications = self.publications();
+        for file in state_of_publication {
             if file.judged.is_accepted() {
-                claims.insert(&file.path, self.claim(&file.judged));
+                publications.insert(&file.path, self.publication(&file.judged));
             } else {
-                claims.refuse(&file.path);
+                publications.refuse(&file.path);
             }
         }
         let there = contents::files(&self.options.directory)?;
         let mut read = HashMap::new();
-        let waiting = claims.take_over(|path, size, digest| {
+        let waiting = publications.take_over(|path, size, digest| {
             let place = self.place(path);
             let is_so_long = there.get(&place) == Some(&size);
             let now = || {
@@ -162,7 +165,7 @@ impl Gate {
             };
             is_so_long && now() == Some(digest)
         })?;
-        contents::remove_others(&self.options.directory, &there, &claims.places())?;
+        contents::remove_others(&self.options.directory, &there, &publications.places())?;
         Ok(waiting)
     }
 
@@ -186,18 +189,24 @@ impl Gate {
     /// # Errors
     /// When something cannot be removed.
     pub fn make_way(&self, path: &Arc<Path>, judged: &Judged) -> io::Result<()> {
-        let claim = self.claim(judged);
-        self.make_way_for(path, &claim).map(|_| ())
+        let publication = self.publication(judged);
+        self.make_way_for(path, &publication).map(|_| ())
     }
 
-    fn make_way_for(&self, path: &Arc<Path>, claim: &Claim) -> io::Result<MutexGuard<'_, Claims>> {
+    fn make_way_for(
+        &self,
+        path: &Arc<Path>,
+        publication: &Publication,
+    ) -> io::Result<MutexGuard<'_, Publications>> {
         self.hold()?;
-        let mut claims = self.claims();
-        let agrees = claims.get(path).is_some_and(|there| there.agrees(claim));
-        if !agrees || !claims.is_whole(path) {
-            claims.revoke(path)?;
+        let mut publications = self.publications();
+        let agrees = publications
+            .get(path)
+            .is_some_and(|there| there.agrees(publication));
+        if !agrees || !publications.is_whole(path) {
+            publications.revoke(path)?;
         }
-        Ok(claims)
+        Ok(publications)
     }
 
     /// A file is accepted: it is published if everything that it needs is. The files that waited
@@ -206,12 +215,12 @@ impl Gate {
     /// # Errors
     /// When it cannot be written.
     pub fn accept(&self, path: &Arc<Path>, judged: &Judged) -> io::Result<()> {
-        let claim = self.claim(judged);
-        let mut claims = self.make_way_for(path, &claim)?;
-        if claims.get(path).is_none() {
-            claims.insert(path, claim);
+        let publication = self.publication(judged);
+        let mut publications = self.make_way_for(path, &publication)?;
+        if publications.get(path).is_none() {
+            publications.insert(path, publication);
         }
-        drop(claims);
+        drop(publications);
         self.publish(path)
     }
 
@@ -222,18 +231,18 @@ impl Gate {
     /// When something cannot be removed.
     pub fn refuse(&self, path: &Arc<Path>) -> io::Result<()> {
         self.hold()?;
-        let mut claims = self.claims();
-        claims.revoke(path)?;
-        claims.refuse(path);
+        let mut publications = self.publications();
+        publications.revoke(path)?;
+        publications.refuse(path);
         let mut held: Vec<Arc<Path>> = Vec::new();
-        for resting in claims.resting_on(path) {
-            let claim = claims.get_mut(&resting);
-            if let Some(claim) = claim.filter(|it| !it.told && it.refused.is_none()) {
-                claim.told = true;
+        for resting in publications.resting_on(path) {
+            let publication = publications.get_mut(&resting);
+            if let Some(publication) = publication.filter(|it| !it.told && it.refused.is_none()) {
+                publication.told = true;
                 held.push(resting);
             }
         }
-        drop(claims);
+        drop(publications);
         if let Some(text) = held_by(path, &held) {
             (self.options.say)(text);
         }
@@ -246,7 +255,7 @@ impl Gate {
     /// When something cannot be removed.
     pub fn revoke(&self, path: &Arc<Path>) -> io::Result<()> {
         self.hold()?;
-        self.claims().revoke(path)
+        self.publications().revoke(path)
     }
 
     /// As [`Gate::revoke`] for a file that is no more.
@@ -255,9 +264,9 @@ impl Gate {
     /// When something cannot be removed.
     pub fn forget(&self, path: &Arc<Path>) -> io::Result<()> {
         self.hold()?;
-        let mut claims = self.claims();
-        claims.forget(path);
-        claims.revoke(path)
+        let mut publications = self.publications();
+        publications.forget(path);
+        publications.revoke(path)
     }
 
     /// Publishes an accepted file if that has not been done, and then whatever waited for it.
@@ -271,10 +280,10 @@ impl Gate {
             if let Err(error) = self.publish(&next) {
                 self.not_published(&next, error, &mut failed);
             }
-            let claims = self.claims();
-            if claims.is_published(&next) {
-                let mut waiting = claims.resting_on(&next);
-                waiting.retain(|it| !claims.is_published(it));
+            let publications = self.publications();
+            if publications.is_published(&next) {
+                let mut waiting = publications.resting_on(&next);
+                waiting.retain(|it| !publications.is_published(it));
                 open.extend(waiting);
             }
         }
@@ -293,23 +302,23 @@ impl Gate {
             return;
         }
         let why = format!("it cannot be written there: {error}");
-        if let Some(claim) = self.claims().get_mut(path) {
-            claim.refused = Some(why.clone());
-            claim.told = true;
+        if let Some(publication) = self.publications().get_mut(path) {
+            publication.refused = Some(why.clone());
+            publication.told = true;
         }
         (self.options.say)(held(path, &why));
     }
 
     /// How many files are published, and which accepted ones are not.
     pub fn status(&self) -> GateStatus {
-        let claims = self.claims();
+        let publications = self.publications();
         let mut status = GateStatus {
             directory: self.options.directory.clone(),
             ..GateStatus::default()
         };
         let mut held: Vec<&Arc<Path>> = Vec::new();
-        for (path, claim) in claims.iter() {
-            if claim.published {
+        for (path, publication) in publications.iter() {
+            if publication.published {
                 status.published += 1;
             } else {
                 held.push(path);
@@ -318,7 +327,8 @@ impl Gate {
         status.held_back = held.len() as u64;
         held.sort();
         for path in held.into_iter().take(SHOWN) {
-            if let Standing::Held { why, .. } = claims.standing(path) {
+            if let PublicationState::HeldBack { why, .. } = publications.state_of_publication(path)
+            {
                 let file = path.to_path_buf();
                 status.examples.push(HeldBack { file, why });
             }
@@ -330,11 +340,11 @@ impl Gate {
     fn publish(&self, path: &Arc<Path>) -> io::Result<()> {
         loop {
             // A name for it, because a lock in the scrutinee would be held in the arms.
-            let standing = self.claims().standing(path);
-            let plan = match standing {
-                Standing::Settled => return Ok(()),
-                Standing::Ready(plan) => plan,
-                Standing::Held { why, lasting } => {
+            let state_of_publication = self.publications().state_of_publication(path);
+            let plan = match state_of_publication {
+                PublicationState::Settled => return Ok(()),
+                PublicationState::Ready(plan) => plan,
+                PublicationState::HeldBack { why, lasting } => {
                     if lasting {
                         self.say_once(path, &why);
                     }
@@ -348,7 +358,7 @@ impl Gate {
             };
             step("copied", path);
             // Otherwise the claims have changed meanwhile, and it is looked at anew.
-            if self.claims().publish(&plan, copies)? {
+            if self.publications().publish(&plan, copies)? {
                 return Ok(());
             }
         }
@@ -358,7 +368,7 @@ impl Gate {
     fn accepted(&self, path: &Arc<Path>, digest: Digest) -> io::Result<Option<Vec<u8>>> {
         let (path, most) = (path.clone(), self.options.max_file);
         let read = move || foreign::read(&path, most);
-        let read = self.options.scouts.within(read).and_then(|read| read);
+        let read = self.options.probes.within(read).and_then(|read| read);
         match read {
             Ok(bytes) => Ok((digest_of(&bytes) == digest).then_some(bytes)),
             // Something else lies there.
@@ -376,7 +386,7 @@ impl Gate {
                 return Ok(None);
             };
             // A copy, not a link: a hard link would follow a writer who changes the file in place.
-            let place = self.claims().place(path);
+            let place = self.publications().place(path);
             let copy = write_ahead(&place, &bytes, self.options.durable)?;
             copies.insert(path.clone(), (*digest, copy));
         }
@@ -384,15 +394,19 @@ impl Gate {
     }
 
     fn say_once(&self, path: &Arc<Path>, why: &str) {
-        let mut claims = self.claims();
-        let claim = claims.get_mut(path).filter(|claim| !claim.told);
-        let Some(claim) = claim else { return };
-        claim.told = true;
+        let mut publications = self.publications();
+        let publication = publications
+            .get_mut(path)
+            .filter(|publication| !publication.told);
+        let Some(publication) = publication else {
+            return;
+        };
+        publication.told = true;
         (self.options.say)(held(path, why));
     }
 
     /// What an acceptance claims.
-    fn claim(&self, judged: &Judged) -> Claim {
+    fn publication(&self, judged: &Judged) -> Publication {
         let needs = judged.inputs.iter().skip(1);
         let inside = |input: &&Input| self.options.paths.contains(&input.path);
         let need = |input: &Input| {
@@ -410,7 +424,7 @@ impl Gate {
             let named = |all: &Vec<RestsOn>| all.iter().any(|it| it.path == need.path);
             !need.judged || rests_on.is_none_or(named)
         };
-        Claim {
+        Publication {
             digest: judged.digest,
             size: size_of_root(judged),
             needs: needs
@@ -451,8 +465,10 @@ impl Gate {
         ))
     }
 
-    fn claims(&self) -> MutexGuard<'_, Claims> {
-        self.claims.lock().unwrap_or_else(PoisonError::into_inner)
+    fn publications(&self) -> MutexGuard<'_, Publications> {
+        self.publications
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 }
 

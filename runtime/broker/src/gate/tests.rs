@@ -7,7 +7,7 @@ use qcbus_messages::{Digest, JobId, Verdict};
 use tempfile::TempDir;
 
 use super::*;
-use crate::core::{Epoch, Jury, Reading};
+use crate::core::{Epoch, Reading, RequiredSet};
 use crate::stamp::stamp_through_links;
 
 /// What a file is built from, by name. Maps include fragments, scenarios have maps and scenarios;
@@ -105,7 +105,7 @@ fn open(dir: &Path, outside: Outside, said: &Arc<Mutex<Vec<String>>>) -> Gate {
     let options = GateOptions {
         outputs: Outputs::default(),
         max_file: 1 << 20,
-        scouts: Scouts::default(),
+        probes: Probes::default(),
         directory: dir.join("gate"),
         paths: ResultPaths::of_watched(dir.join("out"), vec![dir.join("farm")]),
         durable: false,
@@ -129,7 +129,7 @@ fn accepted(inputs: Vec<Input>) -> Judged {
         digest: inputs[0].digest().unwrap(),
         basis: Digest([1; 32]),
         config: Digest([1; 32]),
-        jury: Arc::new(Jury::unknown()),
+        required_set: Arc::new(RequiredSet::unknown()),
         epoch: Epoch(0),
         inputs,
         racy: false,
@@ -290,13 +290,13 @@ fn a_start_keeps_what_stands_and_removes_the_rest() {
     std::fs::write(of_gate("deep/stale.xosc"), "stale").unwrap();
     let gate = open(dir.path(), Outside::Name, &said);
     let bench = Bench { dir, gate, said };
-    let standing = ["a.xodr", "b.xodr", "s.xosc", "t.xosc"].map(|name| Remembered {
+    let state_of_publication = ["a.xodr", "b.xodr", "s.xosc", "t.xosc"].map(|name| Remembered {
         path: bench.path(name),
         judged: bench.judged(name),
         written: None,
         delivered: Vec::new(),
     });
-    let mut left = bench.gate.take_over(&standing).unwrap();
+    let mut left = bench.gate.take_over(&state_of_publication).unwrap();
     left.sort();
     assert_eq!(left, [bench.path("b.xodr"), bench.path("t.xosc")]);
     assert_eq!(bench.behind(), names(&["a.xodr", "part.xml", "s.xosc"]));
@@ -414,11 +414,11 @@ fn faults(bench: &Bench, model: &Model) -> Vec<String> {
     let behind = bench.behind();
     let mut faults = Vec::new();
     for name in behind.iter().filter(|it| *it != "part.xml") {
-        let Some(claim) = model.get(name) else {
+        let Some(publication) = model.get(name) else {
             faults.push(format!("{name} has no claim"));
             continue;
         };
-        for (part, bytes) in claim {
+        for (part, bytes) in publication {
             if !behind.contains(part) || bench.content(part) != *bytes {
                 faults.push(format!("{name} is there without its {part}"));
             }
@@ -426,7 +426,7 @@ fn faults(bench: &Bench, model: &Model) -> Vec<String> {
     }
     let needed = model
         .iter()
-        .any(|(name, claim)| behind.contains(name) && claim.contains_key("part.xml"));
+        .any(|(name, publication)| behind.contains(name) && publication.contains_key("part.xml"));
     if behind.contains("part.xml") && !needed {
         faults.push("nobody needs part.xml".to_owned());
     }

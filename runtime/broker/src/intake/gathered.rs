@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use qcbus_bus::Held;
+use qcbus_bus::MappedImage;
 use qcbus_disk::foreign;
 use qcbus_ingest::modular::ExpandedImage;
 use qcbus_ingest::{Found, Limits, Look, Prepared, Source};
@@ -24,7 +24,7 @@ pub(super) struct Gathered {
     rests_on: Vec<bool>,
     inputs: BTreeMap<PathBuf, Input>,
     root: Vec<Input>,
-    pub held: Vec<(DocId, Held)>,
+    pub held: Vec<(DocId, MappedImage)>,
     /// Something was so young when it was read that its stamp proves nothing.
     racy: bool,
     bytes: u64,

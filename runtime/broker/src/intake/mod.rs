@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use qcbus_bus::{Documents, Held, Loan, LoanError};
+use qcbus_bus::{Documents, Loan, LoanError, MappedImage};
 use qcbus_disk::foreign;
 use qcbus_document::{Document, FileKind};
 use qcbus_ingest::modular::{ExpandedImage, SearchPath};
@@ -36,7 +36,7 @@ pub struct Intake {
     judged_as: Box<JudgedAs>,
     next_doc: AtomicU64,
     shared: Shared,
-    held: Mutex<HashMap<JobId, Vec<(DocId, Held)>>>,
+    held: Mutex<HashMap<JobId, Vec<(DocId, MappedImage)>>>,
     recent: Mutex<VecDeque<(JobId, DocId)>>,
 }
 
@@ -80,7 +80,7 @@ struct Manner {
 #[derive(Debug, Clone)]
 struct Published {
     doc: DocId,
-    held: Held,
+    held: MappedImage,
     digest: Digest,
     inputs: Vec<Input>,
     /// Some of them were so young when they were read that their stamps prove nothing.
@@ -165,7 +165,7 @@ impl Intake {
     }
 
     /// The root image of a job, while it is held.
-    pub fn root(&self, job: JobId) -> Option<Held> {
+    pub fn root(&self, job: JobId) -> Option<MappedImage> {
         lock(&self.held)
             .get(&job)
             .and_then(|all| all.first().map(|(_, held)| held.clone()))
@@ -173,7 +173,7 @@ impl Intake {
 
     /// All images of a job, while they are held.
     #[cfg(test)]
-    pub(crate) fn images(&self, job: JobId) -> Vec<(DocId, Held)> {
+    pub(crate) fn images(&self, job: JobId) -> Vec<(DocId, MappedImage)> {
         lock(&self.held).get(&job).cloned().unwrap_or_default()
     }
 
@@ -210,14 +210,14 @@ impl Intake {
         }
     }
 
-    fn hold(&self, job: JobId, held: Vec<(DocId, Held)>) {
+    fn hold(&self, job: JobId, held: Vec<(DocId, MappedImage)>) {
         lock(&self.held).insert(job, held);
     }
 
     /// Follows the root's references.
     fn gather(
         &self,
-        root: &Held,
+        root: &MappedImage,
         manner: Manner,
         asked: Instant,
         gathered: &mut Gathered,

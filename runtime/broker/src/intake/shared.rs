@@ -9,7 +9,7 @@ use std::time::Instant;
 use qcbus_disk::foreign;
 use qcbus_messages::DocId;
 
-use crate::seams::now;
+use crate::environment::now;
 
 use super::gathered::{has_its_stamps, is_unchanged};
 use super::{Published, lock};

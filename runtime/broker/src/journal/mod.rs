@@ -12,7 +12,7 @@ use rusqlite::{Connection, OpenFlags, params};
 
 use crate::core::{Judged, Member, Origin, Reported};
 use crate::directory_lock::{DirectoryLock, Purpose};
-use qcbus_disk::{FileMark, trust};
+use qcbus_disk::{FileFingerprint, trust};
 
 mod error;
 mod rows;
@@ -41,7 +41,7 @@ pub struct Remembered {
     /// The verdict and what it depends on.
     pub judged: Judged,
     /// The mark of the verdict file as it was written, where that was remembered.
-    pub written: Option<FileMark>,
+    pub written: Option<FileFingerprint>,
     /// The reporters that have said something of it.
     pub delivered: Vec<(String, Reported)>,
 }
@@ -84,7 +84,7 @@ pub enum Entry {
         /// How it came about; absent when the verdict only got fresh stamps.
         history: Option<Box<History>>,
         /// The mark of the verdict file; absent when none was written now.
-        written: Option<FileMark>,
+        written: Option<FileFingerprint>,
     },
     /// A file has gone.
     Withdrawn {
@@ -265,7 +265,7 @@ impl Journal {
                     written: Some(row.get(15)?)
                         .filter(|it: &String| !it.is_empty())
                         // What cannot be read is the mark of no file.
-                        .map(|it| FileMark::parse(&it).unwrap_or(FileMark::NONE)),
+                        .map(|it| FileFingerprint::parse(&it).unwrap_or(FileFingerprint::NONE)),
                     delivered,
                 });
             }

@@ -6,32 +6,41 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use qcbus_messages::path_text::{from_text, to_text as text};
 use qcbus_messages::{Digest, JobId, Verdict};
 
-use crate::core::{Epoch, Input, Judged, Juror, Jury, Mark, Reading, RestsOn, Stamp};
+use crate::core::{
+    Epoch, Input, Judged, Reading, RequiredBundle, RequiredSet, RestsOn, Stamp, VersionDigest,
+};
 
-pub(super) fn jury_to_text(jury: &Jury) -> String {
-    let row = |juror: &Juror| {
+pub(super) fn required_set_to_text(required_set: &RequiredSet) -> String {
+    let row = |required_bundle: &RequiredBundle| {
         (
-            juror.name.clone(),
-            juror.mark.map(|it| format!("{:016x}", it.0)),
+            required_bundle.name.clone(),
+            required_bundle
+                .version_digest
+                .map(|it| format!("{:016x}", it.0)),
         )
     };
-    let rows: Vec<(String, Option<String>)> = jury.0.iter().map(row).collect();
+    let rows: Vec<(String, Option<String>)> = required_set.0.iter().map(row).collect();
     serde_json::to_string(&rows).unwrap_or_default()
 }
 
-fn jury_from_text(text: &str) -> Jury {
-    let read = || -> Option<Vec<Juror>> {
+fn required_set_from_text(text: &str) -> RequiredSet {
+    let read = || -> Option<Vec<RequiredBundle>> {
         let rows: Vec<(String, Option<String>)> = serde_json::from_str(text).ok()?;
-        let juror = |(name, mark): (String, Option<String>)| {
-            let mark = match mark {
-                Some(mark) => Some(Mark(u64::from_str_radix(&mark, 16).ok()?)),
+        let required_bundle = |(name, version_digest): (String, Option<String>)| {
+            let version_digest = match version_digest {
+                Some(version_digest) => Some(VersionDigest(
+                    u64::from_str_radix(&version_digest, 16).ok()?,
+                )),
                 None => None,
             };
-            Some(Juror { name, mark })
+            Some(RequiredBundle {
+                name,
+                version_digest,
+            })
         };
-        rows.into_iter().map(juror).collect()
+        rows.into_iter().map(required_bundle).collect()
     };
-    read().map_or_else(Jury::unknown, Jury)
+    read().map_or_else(RequiredSet::unknown, RequiredSet)
 }
 
 /// A path, and of what is there size, time of modification, inode, digest if it was read, time of
@@ -162,7 +171,7 @@ pub(super) fn judged_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<Option<Judg
         digest,
         basis,
         config,
-        jury: Arc::new(jury_from_text(&row.get::<_, String>(6)?)),
+        required_set: Arc::new(required_set_from_text(&row.get::<_, String>(6)?)),
         epoch: Epoch(number(row.get(14)?)),
         inputs,
         racy: row.get(13)?,

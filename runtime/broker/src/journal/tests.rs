@@ -7,7 +7,7 @@ use qcbus_messages::{Catalogue, Digest, Verdict};
 use std::sync::Arc;
 
 use super::*;
-use crate::core::{Epoch, Input, Juror, Jury, Mark, Reading, Stamp};
+use crate::core::{Epoch, Input, Reading, RequiredBundle, RequiredSet, Stamp, VersionDigest};
 
 fn judged(job: u64) -> Judged {
     Judged {
@@ -19,14 +19,14 @@ fn judged(job: u64) -> Judged {
         digest: Digest([1; 32]),
         basis: Digest([2; 32]),
         config: Digest([3; 32]),
-        jury: Arc::new(Jury(vec![
-            Juror {
+        required_set: Arc::new(RequiredSet(vec![
+            RequiredBundle {
                 name: "mine".to_owned(),
-                mark: None,
+                version_digest: None,
             },
-            Juror {
+            RequiredBundle {
                 name: "xodrBundle".to_owned(),
-                mark: Some(Mark(u64::MAX)),
+                version_digest: Some(VersionDigest(u64::MAX)),
             },
         ])),
         epoch: Epoch(1 << 40),
@@ -69,7 +69,7 @@ fn what_was_written_is_remembered() {
                     path: path.clone(),
                     judged: expected.clone(),
                     history,
-                    written: Some(FileMark::parse("7 8 9").unwrap()),
+                    written: Some(FileFingerprint::parse("7 8 9").unwrap()),
                 },
                 // Only fresh stamps.
                 Entry::Judged {
@@ -90,7 +90,7 @@ fn what_was_written_is_remembered() {
     let all = journal.remembered().unwrap();
     assert_eq!(all.len(), 1);
     assert_eq!(all[0].judged, *expected);
-    assert_eq!(all[0].written, FileMark::parse("7 8 9"));
+    assert_eq!(all[0].written, FileFingerprint::parse("7 8 9"));
     let json = ("json".to_owned(), Reported::Of(JobId(5)));
     assert_eq!(all[0].delivered, [json]);
     let reporters = vec!["json".to_owned(), "text".to_owned()];
@@ -162,7 +162,7 @@ fn a_journal_of_schema_1_opens_and_its_stamps_fit_nothing() {
     assert_eq!(known, digest);
     assert_eq!(all[0].judged.inputs[1], written.inputs[1]);
     assert_eq!(all[0].judged.basis, written.basis);
-    assert_eq!(*all[0].judged.jury, Jury::unknown());
+    assert_eq!(*all[0].judged.required_set, RequiredSet::unknown());
     assert_eq!(all[0].written, None);
     let json = ("json".to_owned(), Reported::Of(JobId(5)));
     let text = ("text".to_owned(), Reported::OfGone);

@@ -7,11 +7,11 @@ use qcbus_messages::path_text::to_text as text;
 use rusqlite::types::Value;
 use rusqlite::{Transaction, params_from_iter};
 
-use super::rows::{inputs_to_text, jury_to_text, millis, rests_on_to_text, signed};
+use super::rows::{inputs_to_text, millis, required_set_to_text, rests_on_to_text, signed};
 use super::{Entry, History};
 use crate::core::{Judged, Member, Reported};
 use crate::store::digest_of;
-use qcbus_disk::FileMark;
+use qcbus_disk::FileFingerprint;
 
 /// A statement with its values.
 #[derive(Debug)]
@@ -130,7 +130,7 @@ fn delivery(path: &str, reporter: &str, reported: Reported) -> Change {
     )
 }
 
-fn file(path: &Path, judged: &Judged, written: Option<&FileMark>) -> Change {
+fn file(path: &Path, judged: &Judged, written: Option<&FileFingerprint>) -> Change {
     // Whoever writes no verdict file leaves the mark of the one that is there.
     let sql = "INSERT OR REPLACE INTO files (path, job, verdict, digest, basis, config, jury, errors, \
          warnings, information, why, xqar, inputs, racy, at, epoch, own, own_errors, rests_on, written) \
@@ -143,7 +143,7 @@ fn file(path: &Path, judged: &Judged, written: Option<&FileMark>) -> Change {
         Value::Text(judged.digest.to_string()),
         Value::Text(judged.basis.to_string()),
         Value::Text(judged.config.to_string()),
-        Value::Text(jury_to_text(&judged.jury)),
+        Value::Text(required_set_to_text(&judged.required_set)),
         count(judged.counts[0]),
         count(judged.counts[1]),
         count(judged.counts[2]),

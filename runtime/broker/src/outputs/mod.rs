@@ -4,7 +4,7 @@
 //! are looked at in turn, because kernels and file systems lose events. The file that a lost output is about is
 //! judged again, which writes the output again.
 
-mod looker;
+mod scanner;
 
 use std::collections::{BTreeMap, HashSet};
 use std::io;
@@ -12,11 +12,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use qcbus_disk::{FileMark, foreign};
+use qcbus_disk::{FileFingerprint, foreign};
 
-use self::looker::Looker;
+use self::scanner::Scanner;
 use crate::core::LostOutput;
-use crate::seams::{Bell, thread};
+use crate::environment::{Bell, thread};
 
 /// Told of outputs that are lost, from the thread that looks at them.
 pub type TellLost = Box<dyn FnMut(Vec<LostOutput>) + Send>;
@@ -46,7 +46,7 @@ struct Book {
 #[derive(Debug, Clone)]
 struct Written {
     file: Arc<Path>,
-    mark: FileMark,
+    fingerprint: FileFingerprint,
     /// That it is lost was told.
     is_told: bool,
 }
@@ -83,10 +83,10 @@ impl Outputs {
         let Some(shared) = self.0.clone() else {
             return Ok(None);
         };
-        let looker = Looker::new(shared.clone(), tell);
+        let scanner = Scanner::new(shared.clone(), tell);
         thread::Builder::new()
             .name("outputs".to_owned())
-            .spawn(move || looker.run())?;
+            .spawn(move || scanner.run())?;
         Ok(Some(OutputWatch(shared)))
     }
 
@@ -98,13 +98,13 @@ impl Outputs {
         }
     }
 
-    /// An output is there. `mark` is that of the very file that was written.
-    pub fn written(&self, output: &Path, file: &Arc<Path>, mark: FileMark) {
+    /// An output is there. `fingerprint` is that of the very file that was written.
+    pub fn written(&self, output: &Path, file: &Arc<Path>, fingerprint: FileFingerprint) {
         let Some(shared) = &self.0 else { return };
         let mut book = shared.book();
         let written = Written {
             file: file.clone(),
-            mark,
+            fingerprint,
             is_told: false,
         };
         book.written.insert(output.into(), written);
@@ -141,15 +141,15 @@ impl Shared {
     /// the lock, so that whoever changes it meanwhile does not wait for a disk; then it is looked at anew.
     fn look(&self, output: &Path, wanted: impl Fn(&mut Written) -> bool) -> Option<LostOutput> {
         loop {
-            let known = self.book().written.get(output)?.mark;
+            let known = self.book().written.get(output)?.fingerprint;
             // What does not answer is what it was.
-            let there = foreign::visit(output, || Ok(FileMark::at(output))).ok()?;
+            let there = foreign::access(output, || Ok(FileFingerprint::at(output))).ok()?;
             if there.as_ref() == Some(&known) {
                 return None;
             }
             let mut book = self.book();
             let written = book.written.get_mut(output)?;
-            if written.mark != known {
+            if written.fingerprint != known {
                 continue;
             }
             return wanted(written).then(|| LostOutput {
@@ -191,9 +191,9 @@ mod tests {
             std::fs::create_dir_all(output.parent().unwrap()).unwrap();
             self.outputs.changing(&output);
             std::fs::write(&output, name).unwrap();
-            let mark = FileMark::at(&output).unwrap();
+            let fingerprint = FileFingerprint::at(&output).unwrap();
             self.outputs
-                .written(&output, &Path::new("/a.xodr").into(), mark);
+                .written(&output, &Path::new("/a.xodr").into(), fingerprint);
             output
         }
 
@@ -259,8 +259,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let output = dir.path().join("a.xqar");
         std::fs::write(&output, "").unwrap();
-        let mark = FileMark::at(&output).unwrap();
-        outputs.written(&output, &Path::new("/a.xodr").into(), mark);
+        let fingerprint = FileFingerprint::at(&output).unwrap();
+        outputs.written(&output, &Path::new("/a.xodr").into(), fingerprint);
         std::fs::remove_file(&output).unwrap();
         assert!(outputs.is_lost(&output));
         let (tell, told) = channel();

@@ -116,16 +116,16 @@ fn resolve(command: &str) -> Result<Option<(String, &str)>, String> {
     let Some(found) = find(&program) else {
         return Ok(None);
     };
-    believe(&found)?;
+    accept(&found)?;
     if let Some(script) = first_file(&mut words).filter(|it| it.is_file()) {
-        believe(&script)?;
+        accept(&script)?;
     }
     let found = found.into_os_string().into_string();
     let found = found.map_err(|it| format!("{}: its name is no UTF-8", it.display()))?;
     Ok(Some((found, rest)))
 }
 
-fn believe(file: &Path) -> Result<(), String> {
+fn accept(file: &Path) -> Result<(), String> {
     match trust::look_at_file(file) {
         Err(error @ TrustError::Foreign { .. }) => Err(error.to_string()),
         // It is missing, or nobody can get at it: so will whoever starts it find.

@@ -8,11 +8,11 @@
 //! `QCBUS_SIM_FROM=1000000` begins with that seed.
 
 mod disk;
+pub mod environment;
 mod kernel;
 mod oracle;
 mod peers;
 mod schedule;
-pub mod seams;
 mod surroundings;
 mod tests;
 mod threads;
@@ -22,7 +22,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use qcbus_bus::{Documents, Held};
+use qcbus_bus::{Documents, MappedImage};
 use qcbus_ingest::Stat;
 use qcbus_messages::{DocId, JobId};
 
@@ -83,8 +83,8 @@ impl Simulation {
         let mut world = self.world();
         let step = world.step;
         match what {
-            "storing" => world.looker.looks(path, step),
-            "pooled" => world.looker.asks(path, step),
+            "storing" => world.scanner.looks(path, step),
+            "pooled" => world.scanner.asks(path, step),
             _ => {}
         }
     }
@@ -107,7 +107,7 @@ impl Simulation {
         breaks
     }
 
-    pub fn images(&self, job: JobId) -> Vec<(DocId, Held)> {
+    pub fn images(&self, job: JobId) -> Vec<(DocId, MappedImage)> {
         let intake = self.world().serving.as_ref().map(|it| it.intake.clone());
         intake.map(|it| it.images(job)).unwrap_or_default()
     }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-use qcbus_disk::FileMark;
+use qcbus_disk::FileFingerprint;
 use qcbus_messages::control::Response;
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Digest, JobId, Verdict};
@@ -38,10 +38,10 @@ struct Dependency {
     sha256: Option<String>,
 }
 
-type Seen<T> = HashMap<PathBuf, (FileMark, T)>;
+type Seen<T> = HashMap<PathBuf, (FileFingerprint, T)>;
 
 /// Looks at results and gate all the time.
-pub struct Looker {
+pub struct Scanner {
     pub out: PathBuf,
     pub gate: PathBuf,
     /// The step at which a writer last began to store a result of each file.
@@ -52,9 +52,9 @@ pub struct Looker {
     published: Seen<Digest>,
 }
 
-impl Looker {
-    pub fn new(out: PathBuf, gate: PathBuf) -> Looker {
-        Looker {
+impl Scanner {
+    pub fn new(out: PathBuf, gate: PathBuf) -> Scanner {
+        Scanner {
             out,
             gate,
             looked: HashMap::new(),
@@ -88,12 +88,12 @@ impl Looker {
 
 /// What was read of a file, which is only read again when it is another.
 fn seen<T: Clone>(known: &mut Seen<T>, path: PathBuf, read: impl Fn(&Path) -> T) -> Option<T> {
-    let mark = FileMark::at(&path)?;
-    if let Some((_, value)) = known.get(&path).filter(|it| it.0 == mark) {
+    let fingerprint = FileFingerprint::at(&path)?;
+    if let Some((_, value)) = known.get(&path).filter(|it| it.0 == fingerprint) {
         return Some(value.clone());
     }
     let value = read(&path);
-    known.insert(path, (mark, value.clone()));
+    known.insert(path, (fingerprint, value.clone()));
     Some(value)
 }
 
@@ -107,13 +107,13 @@ impl World {
         let Some(file) = self.disk.file_at(path) else {
             return;
         };
-        let Some(written) = self.looker.verdict(file) else {
+        let Some(written) = self.scanner.verdict(file) else {
             return self.wrong(format!(
                 "{} has no verdict after it was written",
                 FILES[file]
             ));
         };
-        let since = self.looker.looked.get(path).copied().unwrap_or(0);
+        let since = self.scanner.looked.get(path).copied().unwrap_or(0);
         let fits = |lying: &&Lying| fits(&self.disk, lying, file, &written);
         let moments: Vec<bool> = self
             .disk
@@ -130,7 +130,7 @@ impl World {
         } else if accepted && !moments.contains(&true) {
             self.wrong(format!("{} is accepted and must not be", FILES[file]));
         }
-        let asked = self.looker.asked.get(path).copied().unwrap_or(0);
+        let asked = self.scanner.asked.get(path).copied().unwrap_or(0);
         let must = self.peers.second_since.is_some_and(|since| since < asked);
         if must && !written.maps() {
             let name = FILES[file];
@@ -143,11 +143,11 @@ impl World {
     /// What lies behind the gate stands accepted and is complete.
     pub fn gate_is_true(&mut self) {
         for (file, name) in FILES.iter().enumerate() {
-            let Some(digest) = self.looker.published(file) else {
+            let Some(digest) = self.scanner.published(file) else {
                 continue;
             };
             if JUDGED.contains(&file) {
-                let verdict = self.looker.verdict(file);
+                let verdict = self.scanner.verdict(file);
                 let stands =
                     |it: &Written| it.verdict == Verdict::Accepted && is(Some(digest), &it.sha256);
                 if !verdict.as_ref().is_some_and(stands) {
@@ -159,10 +159,10 @@ impl World {
         }
         let mut lying: Lying = [None; FILES.len()];
         for (file, it) in lying.iter_mut().enumerate() {
-            *it = self.looker.published(file);
+            *it = self.scanner.published(file);
         }
         for file in JUDGED {
-            let maps = self.looker.verdict(file).is_some_and(|it| it.maps());
+            let maps = self.scanner.verdict(file).is_some_and(|it| it.maps());
             let complete = lying[file].is_none() || self.disk.is_sound(&lying, file, maps);
             let map = map_of(file).is_none_or(|map| lying[map].is_some());
             if !complete || (lying[file].is_some() && !map) {
@@ -174,9 +174,9 @@ impl World {
 
     /// Nothing is under way: what is doubted is not behind the gate.
     pub fn shut_is_shut(&mut self) {
-        let open = self.summary.shut.iter();
+        let open = self.summary.unpublished.iter();
         let mut open = open.filter_map(|path| self.disk.file_at(path));
-        let open = open.find(|file| self.looker.gate.join(FILES[*file]).exists());
+        let open = open.find(|file| self.scanner.gate.join(FILES[*file]).exists());
         if let Some(file) = open {
             let name = FILES[file];
             self.wrong(format!(
@@ -263,8 +263,8 @@ impl World {
 
     /// Whether a file is accepted, if all that is said of it is the same and true.
     fn agrees(&mut self, file: usize, row: Option<&Remembered>) -> Result<bool, String> {
-        let written = self.looker.verdict(file);
-        let result = with_suffix(&self.looker.out.join(FILES[file]), ".xqar").exists();
+        let written = self.scanner.verdict(file);
+        let result = with_suffix(&self.scanner.out.join(FILES[file]), ".xqar").exists();
         if self.disk.lying[file].is_none() {
             let nothing = written.is_none() && !result && row.is_none();
             let why = || format!("it is gone: result {result}, {written:?}, journal {row:?}");
@@ -279,11 +279,11 @@ impl World {
         }
         if row.written.as_ref()
             != self
-                .looker
+                .scanner
                 .verdicts
                 .values()
                 .map(|it| &it.0)
-                .find(|mark| row.written.as_ref() == Some(*mark))
+                .find(|fingerprint| row.written.as_ref() == Some(*fingerprint))
         {
             return Err("the journal knows another verdict file".to_owned());
         }
@@ -308,7 +308,7 @@ impl World {
             Verdict::Rejected => !sound,
             Verdict::Undetermined => !sound && !faulty,
         };
-        let path = with_suffix(&self.looker.out.join(FILES[file]), ".xqar");
+        let path = with_suffix(&self.scanner.out.join(FILES[file]), ".xqar");
         let why = || {
             let result = std::fs::read_to_string(&path).unwrap_or_default();
             let (verdict, why) = (written.verdict, &judged.why);
@@ -330,7 +330,7 @@ impl World {
                 }
             };
             let expected = self.disk.lying[file].filter(|_| belongs);
-            if self.looker.published(file) != expected {
+            if self.scanner.published(file) != expected {
                 return Err(format!(
                     "{name} belongs behind the gate: {belongs}, and is not as it must be"
                 ));
@@ -340,7 +340,7 @@ impl World {
     }
 
     fn no_litter(&self) -> Result<(), String> {
-        let mut open = vec![self.looker.out.clone(), self.looker.gate.clone()];
+        let mut open = vec![self.scanner.out.clone(), self.scanner.gate.clone()];
         while let Some(next) = open.pop() {
             for entry in std::fs::read_dir(&next).into_iter().flatten().flatten() {
                 let name = entry.file_name().to_string_lossy().into_owned();

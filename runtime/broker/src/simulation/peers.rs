@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
 
-use qcbus_bus::{Held, HostEvent, PeerId};
+use qcbus_bus::{HostEvent, MappedImage, PeerId};
 use qcbus_document::FileKind;
 use qcbus_formats::manifest::May;
 use qcbus_formats::pool::{Ending, RuleUids};
@@ -193,7 +193,7 @@ impl Peers {
         }
     }
 
-    pub fn has_job(&mut self, peer: PeerId, job: &Job, images: &[(DocId, Held)]) {
+    pub fn has_job(&mut self, peer: PeerId, job: &Job, images: &[(DocId, MappedImage)]) {
         if let Some(process) = self.of(peer) {
             let finds = finds(process.name, job, images);
             let job = job.job;
@@ -339,7 +339,7 @@ fn peer_of(event: &HostEvent) -> Option<PeerId> {
 }
 
 /// What a bundle finds: it looks at images and nothing else.
-fn finds(name: &str, job: &Job, images: &[(DocId, Held)]) -> bool {
+fn finds(name: &str, job: &Job, images: &[(DocId, MappedImage)]) -> bool {
     let image = |doc: DocId| images.iter().find(|it| it.0 == doc).map(|it| &*it.1);
     let mut documents = job.documents.iter();
     let root = documents.next();

@@ -232,7 +232,7 @@ impl Play {
             930..970 => self.time_passes(),
             970..985 => self.with(World::ask),
             985..989 if self.is_alive() => self.kill(),
-            989..994 => self.trouble(),
+            989..994 => self.failure(),
             _ => self.somebody_comes(),
         }
         self.with(|world| {
@@ -359,7 +359,7 @@ impl Play {
     }
 
     /// A clock is set, the kernel loses something, processes wake up.
-    fn trouble(&self) {
+    fn failure(&self) {
         self.with(|world| match world.rng.u32(0..6) {
             0 => {
                 let hours = world.rng.i32(-2..3);

@@ -12,8 +12,8 @@ use super::Simulation;
 use super::threads::here;
 use crate::control::Asked;
 use crate::core::{ChildSpec, Event, Launch};
-use crate::former::Former;
 use crate::launches::Launches;
+use crate::stale_children::StaleChildren;
 use crate::supervise::{self, Surroundings};
 
 fn simulation() -> Arc<Simulation> {
@@ -188,16 +188,16 @@ impl Children {
         }
     }
 
-    pub fn former(&self) -> Option<Former> {
+    pub fn stale_children(&self) -> Option<StaleChildren> {
         match self {
-            Children::Real(real) => real.former(),
+            Children::Real(real) => real.stale_children(),
             Children::Simulated(_) => None,
         }
     }
 
-    pub fn look_for_orphans(&self) {
+    pub fn look_for_descendants(&self) {
         if let Children::Real(real) = self {
-            real.look_for_orphans();
+            real.look_for_descendants();
         }
     }
 
@@ -208,9 +208,9 @@ impl Children {
         }
     }
 
-    pub fn last_words(&self, name: &str) -> Vec<String> {
+    pub fn final_output(&self, name: &str) -> Vec<String> {
         match self {
-            Children::Real(real) => real.last_words(name),
+            Children::Real(real) => real.final_output(name),
             Children::Simulated(_) => Vec::new(),
         }
     }

@@ -51,7 +51,7 @@ pub struct Task {
     pub name: String,
     pub state: Mutex<State>,
     /// Whether it is its turn.
-    turn: Mutex<bool>,
+    has_control: Mutex<bool>,
     changed: Condvar,
     /// It is to end where it stands, as a process does that is killed.
     killed: AtomicBool,
@@ -63,20 +63,20 @@ pub struct Task {
 struct Killed;
 
 impl Task {
-    fn give_turn(&self, mine: bool) {
-        *self.turn.lock().unwrap() = mine;
+    fn hand_over(&self, mine: bool) {
+        *self.has_control.lock().unwrap() = mine;
         self.changed.notify_all();
     }
 
-    fn await_turn(&self, mine: bool) {
-        let turn = self.turn.lock().unwrap();
-        drop(self.changed.wait_while(turn, |it| *it != mine).unwrap());
+    fn await_control(&self, mine: bool) {
+        let has_control = self.has_control.lock().unwrap();
+        drop(self.changed.wait_while(has_control, |it| *it != mine).unwrap());
     }
 
     /// Lets it run until it stops the next time. To be called by who has the turn.
     pub fn resume(&self) {
-        self.give_turn(true);
-        self.await_turn(false);
+        self.hand_over(true);
+        self.await_control(false);
     }
 
     pub fn kill(&self) {
@@ -97,15 +97,15 @@ impl Task {
             return;
         }
         *self.state.lock().unwrap() = state;
-        self.give_turn(false);
-        self.await_turn(true);
+        self.hand_over(false);
+        self.await_control(true);
         if self.killed.load(Ordering::Relaxed) {
             resume_unwind(Box::new(Killed));
         }
     }
 
     fn run(self: &Arc<Task>, simulation: Arc<Simulation>, body: Box<dyn FnOnce() + Send>) {
-        self.await_turn(true);
+        self.await_control(true);
         enter(Some(Here {
             simulation,
             task: Some(self.clone()),
@@ -122,7 +122,7 @@ impl Task {
         }
         enter(None);
         *self.state.lock().unwrap() = State::Ended;
-        self.give_turn(false);
+        self.hand_over(false);
     }
 }
 
@@ -145,7 +145,7 @@ impl Crew {
         let task = Arc::new(Task {
             name,
             state: Mutex::new(State::Ready),
-            turn: Mutex::new(false),
+            has_control: Mutex::new(false),
             changed: Condvar::new(),
             killed: AtomicBool::new(false),
             panic: Mutex::new(None),

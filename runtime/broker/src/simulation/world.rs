@@ -5,14 +5,14 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use fastrand::Rng;
-use qcbus_bus::{Held, PeerId};
+use qcbus_bus::{MappedImage, PeerId};
 use qcbus_messages::control::{Request, Response};
 use qcbus_messages::{DocId, ToPeer};
 use tokio::sync::mpsc::UnboundedSender;
 use tokio::sync::oneshot;
 
 use super::disk::{Disk, How, JUDGED, Mark};
-use super::oracle::Looker;
+use super::oracle::Scanner;
 use super::peers::{Letter, Peers};
 use super::threads::Task;
 use crate::control::Asked;
@@ -31,7 +31,7 @@ pub struct Summary {
     /// Nothing waits and nothing is under way.
     pub quiet: bool,
     /// Acceptances that must not lie behind the gate.
-    pub shut: Vec<Arc<Path>>,
+    pub unpublished: Vec<Arc<Path>>,
     /// Who must judge.
     pub demanded: Vec<String>,
 }
@@ -60,7 +60,7 @@ pub struct World {
     pub waits: Vec<Wait>,
     /// The simulated threads, the loop of the broker first.
     pub tasks: Vec<Arc<Task>>,
-    pub looker: Looker,
+    pub scanner: Scanner,
     /// What must never happen and has.
     pub fault: Option<String>,
     pub lines: Vec<String>,
@@ -87,7 +87,7 @@ impl World {
             summary: Summary::default(),
             waits: Vec::new(),
             tasks: Vec::new(),
-            looker: Looker::new(out, gate),
+            scanner: Scanner::new(out, gate),
             fault: None,
             lines: Vec::new(),
             verbose: false,
@@ -123,7 +123,13 @@ impl World {
     }
 
     /// A peer is told something.
-    pub fn told(&mut self, peer: PeerId, message: &ToPeer, images: &[(DocId, Held)], _: Duration) {
+    pub fn told(
+        &mut self,
+        peer: PeerId,
+        message: &ToPeer,
+        images: &[(DocId, MappedImage)],
+        _: Duration,
+    ) {
         match message {
             ToPeer::Job(job) => self.peers.has_job(peer, job, images),
             ToPeer::Cancel { job } => {

@@ -8,7 +8,7 @@ use qcbus_messages::control::Checked;
 use qcbus_messages::{Digest, JobId, Verdict};
 
 use super::{remove_earlier_results, unwritten};
-use crate::core::{Epoch, Judged, Jury};
+use crate::core::{Epoch, Judged, RequiredSet};
 use crate::directory_lock::{DirectoryLock, LockError};
 use crate::result_paths::ResultPaths;
 
@@ -55,7 +55,7 @@ impl GivenResults {
             digest: told.digest.parse().unwrap_or_default(),
             basis: Digest::default(),
             config: self.config,
-            jury: Arc::new(Jury::default()),
+            required_set: Arc::new(RequiredSet::default()),
             epoch: Epoch::default(),
             inputs: Vec::new(),
             racy: true,

@@ -1,10 +1,10 @@
 //! From outcomes to files on disk: pooling, the result, the verdict file, the gate.
 
 mod earlier;
-mod errand;
 mod given;
 mod history;
 mod leftovers;
+mod on_demand;
 mod pooling;
 mod reconcile;
 mod refresh;
@@ -24,14 +24,14 @@ use qcbus_ingest::RESTS_ON_CHECKER;
 use qcbus_messages::Verdict;
 use qcbus_messages::path_text::to_text;
 
-use crate::core::{FinishedJob, Judged, ShareOutcome, StoreOutcome};
+use crate::core::{FinishedJob, Judged, StoreOutcome, TaskOutcome};
 use crate::directory_lock::DirectoryLock;
+use crate::environment::{disk, step};
 use crate::gate::Gate;
 use crate::journal::{Entry, JournalError, Remembered, SharedJournal};
 use crate::outputs::Outputs;
+use crate::probes::Probes;
 use crate::result_paths::ResultPaths;
-use crate::scouts::Scouts;
-use crate::seams::{disk, step};
 use crate::stages::reached;
 use crate::stamp::stamp_of;
 use qcbus_disk::is_for_good;
@@ -68,7 +68,7 @@ pub struct Store {
     /// Nobody else writes results there.
     pub lock: DirectoryLock,
     /// Who looks at files.
-    pub scouts: Scouts,
+    pub probes: Probes,
     /// Where results of trials are kept, if anything is.
     pub trials: Option<TrialResults>,
     /// What is remembered; without it, nothing is: of a single run nobody asks later.
@@ -91,7 +91,7 @@ impl Store {
             Ok(false) => return StoreOutcome::Stale,
             Err(error) => return StoreOutcome::Failed(unlooked(&job.path, &error)),
         }
-        let outcomes: Vec<BundleOutcome> = job.bundles.iter().map(ShareOutcome::said).collect();
+        let outcomes: Vec<BundleOutcome> = job.bundles.iter().map(TaskOutcome::said).collect();
         let pooled = self.pool(job, outcomes, (config, Scope::Whole), root);
         reached("pooled", &job.path);
         let verdict = pooled.verdict();
@@ -146,7 +146,7 @@ impl Store {
         };
         let read = prepared.clone();
         let now = move || refreshed(&read.inputs);
-        let Some(now) = self.scouts.within(now)? else {
+        let Some(now) = self.probes.within(now)? else {
             return Ok(false);
         };
         if let Some(moved) = now {
@@ -161,7 +161,7 @@ impl Store {
     /// Whether a file certainly is no more. One that does not answer is there.
     fn has_gone(&self, path: &Arc<Path>) -> bool {
         let path = path.clone();
-        let stamp = self.scouts.within(move || stamp_of(&path));
+        let stamp = self.probes.within(move || stamp_of(&path));
         matches!(stamp, Ok(Ok(None)))
     }
 
@@ -169,12 +169,12 @@ impl Store {
     ///
     /// # Errors
     /// What a person should know; it is to be tried again.
-    pub fn open_gate(&self, path: &Arc<Path>, judged: &Judged) -> Result<(), Trouble> {
+    pub fn open_gate(&self, path: &Arc<Path>, judged: &Judged) -> Result<(), StoreFailure> {
         match self.gate.as_ref().filter(|_| judged.is_accepted()) {
             None => Ok(()),
             Some(gate) => gate
                 .accept(path, judged)
-                .map_err(|error| Trouble::not_published(path, &error)),
+                .map_err(|error| StoreFailure::not_published(path, &error)),
         }
     }
 
@@ -182,9 +182,9 @@ impl Store {
     ///
     /// # Errors
     /// What a person should know; it is to be tried again.
-    pub fn close_gate(&self, path: &Arc<Path>) -> Result<(), Trouble> {
+    pub fn close_gate(&self, path: &Arc<Path>) -> Result<(), StoreFailure> {
         let revoked = self.gate.as_ref().map_or(Ok(()), |gate| gate.revoke(path));
-        revoked.map_err(|error| Trouble {
+        revoked.map_err(|error| StoreFailure {
             what: format!("cannot take {} from the gate: {error}", to_text(path)),
             concerns_all: false,
         })
@@ -194,9 +194,9 @@ impl Store {
     ///
     /// # Errors
     /// What a person should know; it is to be tried again.
-    pub fn follow(&self, path: &Arc<Path>) -> Result<(), Trouble> {
+    pub fn follow(&self, path: &Arc<Path>) -> Result<(), StoreFailure> {
         let followed = self.gate.as_ref().map_or(Ok(()), |gate| gate.follow(path));
-        followed.map_err(|(path, error)| Trouble::not_published(&path, &error))
+        followed.map_err(|(path, error)| StoreFailure::not_published(&path, &error))
     }
 
     /// Writes to the journal.
@@ -239,24 +239,24 @@ impl Store {
 
 /// Why something that is to be tried again could not be done.
 #[derive(Debug)]
-pub struct Trouble {
+pub struct StoreFailure {
     /// For a person.
     pub what: String,
     /// It is not about one file: the journal cannot be written.
     pub concerns_all: bool,
 }
 
-impl Trouble {
-    fn not_published(path: &Path, error: &io::Error) -> Trouble {
-        Trouble {
+impl StoreFailure {
+    fn not_published(path: &Path, error: &io::Error) -> StoreFailure {
+        StoreFailure {
             what: format!("cannot publish {}: {error}", to_text(path)),
             concerns_all: false,
         }
     }
 
     /// The journal cannot be written.
-    pub fn of_all(what: String) -> Trouble {
-        Trouble {
+    pub fn of_all(what: String) -> StoreFailure {
+        StoreFailure {
             what,
             concerns_all: true,
         }
@@ -310,7 +310,7 @@ fn judged(
         digest: root.map(|(_, digest)| digest).unwrap_or_default(),
         basis: prepared.map(|it| it.basis).unwrap_or_default(),
         config: job.config,
-        jury: job.jury.clone(),
+        required_set: job.required_set.clone(),
         epoch: job.epoch,
         inputs: prepared.map(|it| it.inputs.clone()).unwrap_or_default(),
         racy: prepared.is_none_or(|it| it.racy),

@@ -11,7 +11,7 @@ use qcbus_messages::path_text::to_text;
 use qcbus_messages::{BUILD_DATE, MissingDocument, Verdict};
 
 use super::Store;
-use crate::core::{FinishedJob, Referenced, RestsOn, ShareOutcome};
+use crate::core::{FinishedJob, Referenced, RestsOn, TaskOutcome};
 
 impl Store {
     pub(super) fn pool(
@@ -86,7 +86,7 @@ impl Store {
 
 /// The remark that nobody could answer for the file: it cannot be read, or nobody checks its kind.
 fn unanswered(job: &FinishedJob) -> Option<Remark> {
-    let takes = |it: &ShareOutcome| {
+    let takes = |it: &TaskOutcome| {
         let catalogue = it.catalogue.as_ref();
         catalogue.is_some_and(|it| it.kinds.contains(&job.kind))
     };

@@ -12,14 +12,14 @@ use qcbus_messages::path_text::to_text;
 
 use super::leftovers::{Leftover, leftovers};
 use super::refresh::as_it_is;
-use super::{Store, Trouble};
+use super::{Store, StoreFailure};
 use crate::core::{Input, Judged, Stamp};
 use crate::gate::GateError;
 use crate::journal::{Entry, Remembered};
 use crate::result_paths::verdict_beside;
 use crate::stamp::{stamp_of, stamp_through_links};
 use crate::watch::hidden_above;
-use qcbus_disk::{FileMark, remove, remove_empty_above};
+use qcbus_disk::{FileFingerprint, remove, remove_empty_above};
 
 /// What stands after all was looked through.
 #[derive(Debug, Default)]
@@ -60,7 +60,7 @@ impl Store {
     ) -> Result<Reconciled, GateError> {
         let mut found = Reconciled::default();
         let mut fallen: Vec<(Remembered, Fall)> = Vec::new();
-        let (mut owned, mut claims) = (HashSet::new(), Vec::new());
+        let (mut owned, mut publications) = (HashSet::new(), Vec::new());
         for row in rows {
             if let Some(fall) = self.fall_of(&row) {
                 fallen.push((row, fall));
@@ -72,14 +72,14 @@ impl Store {
             let lookable = stamp_of(&row.path);
             let as_read = found.as_read(&row.judged, lookable.as_ref().ok());
             if as_read || !row.judged.is_accepted() {
-                claims.push(row.clone());
+                publications.push(row.clone());
             }
             if lookable.is_ok() {
                 found.standing.push(row);
             }
         }
         if let Some(gate) = &self.gate {
-            found.unpublished = gate.take_over(&claims)?;
+            found.unpublished = gate.take_over(&publications)?;
         }
         self.let_fall(fallen, &owned, reporters, &mut found);
         self.clear_leftovers(&owned, reporters, &mut found);
@@ -90,8 +90,8 @@ impl Store {
     fn is_written(&self, row: &Remembered) {
         let outputs = [self.places.xqar(&row.path), self.places.verdict(&row.path)];
         for output in outputs {
-            if let Some(mark) = FileMark::at(&output) {
-                self.outputs.written(&output, &row.path, mark);
+            if let Some(fingerprint) = FileFingerprint::at(&output) {
+                self.outputs.written(&output, &row.path, fingerprint);
             }
         }
     }
@@ -108,8 +108,8 @@ impl Store {
         let Some(xqar) = xqar.filter(|it| *it == self.places.xqar(path)) else {
             return Some(Fall::Moved);
         };
-        let now = FileMark::at(&self.places.verdict(path));
-        // What older versions have written has no mark.
+        let now = FileFingerprint::at(&self.places.verdict(path));
+        // What older versions have written has no fingerprint.
         let same = now.is_some() && (row.written.is_none() || row.written == now);
         (!same || !xqar.exists()).then_some(Fall::Incomplete)
     }
@@ -220,7 +220,7 @@ impl Store {
             return;
         }
         // The next start finds the same and tries again.
-        if let Err(why) = self.record(entries).map_err(Trouble::of_all) {
+        if let Err(why) = self.record(entries).map_err(StoreFailure::of_all) {
             found.said.push(why.what);
         }
     }

@@ -12,7 +12,7 @@ use qcbus_messages::path_text::to_text;
 use sha2::{Digest as _, Sha256};
 
 use super::Store;
-use crate::core::{ErrandOutcome, FinishedJob, TrialEnd};
+use crate::core::{FinishedJob, OnDemandOutcome, TrialEnd};
 
 /// Below the directory of state.
 const DIRECTORY: &str = "shadow";
@@ -68,7 +68,7 @@ impl Store {
         job: &mut FinishedJob,
         config: Option<&Config>,
         root: Option<&[u8]>,
-    ) -> ErrandOutcome {
+    ) -> OnDemandOutcome {
         let pooled = match self.pool_as_it_is(job, (config, Scope::Alone), root) {
             Ok(pooled) => pooled,
             Err(outcome) => return outcome,
@@ -89,15 +89,15 @@ impl Store {
             if let Some(results) = &self.trials {
                 results.forget(shadow, Some(&job.path));
             }
-            return ErrandOutcome::Tried(found);
+            return OnDemandOutcome::Tried(found);
         };
         let path = results.of(shadow, &job.path);
         let text = xqar::write(&pooled.results, self.dialect);
         match write_whole(&path, text.as_bytes(), false) {
             Ok(()) => found.result = Some(path),
-            Err(error) => return ErrandOutcome::Failed(unkept(&path, &error)),
+            Err(error) => return OnDemandOutcome::Failed(unkept(&path, &error)),
         }
-        ErrandOutcome::Tried(found)
+        OnDemandOutcome::Tried(found)
     }
 }
 

@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use qcbus_messages::path_text::to_text;
 
-use super::{Store, Trouble};
+use super::{Store, StoreFailure};
+use crate::environment::{disk, step};
 use crate::journal::{Entry, JournalError, Void};
-use crate::seams::{disk, step};
 use qcbus_disk::{remove, remove_empty_above};
 
 impl Store {
@@ -17,8 +17,8 @@ impl Store {
     ///
     /// # Errors
     /// What a person should know; it is to be tried again.
-    pub fn withdraw(&self, path: &Arc<Path>, reporters: &[String]) -> Result<(), Trouble> {
-        self.withdraw_files(path).map_err(|error| Trouble {
+    pub fn withdraw(&self, path: &Arc<Path>, reporters: &[String]) -> Result<(), StoreFailure> {
+        self.withdraw_files(path).map_err(|error| StoreFailure {
             what: format!("cannot withdraw the result of {}: {error}", to_text(path)),
             concerns_all: false,
         })?;
@@ -27,7 +27,7 @@ impl Store {
             path: path.clone(),
             reporters: reporters.to_vec(),
         };
-        self.record(&[entry]).map_err(Trouble::of_all)
+        self.record(&[entry]).map_err(StoreFailure::of_all)
     }
 
     /// First what others may take for accepted, last what tells that there was a result.

@@ -4,15 +4,15 @@ use std::cell::Cell;
 use std::path::Path;
 use std::sync::Arc;
 
-use qcbus_disk::{FileMark, write_both, write_whole};
+use qcbus_disk::{FileFingerprint, write_both, write_whole};
 use qcbus_formats::pool::Pooled;
 use qcbus_formats::xqar;
 
 use super::history::history;
 use super::{Store, Unwritten, unwritten};
 use crate::core::{FinishedJob, Judged, LostOutput};
+use crate::environment::{disk, step};
 use crate::journal::Entry;
-use crate::seams::{disk, step};
 use crate::stages::reached;
 use crate::verdict_file;
 
@@ -57,13 +57,13 @@ impl Store {
         })
     }
 
-    /// Writes the result and the verdict file, and gives the mark of the latter.
+    /// Writes the result and the verdict file, and gives the fingerprint of the latter.
     fn write_files(
         &self,
         job: &FinishedJob,
         pooled: &Pooled,
         judged: &Judged,
-    ) -> Result<Option<FileMark>, Unwritten> {
+    ) -> Result<Option<FileFingerprint>, Unwritten> {
         let memory = TEXT.take();
         let text = xqar::write_into(memory, &pooled.results, self.dialect);
         let written = self.write_texts(job, pooled, judged, &text);
@@ -79,7 +79,7 @@ impl Store {
         pooled: &Pooled,
         judged: &Judged,
         text: &str,
-    ) -> Result<Option<FileMark>, Unwritten> {
+    ) -> Result<Option<FileFingerprint>, Unwritten> {
         let xqar = self.places.xqar(&job.path);
         let result = (&*xqar, text.as_bytes());
         disk().map_err(|error| unwritten(&xqar, &error))?;
@@ -87,8 +87,8 @@ impl Store {
         if !self.verdict_files {
             let written = write_whole(result.0, result.1, self.durable);
             written.map_err(|error| unwritten(&xqar, &error))?;
-            if let Some(mark) = FileMark::at(&xqar) {
-                self.outputs.written(&xqar, &job.path, mark);
+            if let Some(fingerprint) = FileFingerprint::at(&xqar) {
+                self.outputs.written(&xqar, &job.path, fingerprint);
             }
             return Ok(None);
         }

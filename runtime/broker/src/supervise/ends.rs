@@ -6,14 +6,14 @@ use tokio::sync::mpsc::UnboundedSender;
 
 use super::Started;
 use crate::core::{ChildEnd, Event, Launch};
-use crate::last_words::LastWords;
+use crate::final_output::FinalOutput;
 
 /// Waits for the end of a child and tells it, after what the child has said last was taken down.
 pub(super) async fn watch(
     launch: Launch,
     name: String,
     mut started: Started,
-    words: LastWords,
+    words: FinalOutput,
     events: UnboundedSender<Event>,
 ) {
     let ended = started.child.wait().await;

@@ -202,9 +202,9 @@ async fn only_what_a_broker_has_started_is_believed_and_killed() {
         let mut command = std::process::Command::new("sleep");
         command.arg("1000").spawn().unwrap()
     };
-    let [mut stranger, mut former] = [start(), start()];
+    let [mut stranger, mut stale_children] = [start(), start()];
     let process = |it: &std::process::Child| Process::open(it.id(), None).unwrap();
-    let (strange, adopted) = (process(&stranger), process(&former));
+    let (strange, adopted) = (process(&stranger), process(&stale_children));
     let earlier = Launch::first_of(1);
     let proof = children.launches.proof(earlier, "child");
     let lies = [
@@ -221,7 +221,7 @@ async fn only_what_a_broker_has_started_is_believed_and_killed() {
         .joined(earlier, "child", Some(&adopted), &proof)
         .unwrap();
     children.kill(earlier);
-    assert!(!former.wait().unwrap().success());
+    assert!(!stale_children.wait().unwrap().success());
     // A child of this broker is known without any proof, and nobody else is taken for it.
     children.spawn(Launch(1), &spec(&["sh", "-c", "exec sleep 1000", "sh"]));
     let own = children.own[&Launch(1)].process.clone().unwrap();

@@ -170,7 +170,7 @@ impl Dependencies {
 
 /// The stamp as it is now; as it was, where others wait for an answer in vain.
 fn look_through(path: &Path, seen: Option<Stamp>) -> Option<Stamp> {
-    let stamp = foreign::visit(path, || Ok(stamp_through_links(path)));
+    let stamp = foreign::access(path, || Ok(stamp_through_links(path)));
     stamp.unwrap_or(seen)
 }
 

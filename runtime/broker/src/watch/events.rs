@@ -9,11 +9,11 @@ use qcbus_document::FileKind;
 use rustix::fs::inotify::ReadFlags;
 
 use super::Seen;
+use super::file_lookup::{FileLookup, look_at};
 use super::ignore::{IGNORE_FILE, is_ignored_file, passes_over};
-use super::looker::Looker;
-use super::sight::{Sight, look_at};
+use super::scanner::Scanner;
 use super::tree::{Told, Unwatched};
-use crate::seams::now;
+use crate::environment::now;
 use crate::stamp::stamp_of;
 
 /// How often what no event tells of is looked through.
@@ -42,7 +42,7 @@ pub struct Polling {
     mode: String,
 }
 
-impl Looker {
+impl Scanner {
     /// Asks the kernel for events; where it refuses, says so and looks around instead.
     pub(super) fn ask_for_events(&mut self) {
         if self.options.poll.is_none() && !self.tree.is_open() {
@@ -287,7 +287,7 @@ impl Looker {
             return;
         }
         match look_at(path, &self.options.roots) {
-            Sight::NoFile(what) if what.hides_more() => self.unseen(path, what.to_string()),
+            FileLookup::NoFile(what) if what.hides_more() => self.unseen(path, what.to_string()),
             _ if FileKind::of_path(path).is_none() => self.seen_again(path),
             _ => {}
         }

@@ -9,15 +9,15 @@
 mod dependencies;
 mod due;
 mod events;
+mod file_lookup;
 mod ignore;
 pub mod kernel;
-mod looker;
 mod open_files;
 mod rest;
 mod roots;
 mod scan;
+mod scanner;
 mod settle;
-mod sight;
 #[cfg(test)]
 mod tests;
 mod through;
@@ -27,22 +27,22 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use qcbus_disk::foreign::Lookout;
+use qcbus_disk::foreign::IoWatchdog;
 use qcbus_document::FileKind;
 use qcbus_messages::control::Unseen;
 
 use self::ignore::IgnoreRules;
-use self::looker::Looker;
 use self::scan::scan;
+use self::scanner::Scanner;
 use crate::core::Stamp;
-use crate::seams::{Bell, Sender, channel, thread};
+use crate::environment::{Bell, Sender, channel, thread};
 
+pub use self::file_lookup::{FileLookup, NoFile, is_behind_a_link, look_at};
 pub use self::ignore::{hidden_above, is_excluded};
 pub use self::scan::Scan;
 #[cfg(test)]
 pub(crate) use self::settle::OPEN_QUIET;
 pub use self::settle::Why;
-pub use self::sight::{NoFile, Sight, is_behind_a_link, look_at};
 pub(crate) use self::tree::{Told, Tree, Unwatched, below};
 
 /// Every checkable file below a directory, once. `roots` are all the directories that are looked
@@ -147,22 +147,22 @@ impl Watcher {
     /// When no thread can be started, or there is no descriptor left to wake it.
     pub fn start(
         options: WatchOptions,
-        (lookout, number): (Arc<Lookout>, u64),
+        (io_watchdog, number): (Arc<IoWatchdog>, u64),
         known: Option<Known>,
         tell: impl FnMut(Seen) + Send + 'static,
     ) -> std::io::Result<Watcher> {
         let (orders, inbox) = channel();
         let bell = Arc::new(Bell::new()?);
-        let mut looker = Looker::new(options, Box::new(tell));
+        let mut scanner = Scanner::new(options, Box::new(tell));
         if let Some(known) = known {
-            looker.go_on_with(known);
+            scanner.go_on_with(known);
         }
         let rung = bell.clone();
         thread::Builder::new()
             .name("watch".to_owned())
             .spawn(move || {
-                let _attendance = lookout.attend(number);
-                looker.run(&inbox, &rung);
+                let _attendance = io_watchdog.attend(number);
+                scanner.run(&inbox, &rung);
             })?;
         Ok(Watcher { orders, bell })
     }

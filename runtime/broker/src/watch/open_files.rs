@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use qcbus_disk::foreign;
 use qcbus_document::FileKind;
 
-use crate::seams::is_simulated;
+use crate::environment::is_simulated;
 
 /// The owner may write: in the mode of a link below `/proc/PID/fd` this says how the file was opened.
 const FOR_WRITING: u32 = 0o200;
@@ -61,7 +61,7 @@ fn open_for_writing(link: &Path, is_wanted: impl Fn(&Path) -> bool) -> Option<(u
         return None;
     }
     // The file may lie on a disk that does not answer.
-    let data = foreign::visit(&target, || fs::metadata(link)).ok()?;
+    let data = foreign::access(&target, || fs::metadata(link)).ok()?;
     Some((data.dev(), data.ino()))
 }
 

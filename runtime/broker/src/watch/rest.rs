@@ -4,14 +4,14 @@ use std::path::Path;
 use std::time::Instant;
 
 use super::Seen;
-use super::looker::Looker;
 use super::open_files::OpenFiles;
+use super::scanner::Scanner;
 use super::settle::Looked;
 use crate::core::Stamp;
-use crate::seams::now;
+use crate::environment::now;
 use crate::stamp::{is_younger, stamp_of};
 
-impl Looker {
+impl Scanner {
     /// Tells of files that have settled, and of those that take longer.
     pub(super) fn look_at_what_may_have_settled(&mut self, now: Instant) {
         let stamp = |path: &Path| stamp_of(path).ok().flatten();

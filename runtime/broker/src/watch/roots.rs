@@ -10,7 +10,7 @@ use qcbus_messages::control::Unseen;
 use qcbus_messages::path_text::to_text;
 
 use super::Seen;
-use super::looker::Looker;
+use super::scanner::Scanner;
 
 /// Device and inode of a directory.
 type Identity = (u64, u64);
@@ -31,7 +31,7 @@ impl Roots {
     }
 }
 
-impl Looker {
+impl Scanner {
     /// Looks whether each watched directory is there, and is the one that it was.
     pub fn check_roots(&mut self) {
         for root in self.options.roots.clone() {
@@ -134,6 +134,6 @@ fn look(root: &Path) -> Root {
 
 /// Whether what lies there is the place where something was mounted.
 fn is_unmounted(root: &Path, before: Identity, now: Identity) -> bool {
-    let is_empty = || foreign::visit(root, || Ok(std::fs::read_dir(root)?.next().is_none()));
+    let is_empty = || foreign::access(root, || Ok(std::fs::read_dir(root)?.next().is_none()));
     before.0 != now.0 && is_empty().unwrap_or(false)
 }

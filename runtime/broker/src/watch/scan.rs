@@ -12,8 +12,8 @@ use qcbus_document::FileKind;
 use qcbus_messages::control::Unseen;
 use rustix::fs::{AtFlags, Dir, FileType};
 
+use super::file_lookup::{FileLookup, look_at, open_directory};
 use super::ignore::{IgnoreRules, ignores, passes_over};
-use super::sight::{Sight, look_at, open_directory};
 use crate::core::Stamp;
 use crate::stamp::from_statat;
 
@@ -119,7 +119,7 @@ pub struct Listing {
 /// Looks through one directory, and through none to which its path has become a link.
 pub fn list(directory: &Path, roots: &[PathBuf], rules: &mut [IgnoreRules]) -> Listing {
     let mut listing = Listing::default();
-    let read = foreign::visit(directory, || {
+    let read = foreign::access(directory, || {
         let mut opened = Dir::new(open_directory(directory, roots)?)?;
         listing.read(directory, &mut opened, roots, rules);
         Ok(())
@@ -155,7 +155,7 @@ impl Listing {
                 // Most entries of most directories; nothing more is asked about them.
                 FileType::RegularFile if !is_checkable => {}
                 FileType::RegularFile => {
-                    let data = foreign::visit(&path, || {
+                    let data = foreign::access(&path, || {
                         let (fd, name) = (opened.fd()?, entry.file_name());
                         Ok(rustix::fs::statat(fd, name, AtFlags::SYMLINK_NOFOLLOW)?)
                     });
@@ -201,14 +201,17 @@ impl Listing {
             self.links.push(path.clone());
         }
         match look_at(&path, roots) {
-            Sight::Directory => self.directory(path, rules),
-            Sight::File(stamp) if is_checkable => self.files.push((path, stamp)),
-            Sight::NoFile(what) if is_checkable || what.hides_more() => {
+            FileLookup::Directory => self.directory(path, rules),
+            FileLookup::File(stamp) if is_checkable => self.files.push((path, stamp)),
+            FileLookup::NoFile(what) if is_checkable || what.hides_more() => {
                 let why = what.to_string();
                 self.unseen.push(Unseen { path, why });
             }
-            Sight::Hidden(why) => self.unseen.push(Unseen { path, why }),
-            Sight::File(_) | Sight::Known | Sight::Nothing | Sight::NoFile(_) => {}
+            FileLookup::Hidden(why) => self.unseen.push(Unseen { path, why }),
+            FileLookup::File(_)
+            | FileLookup::Known
+            | FileLookup::Nothing
+            | FileLookup::NoFile(_) => {}
         }
     }
 }

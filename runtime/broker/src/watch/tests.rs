@@ -8,12 +8,12 @@ use std::time::{Duration, Instant};
 mod running;
 
 use super::ignore::IGNORE_FILE;
-use super::looker::Looker;
+use super::scanner::Scanner;
 use super::settle::QUIET;
 use super::{Seen, WatchOptions};
 
 /// A looker around one directory, and what it says.
-fn looker(root: &Path) -> (Looker, Receiver<Seen>) {
+fn scanner(root: &Path) -> (Scanner, Receiver<Seen>) {
     let (tell, told) = channel();
     let options = WatchOptions {
         roots: vec![root.to_path_buf()],
@@ -22,7 +22,7 @@ fn looker(root: &Path) -> (Looker, Receiver<Seen>) {
         settle: None,
     };
     let tell = Box::new(move |seen| tell.send(seen).unwrap());
-    (Looker::new(options, tell), told)
+    (Scanner::new(options, tell), told)
 }
 
 /// A directory without links in its path.
@@ -49,9 +49,9 @@ fn words(root: &Path, told: &Receiver<Seen>) -> Vec<String> {
 }
 
 /// What has been touched settles.
-fn settle(looker: &mut Looker) {
+fn settle(scanner: &mut Scanner) {
     let later = Instant::now() + QUIET * 2;
-    looker.look_at_what_may_have_settled(later);
+    scanner.look_at_what_may_have_settled(later);
 }
 
 #[test]
@@ -60,37 +60,37 @@ fn a_file_behind_a_link_is_seen_through_all_that_happens_to_it() {
     let (link, target) = (root.join("a.xodr"), outside.join("target"));
     std::fs::write(&target, "one").unwrap();
     symlink(&target, &link).unwrap();
-    let (mut looker, told) = looker(&root);
-    let then = |looker: &mut Looker| {
-        looker.look_behind_links();
-        settle(looker);
+    let (mut scanner, told) = scanner(&root);
+    let then = |scanner: &mut Scanner| {
+        scanner.look_behind_links();
+        settle(scanner);
         words(&root, &told)
     };
-    looker.scan_all(true);
-    assert_eq!(then(&mut looker), ["present a.xodr", "settled a.xodr"]);
-    assert!(then(&mut looker).is_empty());
+    scanner.scan_all(true);
+    assert_eq!(then(&mut scanner), ["present a.xodr", "settled a.xodr"]);
+    assert!(then(&mut scanner).is_empty());
 
     std::fs::write(&target, "other bytes").unwrap();
-    assert_eq!(then(&mut looker), ["settled a.xodr"], "rewritten");
+    assert_eq!(then(&mut scanner), ["settled a.xodr"], "rewritten");
     std::fs::write(outside.join("new"), "replaced").unwrap();
     std::fs::rename(outside.join("new"), &target).unwrap();
-    assert_eq!(then(&mut looker), ["settled a.xodr"], "replaced");
+    assert_eq!(then(&mut scanner), ["settled a.xodr"], "replaced");
     std::fs::write(outside.join("other"), "elsewhere").unwrap();
     std::fs::remove_file(&link).unwrap();
     symlink(outside.join("other"), &link).unwrap();
-    assert_eq!(then(&mut looker), ["settled a.xodr"], "pointed elsewhere");
+    assert_eq!(then(&mut scanner), ["settled a.xodr"], "pointed elsewhere");
 
     std::fs::remove_file(outside.join("other")).unwrap();
     let gone = ["unseen a.xodr", "vanished a.xodr"];
-    assert_eq!(then(&mut looker), gone, "dangling");
-    looker.scan_all(false);
-    assert!(then(&mut looker).is_empty(), "it has been said");
+    assert_eq!(then(&mut scanner), gone, "dangling");
+    scanner.scan_all(false);
+    assert!(then(&mut scanner).is_empty(), "it has been said");
     std::fs::write(outside.join("other"), "back").unwrap();
     let back = ["seen again a.xodr", "settled a.xodr"];
-    assert_eq!(then(&mut looker), back, "back again");
+    assert_eq!(then(&mut scanner), back, "back again");
     std::fs::remove_file(&link).unwrap();
-    assert_eq!(then(&mut looker), ["vanished a.xodr"]);
-    assert!(then(&mut looker).is_empty());
+    assert_eq!(then(&mut scanner), ["vanished a.xodr"]);
+    assert!(then(&mut scanner).is_empty());
 }
 
 #[test]
@@ -105,15 +105,15 @@ fn what_cannot_be_looked_at_is_said_once_and_when_it_can_be() {
     symlink(root.join("known"), root.join("known_too")).unwrap();
     symlink(&outside, root.join("ignored")).unwrap();
     std::fs::write(root.join(IGNORE_FILE), "ignored/\n").unwrap();
-    let (mut looker, told) = looker(&root);
-    looker.scan_all(true);
+    let (mut scanner, told) = scanner(&root);
+    scanner.scan_all(true);
     let mut said = words(&root, &told);
     said.sort();
     assert_eq!(said, ["unseen a.xodr", "unseen loop", "unseen maps"]);
-    looker.scan_all(false);
+    scanner.scan_all(false);
     assert!(words(&root, &told).is_empty());
     std::fs::remove_file(root.join("maps")).unwrap();
-    looker.scan_all(false);
+    scanner.scan_all(false);
     assert_eq!(words(&root, &told), ["seen again maps"]);
 }
 
@@ -121,10 +121,10 @@ fn what_cannot_be_looked_at_is_said_once_and_when_it_can_be() {
 fn link_in_place_of_a_directory_is_named_as_long_as_it_is_there() {
     let ((_dir, root), (_other, outside)) = (farm(), farm());
     symlink(&outside, root.join("maps")).unwrap();
-    let (mut looker, told) = looker(&root);
-    looker.scan_all(true);
+    let (mut scanner, told) = scanner(&root);
+    scanner.scan_all(true);
     assert_eq!(words(&root, &told), ["unseen maps"]);
-    looker.look(&root.join("maps"));
+    scanner.look(&root.join("maps"));
     assert!(words(&root, &told).is_empty());
 }
 
@@ -132,13 +132,13 @@ fn link_in_place_of_a_directory_is_named_as_long_as_it_is_there() {
 fn what_the_first_look_sees_is_there_before_it_has_settled() {
     let (_dir, root) = farm();
     std::fs::write(root.join("young.xodr"), "").unwrap();
-    let (mut looker, told) = looker(&root);
-    looker.scan_all(true);
+    let (mut scanner, told) = scanner(&root);
+    scanner.scan_all(true);
     assert_eq!(words(&root, &told), ["present young.xodr"]);
-    settle(&mut looker);
+    settle(&mut scanner);
     assert_eq!(words(&root, &told), ["settled young.xodr"]);
     std::fs::write(root.join("new.xodr"), "").unwrap();
-    looker.scan_all(false);
+    scanner.scan_all(false);
     assert!(words(&root, &told).is_empty());
 }
 
@@ -149,12 +149,12 @@ fn a_directory_that_becomes_a_link_to_another_takes_its_files_with_it() {
         std::fs::create_dir(directory.join("maps")).unwrap();
         std::fs::write(directory.join("maps/a.xodr"), "").unwrap();
     }
-    let (mut looker, told) = looker(&root);
-    looker.look(&root.join("maps/a.xodr"));
+    let (mut scanner, told) = scanner(&root);
+    scanner.look(&root.join("maps/a.xodr"));
     assert_eq!(words(&root, &told), ["settled maps/a.xodr"]);
     std::fs::remove_dir_all(root.join("maps")).unwrap();
     symlink(outside.join("maps"), root.join("maps")).unwrap();
-    looker.scan_all(false);
+    scanner.scan_all(false);
     let said = ["vanished maps/a.xodr", "unseen maps"];
     assert_eq!(words(&root, &told), said);
 }
@@ -173,15 +173,15 @@ fn a_file_that_cannot_be_looked_at_has_not_gone() {
     let (below, aside) = (dir.path().join("maps"), dir.path().join("aside.d"));
     std::fs::create_dir(&below).unwrap();
     std::fs::write(below.join("a.xodr"), "").unwrap();
-    let (mut looker, told) = looker(dir.path());
-    looker.look(&below.join("a.xodr"));
+    let (mut scanner, told) = scanner(dir.path());
+    scanner.look(&below.join("a.xodr"));
     // Root may look into every directory, but through a link to itself nobody sees anything.
     std::fs::rename(&below, &aside).unwrap();
     symlink(&below, &below).unwrap();
-    looker.scan_all(false);
+    scanner.scan_all(false);
     assert_eq!(vanished(&told), Vec::<PathBuf>::new());
     std::fs::remove_file(&below).unwrap();
-    looker.scan_all(false);
+    scanner.scan_all(false);
     assert_eq!(vanished(&told), [below.join("a.xodr")]);
 }
 
@@ -190,12 +190,12 @@ fn looking_through_everything_reads_the_rules_afresh() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("a.xodr");
     std::fs::write(&file, "").unwrap();
-    let (mut looker, told) = looker(dir.path());
-    looker.look(&file);
-    looker.scan_all(false);
+    let (mut scanner, told) = scanner(dir.path());
+    scanner.look(&file);
+    scanner.scan_all(false);
     assert_eq!(vanished(&told), Vec::<PathBuf>::new());
     std::fs::write(dir.path().join(IGNORE_FILE), "*.xodr\n").unwrap();
-    looker.scan_all(false);
+    scanner.scan_all(false);
     assert_eq!(vanished(&told), [file]);
 }
 
@@ -204,11 +204,11 @@ fn a_young_file_that_goes_before_it_has_settled_is_told() {
     let (_dir, root) = farm();
     let file = root.join("a.xodr");
     std::fs::write(&file, "half of").unwrap();
-    let (mut looker, told) = looker(&root);
-    looker.scan_all(true);
+    let (mut scanner, told) = scanner(&root);
+    scanner.scan_all(true);
     assert_eq!(words(&root, &told), ["present a.xodr"]);
     std::fs::remove_file(&file).unwrap();
-    looker.scan_all(false);
+    scanner.scan_all(false);
     assert_eq!(words(&root, &told), ["vanished a.xodr"]);
 }
 
@@ -216,19 +216,19 @@ fn a_young_file_that_goes_before_it_has_settled_is_told() {
 fn what_the_broker_found_gone_is_told_again_if_it_is_there() {
     let (_dir, root) = farm();
     let file = root.join("a.xodr");
-    let (mut looker, told) = looker(&root);
+    let (mut scanner, told) = scanner(&root);
     std::fs::write(&file, "one").unwrap();
-    looker.look(&file);
+    scanner.look(&file);
     assert_eq!(words(&root, &told), ["settled a.xodr"]);
     // It was away for a moment in which the broker tried to read it.
-    looker.forget(&file);
+    scanner.forget(&file);
     let may_be_written_to = ["present a.xodr"];
     assert_eq!(words(&root, &told), may_be_written_to);
-    settle(&mut looker);
+    settle(&mut scanner);
     assert_eq!(words(&root, &told), ["settled a.xodr"]);
     std::fs::remove_file(&file).unwrap();
-    looker.forget(&file);
-    looker.scan_all(false);
+    scanner.forget(&file);
+    scanner.scan_all(false);
     assert!(
         words(&root, &told).is_empty(),
         "it is known that it has gone"
@@ -241,9 +241,9 @@ fn what_is_no_file_to_check_is_only_told_to_have_become_another() {
     let (ignored, map) = (root.join(IGNORE_FILE), root.join("map.xodr"));
     std::fs::write(&ignored, "map.xodr\n").unwrap();
     std::fs::write(&map, "one").unwrap();
-    let (mut looker, told) = looker(&root);
-    looker.dependencies.add(vec![(map.as_path().into(), None)]);
-    looker.look(&map);
+    let (mut scanner, told) = scanner(&root);
+    scanner.dependencies.add(vec![(map.as_path().into(), None)]);
+    scanner.look(&map);
     let said: Vec<Seen> = told.try_iter().collect();
     assert!(matches!(said[..], [Seen::Touched(..)]), "{said:?}");
 }
@@ -253,17 +253,17 @@ fn whoever_asks_for_another_look_is_told_what_is_there_or_has_gone() {
     let (_dir, root) = farm();
     let path = root.join("a.xodr");
     std::fs::write(&path, "one").unwrap();
-    let (mut looker, told) = looker(&root);
-    looker.scan_all(true);
-    settle(&mut looker);
+    let (mut scanner, told) = scanner(&root);
+    scanner.scan_all(true);
+    settle(&mut scanner);
     words(&root, &told);
     // It was away and came back between two events.
-    looker.look(&path);
+    scanner.look(&path);
     assert_eq!(words(&root, &told), ["settled a.xodr"]);
     std::fs::remove_file(&path).unwrap();
-    looker.look(&path);
+    scanner.look(&path);
     assert_eq!(words(&root, &told), ["vanished a.xodr"]);
-    looker.look(&path);
+    scanner.look(&path);
     assert!(words(&root, &told).is_empty());
 }
 
@@ -272,18 +272,18 @@ fn file_without_events_is_told_when_it_is_closed() {
     let (_dir, root) = farm();
     let path = root.join("a.xodr");
     let writer = std::fs::File::create(&path).unwrap();
-    let (mut looker, told) = looker(&root);
-    looker.scan_all(true);
+    let (mut scanner, told) = scanner(&root);
+    scanner.scan_all(true);
     assert_eq!(words(&root, &told), ["present a.xodr"]);
     for ask in [false, true] {
         if ask {
-            looker.look_again(&path);
+            scanner.look_again(&path);
         }
-        settle(&mut looker);
+        settle(&mut scanner);
     }
     assert_eq!(words(&root, &told), ["unfinished a.xodr"]);
     drop(writer);
-    looker.look_at_what_may_have_settled(Instant::now() + QUIET * 20);
+    scanner.look_at_what_may_have_settled(Instant::now() + QUIET * 20);
     assert_eq!(words(&root, &told), ["settled a.xodr"]);
 }
 
@@ -291,13 +291,13 @@ fn file_without_events_is_told_when_it_is_closed() {
 fn unfinished_file_that_goes_is_told() {
     let (_dir, root) = farm();
     let path = root.join("a.xodr");
-    let (mut looker, told) = looker(&root);
+    let (mut scanner, told) = scanner(&root);
     let _writer = std::fs::File::create(&path).unwrap();
-    looker.look_again(&path);
-    settle(&mut looker);
+    scanner.look_again(&path);
+    settle(&mut scanner);
     let said = ["present a.xodr", "unfinished a.xodr"];
     assert_eq!(words(&root, &told), said);
     std::fs::remove_file(&path).unwrap();
-    looker.look(&path);
+    scanner.look(&path);
     assert_eq!(words(&root, &told), ["vanished a.xodr"]);
 }

@@ -9,11 +9,11 @@ use std::time::Duration;
 use super::Seen;
 use super::due::Turn;
 use super::ignore::IgnoreRules;
-use super::looker::Looker;
 use super::scan::{Listing, cannot_look_into, is_too_much, list};
+use super::scanner::Scanner;
 use super::tree::{Unwatched, below, children};
 use crate::core::Stamp;
-use crate::seams::{now, step};
+use crate::environment::{now, step};
 use crate::stamp::is_younger;
 
 /// How a directory is looked through.
@@ -25,7 +25,7 @@ struct How {
     first: bool,
 }
 
-impl Looker {
+impl Scanner {
     /// Begins to look through everything, because events may have been lost.
     pub fn begin_pass(&mut self, first: bool) {
         // Those of rule files, too.

@@ -15,7 +15,7 @@ use qcbus_disk::foreign;
 use rustix::fs::inotify::ReadFlags;
 use rustix::io::Errno;
 
-use crate::seams::Kernel;
+use crate::environment::Kernel;
 
 pub use super::kernel::Told;
 
@@ -99,7 +99,7 @@ impl Tree {
         let Some(kernel) = &self.kernel else {
             return Err(Unwatched::Refused(io::ErrorKind::Unsupported.into()));
         };
-        match foreign::visit(directory, || Ok(kernel.watch(directory)?)) {
+        match foreign::access(directory, || Ok(kernel.watch(directory)?)) {
             Ok(watch) => {
                 self.put(directory, Some(watch));
                 Ok(())

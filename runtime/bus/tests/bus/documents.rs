@@ -3,23 +3,23 @@
 use std::collections::BTreeMap;
 use std::os::unix::process::ExitStatusExt;
 
-use qcbus_bus::{Documents, Held, Host, HostEvent, HostOptions, LoanError, Peer};
+use qcbus_bus::{Documents, Host, HostEvent, HostOptions, LoanError, MappedImage, Peer};
 use qcbus_document::FileKind;
 use qcbus_messages::{Digest, DocId, FromPeer};
 
 use crate::helper::{Helper, job_with};
 use crate::support::{Site, has_room, is_uniform, join, run, welcome};
 
-fn publish(documents: &Documents, doc: u64, len: usize) -> Held {
+fn publish(documents: &Documents, doc: u64, len: usize) -> MappedImage {
     let mut loan = documents.loan(len + 10).unwrap();
     assert_eq!(loan.len(), len + 10);
     assert_eq!(loan.as_ptr().addr() % 64, 0);
     loan.fill(pattern(doc));
-    let held = loan
+    let mapped_image = loan
         .publish(DocId(doc), len, digest(doc), FileKind::Xosc)
         .unwrap();
-    check(&held, doc, len);
-    held
+    check(&mapped_image, doc, len);
+    mapped_image
 }
 
 fn pattern(doc: u64) -> u8 {
@@ -30,20 +30,20 @@ fn digest(doc: u64) -> Digest {
     Digest([pattern(doc); 32])
 }
 
-fn check(held: &Held, doc: u64, len: usize) {
-    assert_eq!(held.doc(), DocId(doc));
-    assert_eq!(held.digest(), digest(doc));
-    assert_eq!(held.kind(), FileKind::Xosc);
-    assert_eq!(held.len(), len);
-    assert_eq!(held.as_ptr().addr() % 64, 0);
-    assert!(is_uniform(held, pattern(doc)));
+fn check(mapped_image: &MappedImage, doc: u64, len: usize) {
+    assert_eq!(mapped_image.doc(), DocId(doc));
+    assert_eq!(mapped_image.digest(), digest(doc));
+    assert_eq!(mapped_image.kind(), FileKind::Xosc);
+    assert_eq!(mapped_image.len(), len);
+    assert_eq!(mapped_image.as_ptr().addr() % 64, 0);
+    assert!(is_uniform(mapped_image, pattern(doc)));
 }
 
 /// The document, when it has arrived.
-async fn arrival(host: &mut Host, peer: &mut Peer, doc: u64) -> Held {
+async fn arrival(host: &mut Host, peer: &mut Peer, doc: u64) -> MappedImage {
     loop {
-        if let Some(held) = peer.document(DocId(doc)) {
-            return held;
+        if let Some(mapped_image) = peer.document(DocId(doc)) {
+            return mapped_image;
         }
         tokio::select! {
             event = host.next() => panic!("{event:?}"),
@@ -61,9 +61,9 @@ fn every_size_arrives_and_is_aligned() {
         let documents = host.documents();
         let sizes = [0, 1, 63, 64, 65, 500_000, 524_288, 600_000, 9_000_000];
         for (doc, len) in (1..).zip(sizes) {
-            let held = publish(&documents, doc, len);
+            let mapped_image = publish(&documents, doc, len);
             check(&arrival(&mut host, &mut peer, doc).await, doc, len);
-            drop(held);
+            drop(mapped_image);
         }
     });
 }
@@ -91,9 +91,9 @@ fn a_hundred_megabytes_reach_four_readers_in_place() {
         }
         let ours = worker.join().unwrap();
         for reader in &mut readers {
-            let held = arrival(&mut host, reader, 5).await;
-            assert_eq!(held.len(), len);
-            assert_eq!(held[..], ours[..]);
+            let mapped_image = arrival(&mut host, reader, 5).await;
+            assert_eq!(mapped_image.len(), len);
+            assert_eq!(mapped_image[..], ours[..]);
         }
     });
 }
@@ -110,7 +110,7 @@ fn readers_have_no_copy() {
             .map(|_| Helper::start("reads_and_weighs_itself", &site.instance))
             .collect();
         let len = 100_000_000;
-        let held = publish(&host.documents(), 1, len);
+        let mapped_image = publish(&host.documents(), 1, len);
         let mut weighed = 0;
         while weighed < 4 {
             match host.next().await {
@@ -128,7 +128,7 @@ fn readers_have_no_copy() {
                 other => panic!("{other:?}"),
             }
         }
-        check(&held, 1, len);
+        check(&mapped_image, 1, len);
     });
 }
 
@@ -145,10 +145,10 @@ fn slots_are_recycled() {
         let before = free_shared_memory();
         let len = 20_000_000;
         for doc in 1..=60 {
-            let held = publish(&documents, doc, len);
+            let mapped_image = publish(&documents, doc, len);
             check(&arrival(&mut host, &mut peer, doc).await, doc, len);
             peer.forget(DocId(doc));
-            drop(held);
+            drop(mapped_image);
         }
         let taken = before.saturating_sub(free_shared_memory());
         assert!(taken < 30 * len as u64, "{taken} bytes for 60 documents");
@@ -166,12 +166,12 @@ fn who_comes_late_gets_what_is_there() {
         let site = Site::new();
         let mut host = site.host();
         let documents = host.documents();
-        let held: Vec<Held> = (1..=20)
+        let mapped_image: Vec<MappedImage> = (1..=20)
             .map(|doc| publish(&documents, doc, 10_000 * doc as usize))
             .collect();
         let large = publish(&documents, 21, 3_000_000);
         let (_, mut peer) = join(&mut host, &site, "late").await;
-        for ours in held.iter().chain([&large]) {
+        for ours in mapped_image.iter().chain([&large]) {
             let doc = ours.doc().0;
             check(&arrival(&mut host, &mut peer, doc).await, doc, ours.len());
         }
@@ -208,13 +208,13 @@ fn a_reader_never_runs_out_of_hands() {
         let mut kept = BTreeMap::new();
         for doc in 1..=400 {
             drop(publish(&documents, doc, 100));
-            let held = arrival(&mut host, &mut peer, doc).await;
+            let mapped_image = arrival(&mut host, &mut peer, doc).await;
             if doc % 20 == 0 {
-                kept.insert(doc, held);
+                kept.insert(doc, mapped_image);
             }
         }
-        for (doc, held) in kept {
-            check(&held, doc, 100);
+        for (doc, mapped_image) in kept {
+            check(&mapped_image, doc, 100);
         }
     });
 }
@@ -253,18 +253,18 @@ fn no_more_is_held_than_the_slowest_reader_takes() {
         let documents = host.documents();
         // Large ones: of these the fewest are carried at once.
         let len = 600_000;
-        let mut held = Vec::new();
+        let mut mapped_image = Vec::new();
         while let Ok(loan) = documents.loan(len) {
             drop(loan);
-            held.push(publish(&documents, held.len() as u64 + 1, len));
+            mapped_image.push(publish(&documents, mapped_image.len() as u64 + 1, len));
         }
         assert_eq!(documents.loan(len).err(), Some(LoanError::Busy));
-        assert!(held.len() > 1);
-        for doc in &held {
+        assert!(mapped_image.len() > 1);
+        for doc in &mapped_image {
             arrival(&mut host, &mut peer, doc.doc().0).await;
         }
         // And if it had lost one all the same, there would be a place for it.
-        documents.publish_again(&held[0]).unwrap();
+        documents.publish_again(&mapped_image[0]).unwrap();
     });
 }
 
@@ -307,13 +307,13 @@ fn documents_outlive_the_broker_in_the_hands_of_a_reader() {
         let (_, mut peer) = join(&mut host, &site, "reader").await;
         let documents = host.documents();
         drop(publish(&documents, 1, 2_000_000));
-        let held = arrival(&mut host, &mut peer, 1).await;
+        let mapped_image = arrival(&mut host, &mut peer, 1).await;
         drop(host);
         assert!(matches!(documents.loan(1), Err(LoanError::Bus(_))));
         drop(documents);
-        check(&held, 1, 2_000_000);
+        check(&mapped_image, 1, 2_000_000);
         drop(peer);
-        check(&held, 1, 2_000_000);
+        check(&mapped_image, 1, 2_000_000);
     });
 }
 

@@ -152,13 +152,13 @@ async fn member(instance: &Instance, name: &str) -> Result<Peer, JoinError> {
 /// Holds every document that arrives, for ever, and says so to the broker.
 async fn holds_documents(instance: &Instance) {
     let mut peer = member(instance, "holder").await.unwrap();
-    let mut held = Vec::new();
+    let mut mapped_image = Vec::new();
     loop {
         if let PeerEvent::Document(doc) = peer.next().await {
-            held.extend(peer.document(doc));
+            mapped_image.extend(peer.document(doc));
             peer.send(&FromPeer::JobDone {
                 job: JobId(doc.0),
-                micros: held.len() as u64,
+                micros: mapped_image.len() as u64,
             });
         }
     }
@@ -169,8 +169,8 @@ async fn reads_and_weighs_itself(instance: &Instance) {
     let mut peer = member(instance, "reader").await.unwrap();
     loop {
         if let PeerEvent::Document(doc) = peer.next().await {
-            let held = peer.document(doc).unwrap();
-            assert!(is_uniform(&held, held[0]));
+            let mapped_image = peer.document(doc).unwrap();
+            assert!(is_uniform(&mapped_image, mapped_image[0]));
             peer.send(&FromPeer::JobDone {
                 job: JobId(doc.0),
                 micros: private_memory(),
@@ -204,7 +204,7 @@ async fn lives_in_a_small_memory(instance: &Instance) {
             }
         };
         loan.fill(doc as u8);
-        let held = loan
+        let mapped_image = loan
             .publish(DocId(doc), 10_000_000, Digest::default(), FileKind::Xodr)
             .unwrap();
         while peer.document(DocId(doc)).is_none() {
@@ -216,7 +216,7 @@ async fn lives_in_a_small_memory(instance: &Instance) {
         assert!(is_uniform(&peer.document(DocId(doc)).unwrap(), doc as u8));
         kept.extend(peer.document(DocId(doc)));
         peer.forget(DocId(doc));
-        drop(held);
+        drop(mapped_image);
     }
     say(&format!("40 documents, {} refusals", refused.min(1)));
 }
@@ -383,10 +383,13 @@ async fn answers_jobs(instance: &Instance) {
 fn answer(peer: &mut Peer, job: &Job) -> bool {
     let mut sum = 0;
     for document in &job.documents {
-        let Some(held) = peer.document(document.doc) else {
+        let Some(mapped_image) = peer.document(document.doc) else {
             return false;
         };
-        sum += held.iter().map(|byte| u64::from(*byte)).sum::<u64>();
+        sum += mapped_image
+            .iter()
+            .map(|byte| u64::from(*byte))
+            .sum::<u64>();
         peer.forget(document.doc);
     }
     peer.send(&FromPeer::JobDone {
@@ -401,10 +404,10 @@ async fn writes_into_a_document(instance: &Instance) {
     let mut peer = member(instance, "scribbler").await.unwrap();
     loop {
         if let PeerEvent::Document(doc) = peer.next().await {
-            let held = peer.document(doc).unwrap();
+            let mapped_image = peer.document(doc).unwrap();
             say("writes");
             // SAFETY: there is none; the process dies here, and that is the point.
-            unsafe { std::ptr::write_volatile(held.as_ptr().cast_mut(), 0) };
+            unsafe { std::ptr::write_volatile(mapped_image.as_ptr().cast_mut(), 0) };
             say("has written");
         }
     }
@@ -489,7 +492,7 @@ async fn serves(instance: &Instance) {
     let documents = host.documents();
     let mut image = documents.loan(1000).unwrap();
     image.fill(1);
-    let held = image
+    let mapped_image = image
         .publish(DocId(1), 1000, Digest::default(), FileKind::Xodr)
         .unwrap();
     let mut expected = BTreeMap::new();
@@ -516,7 +519,7 @@ async fn serves(instance: &Instance) {
                     host.send(peer, &job_with(job.0 + IN_FLIGHT, DocId(1)));
                 }
                 FromPeer::NeedDocument { .. } => {
-                    if let Err(error) = documents.publish_again(&held) {
+                    if let Err(error) = documents.publish_again(&mapped_image) {
                         say(&format!("wrong: {error}"));
                     }
                 }

@@ -195,15 +195,18 @@ fn a_turn_reads_a_megabyte_and_the_next_begins_with_another_peer() {
                     std::future::poll_fn(|context| Poll::Ready(next.as_mut().poll(context))).await;
                 assert!(polled.is_pending(), "{polled:?}");
             }
-            let mut turn = 0;
+            let mut receive_budget = 0;
             for (number, (rogue, header)) in rogues.iter_mut().enumerate() {
                 while rogue.receive().is_some() {}
                 let sent = fill(rogue, header);
                 read[number] += sent;
-                turn += sent;
+                receive_budget += sent;
             }
             // A megabyte is 64 frames; a peer is read from to the end of its quota.
-            assert!(turn <= 64 + 8, "{turn} frames in one turn");
+            assert!(
+                receive_budget <= 64 + 8,
+                "{receive_budget} frames in one turn"
+            );
         }
         let least = read.iter().min().unwrap();
         let most = read.iter().max().unwrap();

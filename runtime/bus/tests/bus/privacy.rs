@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::time::Duration;
 
-use qcbus_bus::{Held, PeerEvent};
+use qcbus_bus::{MappedImage, PeerEvent};
 use qcbus_document::fuzzing::{Tree, walk};
 use qcbus_document::{Document, FileKind};
 use qcbus_messages::{Digest, DocId};
@@ -138,12 +138,12 @@ fn image() -> Vec<u8> {
 
 /// Reads an image in every way until it was seen as it is and changed, often each. Returns how often
 /// it was refused.
-fn read_it_while_it_changes(held: &Held, sound: &[u8]) -> usize {
+fn read_it_while_it_changes(mapped_image: &MappedImage, sound: &[u8]) -> usize {
     let as_it_is = walk(Document::open(sound).unwrap());
     let (mut same, mut other, mut refused) = (0, 0, 0);
     let before = Document::open(sound).unwrap().len();
     while same < 20 || other < 2_000 {
-        let Ok(document) = Document::open(held) else {
+        let Ok(document) = Document::open(mapped_image) else {
             refused += 1;
             continue;
         };
@@ -174,7 +174,7 @@ fn a_slot_that_is_rewritten_while_it_is_read() {
             .publish(DocId(1), sound.len(), Digest::default(), FileKind::Xodr)
             .unwrap();
         let (_, mut peer) = join(&mut host, &site, "reader").await;
-        let held = loop {
+        let mapped_image = loop {
             tokio::select! {
                 event = host.next() => panic!("{event:?}"),
                 event = peer.next() => if matches!(event, PeerEvent::Document(_)) {
@@ -182,13 +182,13 @@ fn a_slot_that_is_rewritten_while_it_is_read() {
                 }
             }
         };
-        assert_eq!(&*held, &sound[..]);
+        assert_eq!(&*mapped_image, &sound[..]);
         let mut rewriter = Helper::start("rewrites_images", &site.instance);
         assert_eq!(rewriter.line(), "rewrites");
         let (done, reading) = std::sync::mpsc::channel();
         let original = sound.clone();
         std::thread::spawn(move || {
-            let _ = done.send(read_it_while_it_changes(&held, &original));
+            let _ = done.send(read_it_while_it_changes(&mapped_image, &original));
         });
         let refused = reading.recv_timeout(WATCHDOG);
         rewriter.kill();

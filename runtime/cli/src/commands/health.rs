@@ -40,7 +40,7 @@ pub fn reasons(status: &Status) -> Vec<String> {
         reasons.push(format!("{more} more cannot be looked at"));
     }
     let mut told: BTreeMap<&str, u64> = BTreeMap::new();
-    for notice in status.notices.iter().filter(|it| is_trouble(it)) {
+    for notice in status.notices.iter().filter(|it| is_failure(it)) {
         // What is tried again is told again.
         let ago_s = told.entry(&notice.text).or_insert(notice.ago_s);
         *ago_s = notice.ago_s.min(*ago_s);
@@ -75,7 +75,7 @@ fn of_peer(peer: &PeerStatus) -> Option<String> {
 
 /// Whether a notice says that something cannot be read, written or given room. Of other trouble the status itself
 /// tells how it is now.
-fn is_trouble(notice: &NoticeStatus) -> bool {
+fn is_failure(notice: &NoticeStatus) -> bool {
     match notice.kind.as_str() {
         // Until the broker is started again.
         "lost" => true,

@@ -15,7 +15,7 @@ use qcbus_messages::path_text::to_text;
 use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 
-use super::programs::{command_line, one_shot};
+use super::programs::{command_line, is_asam_module};
 use super::readiness;
 use super::remote::exit_of;
 use super::settings::{absolute, instance, real};
@@ -55,7 +55,7 @@ pub(super) fn said(done: Result<String, Refusal>) -> Exit {
 fn try_add(args: &BundleAddArgs) -> Result<String, Refusal> {
     good_name(&args.name)?;
     let (name, command) = match &args.asam {
-        Some(command) => (&joined_as(&args.name), one_shot(command)?),
+        Some(command) => (&joined_as(&args.name), is_asam_module(command)?),
         None => (&args.name, command_line(&args.command)?),
     };
     let home = Home::find(&args.manifests)?;
@@ -66,7 +66,7 @@ fn try_add(args: &BundleAddArgs) -> Result<String, Refusal> {
     let before = std::fs::read(&path).ok();
     let shown = to_text(&path);
     let text = match &args.asam {
-        Some(_) => one_shot_manifest(name, args, &command),
+        Some(_) => asam_module_manifest(name, args, &command),
         None => manifest(args, &command),
     };
     write_whole(&path, text.as_bytes(), true).map_err(|error| {
@@ -325,7 +325,7 @@ fn joined_as(name: &str) -> String {
 
 /// The text of the manifest of a one-shot module, which looks for its section of a configuration by the name that it was
 /// given.
-fn one_shot_manifest(name: &str, args: &BundleAddArgs, command: &str) -> String {
+fn asam_module_manifest(name: &str, args: &BundleAddArgs, command: &str) -> String {
     let mut module = serde_json::json!({
         "name": name,
         "exec_type": "executable",

@@ -18,7 +18,7 @@ const FIRST_LINE: u64 = 256;
 
 /// The command of a one-shot module with the whole path of its program, as in [`command_line`]. The rest is the
 /// shell's.
-pub(super) fn one_shot(command: &str) -> Result<String, Refusal> {
+pub(super) fn is_asam_module(command: &str) -> Result<String, Refusal> {
     let command = qcbus_asam_adapter::goes_where_it_is(command).map_or(command, |(rest, _)| rest);
     let (program, rest) = first_word(command.trim())?;
     let found = find_program(&program).map_err(usage)?;

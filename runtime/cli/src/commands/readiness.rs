@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use qcbus_broker::control::ask_broker;
-use qcbus_messages::control::{BundleStanding, Request, Response, Runs, Standing};
+use qcbus_messages::control::{BundleReadiness, Readiness, Request, Response, Runs};
 use qcbus_messages::{Exit, shown};
 
 use super::manifests::{Home, Refusal};
@@ -15,7 +15,7 @@ use crate::talk;
 const PAUSE: Duration = Duration::from_millis(50);
 
 /// How a bundle stands; `None` when there is none of this name.
-pub fn standing(broker: &Path, name: &str) -> Result<Option<Box<BundleStanding>>, Refusal> {
+pub fn readiness(broker: &Path, name: &str) -> Result<Option<Box<BundleReadiness>>, Refusal> {
     let request = Request::Bundle {
         name: name.to_owned(),
     };
@@ -37,18 +37,18 @@ pub fn wait(home: &Home, name: &str, command: &str, limit: Duration) -> Result<R
     };
     let begin = Instant::now();
     loop {
-        let bundle = standing(broker, name)?;
+        let bundle = readiness(broker, name)?;
         let ours = bundle.filter(|it| it.command.as_deref() == Some(command));
         let Some(bundle) = ours else {
             let why = "somebody has changed its manifest meanwhile".to_owned();
             return Err((Exit::Undetermined, why));
         };
-        match (bundle.standing, bundle.runs) {
-            (Standing::Ready, Some(runs)) => return Ok(runs),
-            (Standing::Failing { why }, _) => {
+        match (bundle.readiness, bundle.runs) {
+            (Readiness::Ready, Some(runs)) => return Ok(runs),
+            (Readiness::Failing { why }, _) => {
                 return Err((Exit::Usage, failing(name, &why, &bundle.said)));
             }
-            (Standing::Coming { joined }, _) if begin.elapsed() >= limit => {
+            (Readiness::Coming { joined }, _) if begin.elapsed() >= limit => {
                 let seconds = limit.as_secs_f64();
                 let what = if joined {
                     "it has said hello, but not what it checks"

@@ -60,9 +60,9 @@ async fn serve(options: Options, hangup: Hangup) -> Exit {
                 StartError::Load(_)
                 | StartError::Bus(BusError::AlreadyRunning { .. } | BusError::Instance(_))
                 | StartError::Journal(
-                    JournalError::State(LockError::Held { .. }) | JournalError::Foreign(_),
+                    JournalError::State(LockError::Taken { .. }) | JournalError::Foreign(_),
                 )
-                | StartError::Results(LockError::Held { .. } | LockError::Shared { .. })
+                | StartError::Results(LockError::Taken { .. } | LockError::Shared { .. })
                 | StartError::Gate(GateError::Lock(_) | GateError::Foreign { .. }) => Exit::Usage,
                 _ => Exit::Internal,
             };

@@ -9,7 +9,7 @@ use qcbus_bus::Instance;
 use qcbus_formats::xqar::Dialect;
 use qcbus_ingest::Limits;
 use qcbus_messages::path_text::to_text;
-use qcbus_sdk::Hands;
+use qcbus_sdk::Permits;
 
 use crate::args::{DialectArg, InstanceArgs, LimitArgs};
 
@@ -134,7 +134,7 @@ pub fn settings(args: &LimitArgs) -> Settings {
     settings.max_restarts = args.max_restarts.unwrap_or(settings.max_restarts);
     // A third of the work on a file is the broker's: what it reads, and what it has under way, keep many
     // processors busy. The bounds are those of memory, and of documents on the bus.
-    let cores = args.threads.unwrap_or_else(Hands::available);
+    let cores = args.threads.unwrap_or_else(Permits::available);
     settings.max_preparing = cores.clamp(settings.max_preparing, 8);
     settings.max_active = (2 * cores + 8).clamp(settings.max_active, 40);
     settings

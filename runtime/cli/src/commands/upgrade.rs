@@ -4,7 +4,7 @@ use std::path::Path;
 
 use qcbus_disk::write_whole;
 use qcbus_messages::Exit;
-use qcbus_messages::control::{BundleStanding, Runs, Standing};
+use qcbus_messages::control::{BundleReadiness, Readiness, Runs};
 use qcbus_messages::path_text::to_text;
 
 use super::manifests::{Home, Refusal, said, usage};
@@ -62,13 +62,13 @@ fn upgrade(args: &BundleUpgradeArgs) -> Result<String, Refusal> {
 }
 
 /// How the bundle stands whose program is to be another.
-fn before(home: &Home, name: &str) -> Result<BundleStanding, Refusal> {
+fn before(home: &Home, name: &str) -> Result<BundleReadiness, Refusal> {
     let Some(broker) = home.broker() else {
         return Err((Exit::NoBroker, "no broker runs".to_owned()));
     };
-    let standing = readiness::standing(broker, name)?;
-    let standing = standing.filter(|it| it.command.is_some()).map(|it| *it);
-    standing.ok_or_else(|| {
+    let readiness = readiness::readiness(broker, name)?;
+    let readiness = readiness.filter(|it| it.command.is_some()).map(|it| *it);
+    readiness.ok_or_else(|| {
         usage(format!(
             "no manifest brings `{name}`: what comes with qcbus is upgraded with it, what was started by hand is \
              started by hand, and `qcbus bundle add` brings what is new"
@@ -110,12 +110,12 @@ fn change(
     Ok(bytes)
 }
 
-fn done(home: &Home, name: &str, was: &BundleStanding, runs: &Runs, notices: &[String]) -> String {
+fn done(home: &Home, name: &str, was: &BundleReadiness, runs: &Runs, notices: &[String]) -> String {
     let now = home
         .broker()
-        .and_then(|it| readiness::standing(it, name).ok());
+        .and_then(|it| readiness::readiness(it, name).ok());
     let spec = now.flatten().map(|it| it.spec);
-    if spec == Some(was.spec) && was.standing == Standing::Ready {
+    if spec == Some(was.spec) && was.readiness == Readiness::Ready {
         let nothing = "; nothing has changed: what runs is its program as it lies there (`touch` it when \
                        something has that it loads)";
         return readiness::ready(name, runs, nothing, notices);
@@ -140,8 +140,8 @@ fn done(home: &Home, name: &str, was: &BundleStanding, runs: &Runs, notices: &[S
 /// Who judges now.
 fn goes_on(home: &Home, name: &str) -> String {
     let broker = home.broker();
-    let standing = broker.and_then(|it| readiness::standing(it, name).ok());
-    match standing.flatten().and_then(|it| it.runs) {
+    let readiness = broker.and_then(|it| readiness::readiness(it, name).ok());
+    match readiness.flatten().and_then(|it| it.runs) {
         Some(runs) => format!(
             "the process before goes on ({}, version {}, {})",
             runs.pid,

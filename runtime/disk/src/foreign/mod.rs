@@ -2,10 +2,10 @@
 //! there instead, may swap it while it is opened, and may have it on a disk that does not answer.
 //!
 //! Everything here opens regular files only, never waits for a writer or a lease, and reads no more than
-//! it was told to. What it waits for is written down where a [`Lookout`] sees it.
+//! it was told to. What it waits for is written down where a [`IoWatchdog`] sees it.
 
 mod behalf;
-mod lookout;
+mod io_watchdog;
 mod mounts;
 
 use std::fs::{DirEntry, File, Metadata};
@@ -18,8 +18,8 @@ use rustix::fs::{Mode, OFlags};
 use rustix::io::{Errno, retry_on_intr};
 
 pub use behalf::{Behalf, Reader, on_behalf_of, reader};
-pub use lookout::{Attendance, Lookout, Overdue};
-use lookout::{Visit, note};
+use io_watchdog::{Access, note};
+pub use io_watchdog::{Attendance, IoWatchdog, Overdue};
 
 /// Why a path was not opened.
 #[derive(Debug, thiserror::Error)]
@@ -54,7 +54,7 @@ impl From<Refused> for io::Error {
 /// # Errors
 /// See [`Refused`]. While somebody has a lease on the file, the system says that it would block.
 pub fn open(path: &Path) -> Result<(File, Metadata), Refused> {
-    let _visit = Visit::begin(path)?;
+    let _access = Access::begin(path)?;
     noted(path, open_regular(path))
 }
 
@@ -63,8 +63,8 @@ pub fn open(path: &Path) -> Result<(File, Metadata), Refused> {
 /// # Errors
 /// As [`open`], and [`io::ErrorKind::FileTooLarge`].
 pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
-    let visit = Visit::begin(path)?;
-    noted(path, read_regular(path, most, &visit))
+    let access = Access::begin(path)?;
+    noted(path, read_regular(path, most, &access))
 }
 
 /// Reads what is left of a file, but no more than `most` bytes. `path` is its own, for the lookout.
@@ -72,8 +72,8 @@ pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
 /// # Errors
 /// Whatever the system says.
 pub fn read_on(path: &Path, file: &mut File, most: u64, bytes: &mut Vec<u8>) -> io::Result<()> {
-    let visit = Visit::begin(path)?;
-    noted(path, read_pieces(file, most, bytes, &visit))
+    let access = Access::begin(path)?;
+    noted(path, read_pieces(file, most, bytes, &access))
 }
 
 /// What [`std::fs::metadata`] says.
@@ -81,7 +81,7 @@ pub fn read_on(path: &Path, file: &mut File, most: u64, bytes: &mut Vec<u8>) -> 
 /// # Errors
 /// Whatever the system says.
 pub fn metadata(path: &Path) -> io::Result<Metadata> {
-    let _visit = Visit::begin(path)?;
+    let _access = Access::begin(path)?;
     noted(path, std::fs::metadata(path))
 }
 
@@ -90,7 +90,7 @@ pub fn metadata(path: &Path) -> io::Result<Metadata> {
 /// # Errors
 /// Whatever the system says.
 pub fn symlink_metadata(path: &Path) -> io::Result<Metadata> {
-    let _visit = Visit::begin(path)?;
+    let _access = Access::begin(path)?;
     noted(path, std::fs::symlink_metadata(path))
 }
 
@@ -111,7 +111,7 @@ pub fn is_symlink(path: &Path) -> io::Result<bool> {
 /// # Errors
 /// Whatever the system says.
 pub fn canonicalize(path: &Path) -> io::Result<PathBuf> {
-    let _visit = Visit::begin(path)?;
+    let _access = Access::begin(path)?;
     noted(path, std::fs::canonicalize(path))
 }
 
@@ -120,7 +120,7 @@ pub fn canonicalize(path: &Path) -> io::Result<PathBuf> {
 /// # Errors
 /// Whatever the system says.
 pub fn list(directory: &Path) -> io::Result<Vec<DirEntry>> {
-    let _visit = Visit::begin(directory)?;
+    let _access = Access::begin(directory)?;
     let data = noted(directory, std::fs::metadata(directory))?;
     behalf::may_read(&data)?;
     let entries = noted(directory, std::fs::read_dir(directory))?;
@@ -133,8 +133,8 @@ pub fn list(directory: &Path) -> io::Result<Vec<DirEntry>> {
 ///
 /// # Errors
 /// Whatever `work` says.
-pub fn visit<T>(path: &Path, work: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
-    let _visit = Visit::begin(path)?;
+pub fn access<T>(path: &Path, work: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
+    let _access = Access::begin(path)?;
     noted(path, work())
 }
 
@@ -270,10 +270,10 @@ const MADE_UP: &[u32] = &[
     0x0765_5821,
 ];
 
-fn read_regular(path: &Path, most: u64, visit: &Visit) -> io::Result<Vec<u8>> {
+fn read_regular(path: &Path, most: u64, access: &Access) -> io::Result<Vec<u8>> {
     let (mut file, data) = open_regular(path)?;
     let mut bytes = Vec::with_capacity(usize::try_from(data.len().min(most)).unwrap_or(0) + 1);
-    read_pieces(&mut file, most.saturating_add(1), &mut bytes, visit)?;
+    read_pieces(&mut file, most.saturating_add(1), &mut bytes, access)?;
     if bytes.len() as u64 > most {
         let why = format!("it has more than {most} bytes");
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, why));
@@ -284,11 +284,11 @@ fn read_regular(path: &Path, most: u64, visit: &Visit) -> io::Result<Vec<u8>> {
 /// In one go a slow disk would look like one that hangs.
 const PIECE: u64 = 4 << 20;
 
-fn read_pieces(file: &mut File, most: u64, bytes: &mut Vec<u8>, visit: &Visit) -> io::Result<()> {
+fn read_pieces(file: &mut File, most: u64, bytes: &mut Vec<u8>, access: &Access) -> io::Result<()> {
     let mut left = most;
     while left > 0 {
         let read = file.take(PIECE.min(left)).read_to_end(bytes)? as u64;
-        visit.goes_on();
+        access.goes_on();
         left -= read;
         if read < PIECE {
             break;

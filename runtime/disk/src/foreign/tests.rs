@@ -99,18 +99,18 @@ fn errors_of_the_moment_are_told_from_those_of_the_file() {
 }
 
 /// A visit that goes on until `end` is dropped.
-fn hang(lookout: &Arc<Lookout>, owner: Option<u64>, path: &Path) -> Hanging {
+fn hang(io_watchdog: &Arc<IoWatchdog>, owner: Option<u64>, path: &Path) -> Hanging {
     let ((end, ended), (begun, begins)) = (channel::<()>(), channel());
-    let (lookout, path) = (lookout.clone(), path.to_path_buf());
+    let (io_watchdog, path) = (io_watchdog.clone(), path.to_path_buf());
     let thread = std::thread::spawn(move || {
         let attendance = match owner {
-            Some(owner) => lookout.attend(owner),
-            None => lookout.attend_for_good(),
+            Some(owner) => io_watchdog.attend(owner),
+            None => io_watchdog.attend_for_good(),
         };
-        let visit = Visit::begin(&path).unwrap();
+        let access = Access::begin(&path).unwrap();
         begun.send(()).unwrap();
         let _ = ended.recv();
-        drop(visit);
+        drop(access);
         let further = metadata(Path::new("/")).map(|_| ()).map_err(|it| it.kind());
         (attendance.was_given_up(), further)
     });
@@ -132,58 +132,61 @@ impl Hanging {
 
 #[test]
 fn who_cannot_be_replaced_is_named_and_goes_on_when_there_is_an_answer() {
-    let lookout = Arc::new(Lookout::default());
+    let io_watchdog = Arc::new(IoWatchdog::default());
     let path = Path::new("/farm/hung");
-    let watcher = hang(&lookout, None, path);
-    let overdue = lookout.overdue(Duration::ZERO);
+    let watcher = hang(&io_watchdog, None, path);
+    let overdue = io_watchdog.overdue(Duration::ZERO);
     assert_eq!((overdue[0].owner, &*overdue[0].path), (None, path));
-    assert_eq!(lookout.hanging(), [path]);
-    let attendance = lookout.attend(8);
+    assert_eq!(io_watchdog.hanging(), [path]);
+    let attendance = io_watchdog.attend(8);
     assert_eq!(metadata(path).unwrap_err().kind(), io::ErrorKind::TimedOut);
     drop(attendance);
 
     let (was_given_up, further) = watcher.end();
     assert!(!was_given_up);
     assert_eq!(further, Ok(()), "it looks at others as ever");
-    assert!(lookout.hanging().is_empty());
+    assert!(io_watchdog.hanging().is_empty());
 }
 
 #[test]
 fn who_looks_at_one_thing_while_at_another_is_seen_at_each() {
-    let lookout = Arc::new(Lookout::default());
-    let attendance = lookout.attend_for_good();
+    let io_watchdog = Arc::new(IoWatchdog::default());
+    let attendance = io_watchdog.attend_for_good();
     let (directory, rules) = (Path::new("/farm"), Path::new("/farm/.qcignore"));
-    let outer = Visit::begin(directory).unwrap();
-    assert_eq!(lookout.overdue(Duration::ZERO)[0].path, directory);
-    let inner = Visit::begin(rules).unwrap();
-    assert!(lookout.hanging().is_empty(), "the directory has answered");
-    assert_eq!(lookout.overdue(Duration::ZERO)[0].path, rules);
+    let outer = Access::begin(directory).unwrap();
+    assert_eq!(io_watchdog.overdue(Duration::ZERO)[0].path, directory);
+    let inner = Access::begin(rules).unwrap();
+    assert!(
+        io_watchdog.hanging().is_empty(),
+        "the directory has answered"
+    );
+    assert_eq!(io_watchdog.overdue(Duration::ZERO)[0].path, rules);
     drop(inner);
-    assert!(lookout.hanging().is_empty());
+    assert!(io_watchdog.hanging().is_empty());
     assert_eq!(
-        lookout.overdue(Duration::ZERO)[0].path,
+        io_watchdog.overdue(Duration::ZERO)[0].path,
         directory,
         "it is gone on with the directory"
     );
     drop(outer);
-    assert!(lookout.hanging().is_empty());
-    assert_eq!(lookout.overdue(Duration::ZERO), []);
+    assert!(io_watchdog.hanging().is_empty());
+    assert_eq!(io_watchdog.overdue(Duration::ZERO), []);
     assert_eq!(attendance.waits_since(), None);
 }
 
 #[test]
 fn who_waits_for_too_long_is_named_and_nobody_follows() {
-    let lookout = Arc::new(Lookout::default());
+    let io_watchdog = Arc::new(IoWatchdog::default());
     let path = Path::new("/farm/hung/map.xodr");
-    let patient = hang(&lookout, Some(7), path);
-    assert_eq!(lookout.overdue(Duration::from_secs(3600)), []);
-    let overdue = lookout.overdue(Duration::ZERO);
+    let patient = hang(&io_watchdog, Some(7), path);
+    assert_eq!(io_watchdog.overdue(Duration::from_secs(3600)), []);
+    let overdue = io_watchdog.overdue(Duration::ZERO);
     assert_eq!(overdue.len(), 1);
     assert_eq!((overdue[0].owner, &*overdue[0].path), (Some(7), path));
-    assert_eq!(lookout.overdue(Duration::ZERO), [], "it is said once");
-    assert_eq!(lookout.hanging(), [path]);
+    assert_eq!(io_watchdog.overdue(Duration::ZERO), [], "it is said once");
+    assert_eq!(io_watchdog.hanging(), [path]);
 
-    let attendance = lookout.attend(8);
+    let attendance = io_watchdog.attend(8);
     assert_eq!(metadata(path).unwrap_err().kind(), io::ErrorKind::TimedOut);
     assert!(
         attendance.moment().is_some(),
@@ -200,8 +203,8 @@ fn who_waits_for_too_long_is_named_and_nobody_follows() {
     let (was_given_up, further) = patient.end();
     assert!(was_given_up);
     assert_eq!(further, Err(io::ErrorKind::TimedOut), "it goes no further");
-    assert!(lookout.hanging().is_empty(), "it has answered");
-    let _attendance = lookout.attend(9);
+    assert!(io_watchdog.hanging().is_empty(), "it has answered");
+    let _attendance = io_watchdog.attend(9);
     let answer = metadata(path).unwrap_err();
     assert_eq!(
         answer.kind(),
@@ -212,16 +215,16 @@ fn who_waits_for_too_long_is_named_and_nobody_follows() {
 
 #[test]
 fn a_directory_that_hangs_takes_few_threads() {
-    let lookout = Arc::new(Lookout::default());
+    let io_watchdog = Arc::new(IoWatchdog::default());
     let at = |number: usize| PathBuf::from(format!("/farm/hung/{number}.xodr"));
-    let hanging: Vec<_> = (0..lookout::PER_DIRECTORY)
-        .map(|number| hang(&lookout, Some(1), &at(number)))
+    let hanging: Vec<_> = (0..io_watchdog::PER_DIRECTORY)
+        .map(|number| hang(&io_watchdog, Some(1), &at(number)))
         .collect();
     assert_eq!(
-        lookout.overdue(Duration::ZERO).len(),
-        lookout::PER_DIRECTORY
+        io_watchdog.overdue(Duration::ZERO).len(),
+        io_watchdog::PER_DIRECTORY
     );
-    let attendance = lookout.attend(2);
+    let attendance = io_watchdog.attend(2);
     let refused = metadata(&at(99)).unwrap_err();
     assert_eq!(refused.kind(), io::ErrorKind::TimedOut);
     let beside = metadata(Path::new("/farm/nothing.xodr")).unwrap_err();
@@ -230,19 +233,19 @@ fn a_directory_that_hangs_takes_few_threads() {
     for one in hanging {
         let _ = one.end();
     }
-    assert!(lookout.hanging().is_empty());
+    assert!(io_watchdog.hanging().is_empty());
 }
 
 #[test]
 fn a_file_system_that_hangs_takes_few_threads_wherever_they_look() {
-    let lookout = Arc::new(Lookout::default());
+    let io_watchdog = Arc::new(IoWatchdog::default());
     let at = |number| PathBuf::from(format!("/proc/directory-{number}/a.xodr"));
-    let hanging: Vec<_> = (0..lookout::PER_MOUNT)
-        .map(|number| hang(&lookout, Some(1), &at(number)))
+    let hanging: Vec<_> = (0..io_watchdog::PER_MOUNT)
+        .map(|number| hang(&io_watchdog, Some(1), &at(number)))
         .collect();
-    let found = lookout.overdue(Duration::ZERO).len();
-    assert_eq!(found, lookout::PER_MOUNT);
-    let attendance = lookout.attend(2);
+    let found = io_watchdog.overdue(Duration::ZERO).len();
+    assert_eq!(found, io_watchdog::PER_MOUNT);
+    let attendance = io_watchdog.attend(2);
     let other = Path::new("/proc/self/status");
     assert_eq!(metadata(other).unwrap_err().kind(), io::ErrorKind::TimedOut);
     assert!(metadata(Path::new("/")).is_ok(), "that is another one");
@@ -255,20 +258,20 @@ fn a_file_system_that_hangs_takes_few_threads_wherever_they_look() {
 
 #[test]
 fn a_disk_that_is_slow_is_not_overdue() {
-    let lookout = Arc::new(Lookout::default());
-    let attendance = lookout.attend(1);
-    let visit = Visit::begin(Path::new("/farm/large.xodr")).unwrap();
+    let io_watchdog = Arc::new(IoWatchdog::default());
+    let attendance = io_watchdog.attend(1);
+    let access = Access::begin(Path::new("/farm/large.xodr")).unwrap();
     let begun = attendance.waits_since().unwrap();
-    visit.goes_on();
+    access.goes_on();
     assert!(attendance.waits_since().unwrap() > begun);
-    drop(visit);
+    drop(access);
     assert_eq!(attendance.waits_since(), None);
 }
 
 #[test]
 fn what_went_wrong_for_now_is_remembered_as_long_as_somebody_attends() {
-    let lookout = Arc::new(Lookout::default());
-    let attendance = lookout.attend(1);
+    let io_watchdog = Arc::new(IoWatchdog::default());
+    let attendance = io_watchdog.attend(1);
     let meet =
         |path: &str, error: Errno| noted::<(), io::Error>(Path::new(path), Err(error.into()));
     assert!(meet("a", Errno::NOENT).is_err());

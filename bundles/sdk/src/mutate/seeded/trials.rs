@@ -32,15 +32,15 @@ impl Study<'_> {
             .partition::<Vec<&Entry>, _>(|entry| self.directory(&entry.original).is_some());
         let originals: BTreeSet<&Original> = there.iter().map(|entry| &entry.original).collect();
         let originals: Vec<&Original> = originals.into_iter().collect();
-        let before = in_parallel(&originals, |desk: &mut Desk, original| {
-            self.said(desk, &plan, original, &Changed::new())
+        let before = in_parallel(&originals, |cli: &mut Cli, original| {
+            self.said(cli, &plan, original, &Changed::new())
         });
         let before: BTreeMap<&Original, _> = originals.iter().copied().zip(before).collect();
-        let tried = in_parallel(&there, |desk: &mut Desk, entry| {
+        let tried = in_parallel(&there, |cli: &mut Cli, entry| {
             let before = before[&entry.original].as_ref();
             before
                 .map_err(String::clone)
-                .and_then(|before| self.trial(desk, &plan, entry, before))
+                .and_then(|before| self.trial(cli, &plan, entry, before))
                 .map_err(|error| format!("{}: {error}", entry.id))
         });
         let mut trials = Trials {
@@ -69,38 +69,38 @@ impl Study<'_> {
 
     fn trial<'e>(
         &self,
-        desk: &mut Desk,
+        cli: &mut Cli,
         plan: &Plan,
         entry: &'e Entry,
         before: &[Said],
     ) -> Result<Trial<'e>, String> {
         let source = self.directory(&entry.original).ok_or("not at hand")?;
         let (changed, spots) = apply(&entry.edits, &entry.at, &source)?;
-        let after = self.said(desk, plan, &entry.original, &changed)?;
+        let after = self.said(cli, plan, &entry.original, &changed)?;
         Ok(judge(entry, spots, new_ones(before, after)))
     }
 
     fn said(
         &self,
-        desk: &mut Desk,
+        cli: &mut Cli,
         plan: &Plan,
         original: &Original,
         changed: &Changed,
     ) -> Result<Vec<Said>, String> {
         let producer = &original.producer;
-        if !desk.0.contains_key(producer) {
+        if !cli.0.contains_key(producer) {
             let source = self.directory(original).ok_or("not at hand")?;
             let overlay = Overlay::of(&source).map_err(|error| error.to_string())?;
-            desk.0.insert(producer.clone(), overlay);
+            cli.0.insert(producer.clone(), overlay);
         }
-        let all = desk.0[producer].with(changed, |root| said(plan, root, &original.path));
+        let all = cli.0[producer].with(changed, |root| said(plan, root, &original.path));
         all.map_err(|error| error.to_string())?
     }
 }
 
 /// What one thread works with.
 #[derive(Default)]
-struct Desk(BTreeMap<String, Overlay>);
+struct Cli(BTreeMap<String, Overlay>);
 
 impl<'e> Trials<'e> {
     /// Faults, harmless variants and what could not be tried.

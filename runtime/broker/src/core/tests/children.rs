@@ -58,7 +58,7 @@ fn a_bundle_that_another_command_starts_judges_anew() {
     world.event(Event::Children { specs });
     world.child_joins();
     let waits = Event::Wait {
-        ticket: Ticket(9),
+        request_id: RequestId(9),
         path: path_of(0),
         stamp: Some(stamp(world.there[&path_of(0)])),
         unwatched: None,
@@ -292,7 +292,7 @@ fn a_manifest_that_changed_while_no_broker_ran_is_carried_out() {
         world.restart();
         world.manifest(Some(2));
         // The process of the former broker has outlived it, and joins the next.
-        world.child_of_a_former_broker_joins(version, &spec);
+        world.stale_child_joins(version, &spec);
         assert_eq!(child_version(&world), version.to_string());
         let adopted = world.state.bundles[CHILD].pid;
         world.pass(Duration::from_secs(1));

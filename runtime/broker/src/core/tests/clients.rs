@@ -13,7 +13,7 @@ use qcbus_messages::{JobId, Verdict};
 pub struct Client {
     file: u8,
     /// By whom the file is to be looked at, each as what is started under that name.
-    jury: Vec<(String, Option<Mark>)>,
+    required_set: Vec<(String, Option<VersionDigest>)>,
     config: Digest,
     /// All that lay there since it asked.
     seen: Vec<Vec<Input>>,
@@ -22,11 +22,11 @@ pub struct Client {
 /// All clients, and what is done for them.
 #[derive(Default)]
 pub struct Clients {
-    pub open: BTreeMap<Ticket, Client>,
-    pub answers: BTreeMap<Ticket, Response>,
+    pub open: BTreeMap<RequestId, Client>,
+    pub answers: BTreeMap<RequestId, Response>,
     pub pooling: Vec<FinishedJob>,
     /// What was pooled and the state machine has not heard.
-    pub pooled: Vec<(JobId, ErrandOutcome)>,
+    pub pooled: Vec<(JobId, OnDemandOutcome)>,
     /// Of what each result was made.
     found: BTreeMap<JobId, FinishedJob>,
 }
@@ -54,40 +54,46 @@ impl World {
     }
 
     /// Somebody wants to know what the child finds in a file.
-    pub fn ask(&mut self, file: u8) -> Ticket {
+    pub fn ask(&mut self, file: u8) -> RequestId {
         self.ask_by(file, &[CHILD])
     }
 
-    pub fn ask_by(&mut self, file: u8, bundles: &[&str]) -> Ticket {
-        self.tickets += 1;
-        let ticket = Ticket(self.tickets);
-        let mark = self.manifest.map(|version| {
+    pub fn ask_by(&mut self, file: u8, bundles: &[&str]) -> RequestId {
+        self.request_ids += 1;
+        let request_id = RequestId(self.request_ids);
+        let version_digest = self.manifest.map(|version| {
             let started = child(version).digest();
-            Mark::of(&version.to_string(), &catalogue(CHILD), Some(started))
+            VersionDigest::of(&version.to_string(), &catalogue(CHILD), Some(started))
         });
         let client = Client {
             file,
-            jury: bundles.iter().map(|it| ((*it).to_owned(), mark)).collect(),
+            required_set: bundles
+                .iter()
+                .map(|it| ((*it).to_owned(), version_digest))
+                .collect(),
             config: digest(self.reconfigured.into()),
             seen: Vec::new(),
         };
-        self.clients.open.insert(ticket, client);
+        self.clients.open.insert(request_id, client);
         let bundles = bundles.iter().map(|it| (*it).to_owned()).collect();
         self.event(Event::Check {
             path: path_of(file),
-            errand: Errand { ticket, bundles },
+            on_demand: OnDemand {
+                request_id,
+                bundles,
+            },
         });
-        ticket
+        request_id
     }
 
     /// A client does not wait any longer.
     pub fn client_leaves(&mut self, n: u8) {
         let count = self.clients.open.len();
         if count > 0 {
-            let ticket = self.clients.open.keys().nth(usize::from(n) % count);
-            let ticket = *ticket.unwrap();
-            self.clients.open.remove(&ticket);
-            self.event(Event::ClientLeft { ticket });
+            let request_id = self.clients.open.keys().nth(usize::from(n) % count);
+            let request_id = *request_id.unwrap();
+            self.clients.open.remove(&request_id);
+            self.event(Event::ClientLeft { request_id });
         }
     }
 
@@ -111,10 +117,10 @@ impl World {
         assert_eq!(total, files.len() as u64, "a file counts once");
         let at_bundles = self.state.jobs.values().filter(|job| {
             let at_work = job.stage.is_before_storing();
-            at_work && job.errand.is_some() && !job.is_trial()
+            at_work && job.on_demand.is_some() && !job.is_trial()
         });
-        for errand in at_bundles.filter_map(|job| job.errand.as_ref()) {
-            let open = self.clients.open.contains_key(&errand.ticket);
+        for on_demand in at_bundles.filter_map(|job| job.on_demand.as_ref()) {
+            let open = self.clients.open.contains_key(&on_demand.request_id);
             assert!(open, "nobody is asked for a client that has gone");
         }
     }
@@ -125,8 +131,8 @@ impl World {
             Action::Depend { files } => (files.iter().map(|it| &it.0).collect(), "watched"),
             Action::Undepend { paths } => (paths.iter().collect(), "watched"),
             Action::Store(job) => {
-                let errand = &self.state.jobs[&job.job].errand;
-                assert!(errand.is_none(), "a result for a client is not stored");
+                let on_demand = &self.state.jobs[&job.job].on_demand;
+                assert!(on_demand.is_none(), "a result for a client is not stored");
                 (vec![&job.path], "stored")
             }
             Action::Restamp { path, .. } | Action::Withdraw { path, .. } => {
@@ -143,8 +149,8 @@ impl World {
     }
 
     pub fn is_to_be_pooled(&mut self, job: FinishedJob) {
-        let errand = &self.state.jobs[&job.job].errand;
-        assert!(errand.is_some(), "only for a client");
+        let on_demand = &self.state.jobs[&job.job].on_demand;
+        assert!(on_demand.is_some(), "only for a client");
         self.clients.pooling.push(job);
     }
 
@@ -158,17 +164,17 @@ impl World {
         let (id, prepared) = (job.job, job.prepared.as_ref().unwrap());
         let is_trial = self.state.jobs.get(&id).is_some_and(|it| it.is_trial());
         let outcome = if !well {
-            ErrandOutcome::Failed("full".to_owned())
+            OnDemandOutcome::Failed("full".to_owned())
         } else if prepared.inputs != self.inputs(file_of(&job.path)) {
-            ErrandOutcome::Stale
+            OnDemandOutcome::Stale
         } else if is_trial {
-            ErrandOutcome::Tried(found_in(&job))
+            OnDemandOutcome::Tried(found_in(&job))
         } else if job.epoch != self.state.epoch() {
-            ErrandOutcome::Outdated
+            OnDemandOutcome::Outdated
         } else {
             let checked = checked(&job);
             self.clients.found.insert(id, job);
-            ErrandOutcome::Pooled(Box::new(checked))
+            OnDemandOutcome::Pooled(Box::new(checked))
         };
         self.clients.pooled.push((id, outcome));
     }
@@ -182,10 +188,10 @@ impl World {
     }
 
     /// Whether this was an answer to one of these clients.
-    pub fn client_is_answered(&mut self, ticket: Ticket, response: &Response) -> bool {
-        let once = !self.clients.answers.contains_key(&ticket);
+    pub fn client_is_answered(&mut self, request_id: RequestId, response: &Response) -> bool {
+        let once = !self.clients.answers.contains_key(&request_id);
         assert!(once, "one answer for each");
-        let Some(client) = self.clients.open.remove(&ticket) else {
+        let Some(client) = self.clients.open.remove(&request_id) else {
             return false;
         };
         match response {
@@ -193,7 +199,7 @@ impl World {
             Response::Elsewhere { .. } => {}
             other => panic!("no answer to a client that wants a file checked: {other:?}"),
         }
-        self.clients.answers.insert(ticket, response.clone());
+        self.clients.answers.insert(request_id, response.clone());
         true
     }
 
@@ -204,14 +210,18 @@ impl World {
         assert_eq!(job.path, path_of(client.file));
         let read = &job.prepared.as_ref().unwrap().inputs;
         assert!(client.seen.contains(read), "{read:?}: {:?}", client.seen);
-        assert_eq!(named(&job.jury), client.jury, "exactly those, and as such");
+        assert_eq!(
+            named(&job.required_set),
+            client.required_set,
+            "exactly those, and as such"
+        );
         let names = job.bundles.iter().map(|it| &it.name);
-        assert!(names.eq(client.jury.iter().map(|it| &it.0)));
+        assert!(names.eq(client.required_set.iter().map(|it| &it.0)));
         assert_eq!(job.config, client.config);
     }
 
     /// Whether files are checked otherwise from now on, or may be.
-    pub fn brings_other_terms(&self, event: &Event) -> bool {
+    pub fn brings_another_context(&self, event: &Event) -> bool {
         match event {
             Event::Children { .. } => true,
             Event::Configured { digest, .. } => *digest != self.state.config,
@@ -220,18 +230,22 @@ impl World {
     }
 
     /// Nobody is left of those who asked under what is not in force any more.
-    pub fn terms_are_others(&self) {
-        let open: Vec<&Ticket> = self.clients.open.keys().collect();
+    pub fn context_differs(&self) {
+        let open: Vec<&RequestId> = self.clients.open.keys().collect();
         assert!(open.is_empty(), "{open:?} asked under other terms");
     }
 
     /// All clients have gone, or have their answers, and there is no trace of any.
     pub fn clients_are_content(&self) {
-        let open: Vec<&Ticket> = self.clients.open.keys().collect();
+        let open: Vec<&RequestId> = self.clients.open.keys().collect();
         assert!(open.is_empty(), "{open:?} wait for ever");
-        assert!(self.state.errands.is_empty());
-        let errands = self.state.files.iter().filter(|it| it.1.errand.is_some());
-        assert_eq!(errands.count(), 0);
+        assert!(self.state.on_demand_checks.is_empty());
+        let on_demand_checks = self
+            .state
+            .files
+            .iter()
+            .filter(|it| it.1.on_demand.is_some());
+        assert_eq!(on_demand_checks.count(), 0);
     }
 }
 

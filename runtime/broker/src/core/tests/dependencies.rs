@@ -195,7 +195,7 @@ fn what_could_not_be_read_is_tried_again_and_said_once() {
     not_read(&mut world);
     let FinishedJob {
         job,
-        jury,
+        required_set,
         config,
         epoch,
         ..
@@ -204,7 +204,7 @@ fn what_could_not_be_read_is_tried_again_and_said_once() {
         job,
         verdict: Verdict::Undetermined,
         config,
-        jury,
+        required_set,
         epoch,
         why: vec!["an old disk".to_owned()],
         ..unread()
@@ -231,7 +231,7 @@ fn unread() -> Judged {
         digest: Digest::default(),
         basis: Digest::default(),
         config: Digest::default(),
-        jury: Arc::default(),
+        required_set: Arc::default(),
         epoch: Epoch::default(),
         inputs: Vec::new(),
         racy: true,

@@ -111,7 +111,7 @@ fn a_bundle_that_was_told_to_go_has_its_time() {
     let mut world = World::new();
     world.join("First");
     world.state.drain_peer("First", &mut Vec::new());
-    let limit = leaving::LEAVE_LIMIT;
+    let limit = draining::LEAVE_LIMIT;
     let why = is_ended_after(&mut world, limit, alive);
     assert!(why.contains("told to go"), "{why}");
 }
@@ -141,13 +141,13 @@ fn words_on_a_checker_that_was_not_offered_or_a_job_that_is_over_count_for_nothi
     };
     world.say(session, issues(1));
     world.say(session, issues(2));
-    let share = &world.state.jobs[&job].shares["First"];
-    assert_eq!(share.staged.keys().copied().collect::<Vec<_>>(), [1]);
+    let task = &world.state.jobs[&job].tasks["First"];
+    assert_eq!(task.pending.keys().copied().collect::<Vec<_>>(), [1]);
     assert_eq!(world.state.bundles["First"].offences, 1);
     world.say(session, FromPeer::JobDone { job, micros: 1 });
     world.say(session, issues(1));
-    let share = world.state.jobs.get(&job).map(|it| &it.shares["First"]);
-    let kept = share.and_then(|it| it.staged.get(&1));
+    let task = world.state.jobs.get(&job).map(|it| &it.tasks["First"]);
+    let kept = task.and_then(|it| it.pending.get(&1));
     assert!(kept.is_none_or(|it| it.issues.len() == 1));
 }
 
@@ -162,7 +162,7 @@ fn what_a_bundle_may_report_is_bounded_by_number_and_by_weight() {
     ] {
         let (mut world, session, job) = busy();
         world.state.settings.max_issues = issues;
-        world.state.settings.max_staged_bytes = bytes;
+        world.state.settings.max_pending_bytes = bytes;
         world.say(
             session,
             FromPeer::Issues {
@@ -171,9 +171,9 @@ fn what_a_bundle_may_report_is_bounded_by_number_and_by_weight() {
                 issues: vec![finding(); 5],
             },
         );
-        let staged = &world.state.jobs[&job].shares["First"].staged[&0];
-        assert_eq!(staged.issues.len(), kept);
-        assert_eq!(staged.withheld, 5 - kept as u64);
+        let pending = &world.state.jobs[&job].tasks["First"].pending[&0];
+        assert_eq!(pending.issues.len(), kept);
+        assert_eq!(pending.withheld, 5 - kept as u64);
     }
 }
 
@@ -209,8 +209,8 @@ fn done(job: JobId, checker: u32, value: &str, facts: usize) -> FromPeer {
 
 /// What a checker's share came to: its ending and how many facts of its run are kept.
 fn kept(world: &World, job: JobId, checker: u32) -> (Ending, usize) {
-    let staged = &world.state.jobs[&job].shares["First"].staged[&checker];
-    let (ending, params, metadata) = staged.done.clone().unwrap();
+    let pending = &world.state.jobs[&job].tasks["First"].pending[&checker];
+    let (ending, params, metadata) = pending.done.clone().unwrap();
     (ending, params.len() + metadata.len())
 }
 
@@ -246,10 +246,10 @@ fn a_checker_with_more_to_say_of_its_run_than_is_kept_has_failed() {
 fn what_all_checkers_say_of_their_end_is_bounded_with_the_findings() {
     let (mut world, session, job) = busy();
     let fact = facts_weight(&[], &[Metadata::default()]) + "key".len();
-    world.state.settings.max_staged_bytes = 3 * fact;
+    world.state.settings.max_pending_bytes = 3 * fact;
     world.say(session, done(job, 0, "", 2));
     assert_eq!(
-        world.state.jobs[&job].shares["First"].staged_bytes,
+        world.state.jobs[&job].tasks["First"].pending_bytes,
         2 * fact
     );
     world.say(session, done(job, 1, "", 2));
@@ -259,7 +259,7 @@ fn what_all_checkers_say_of_their_end_is_bounded_with_the_findings() {
     world.say(session, done(job, 1, "", 2));
     assert_eq!(kept(&world, job, 1), (Ending::Completed, 2));
     assert_eq!(
-        world.state.jobs[&job].shares["First"].staged_bytes,
+        world.state.jobs[&job].tasks["First"].pending_bytes,
         3 * fact
     );
 }
@@ -267,7 +267,7 @@ fn what_all_checkers_say_of_their_end_is_bounded_with_the_findings() {
 #[test]
 fn reasons_and_who_is_in_the_way_count_too() {
     let (mut world, session, job) = busy();
-    world.state.settings.max_staged_bytes = 100_000;
+    world.state.settings.max_pending_bytes = 100_000;
     for by in [vec!["x".repeat(4000); 60], vec!["x".repeat(4000); 6000]] {
         let ending = Ending::Blocked {
             by,
@@ -285,8 +285,8 @@ fn reasons_and_who_is_in_the_way_count_too() {
                 }],
             },
         );
-        let share = &world.state.jobs[&job].shares["First"];
-        assert!((30_000..60_000).contains(&share.staged_bytes));
+        let task = &world.state.jobs[&job].tasks["First"];
+        assert!((30_000..60_000).contains(&task.pending_bytes));
         assert!(kept(&world, job, 0).0.is_open());
     }
 }

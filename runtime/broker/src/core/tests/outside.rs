@@ -5,12 +5,12 @@ use crate::simulation::Summary;
 
 impl State {
     pub(crate) fn summary(&self) -> Summary {
-        let shut = self.files.iter().filter(|(_, it)| it.shut);
+        let unpublished = self.files.iter().filter(|(_, it)| it.unpublished);
         let members = self.bundles.iter().filter(|(_, it)| it.origin.is_some());
         Summary {
             demanded: members.map(|(name, _)| name.clone()).collect(),
             quiet: self.files.is_quiet() && self.jobs.is_empty() && self.scanned,
-            shut: shut.map(|(_, it)| it.path.clone()).collect(),
+            unpublished: unpublished.map(|(_, it)| it.path.clone()).collect(),
         }
     }
 }

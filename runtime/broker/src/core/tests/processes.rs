@@ -58,7 +58,7 @@ impl World {
     }
 
     /// One that a former broker started has outlived it. It says that it is of this version.
-    pub fn child_of_a_former_broker_joins(&mut self, version: u8, spec: &ChildSpec) {
+    pub fn stale_child_joins(&mut self, version: u8, spec: &ChildSpec) {
         let launch = Launch::first_of(self.generation - 1).next(spec);
         self.join_as(CHILD, version, Some(launch.0));
     }
@@ -139,7 +139,7 @@ impl World {
     }
 
     pub fn children_are(&mut self, version: Option<u8>) {
-        let reporter = self.desk.open.then(reporter);
+        let reporter = self.requests.open.then(reporter);
         let children = version.map(child).into_iter();
         let children = children.chain(self.shadow.map(shadow));
         let specs = children.chain(reporter).collect();
@@ -151,11 +151,11 @@ impl World {
         if name != CHILD || self.manifest.is_none() {
             self.demanded.remove(name);
         }
-        self.tickets += 1;
-        let ticket = Ticket(self.tickets);
-        self.waiting.insert(ticket, 0);
+        self.request_ids += 1;
+        let request_id = RequestId(self.request_ids);
+        self.waiting.insert(request_id, 0);
         let name = name.to_owned();
-        self.event(Event::RemoveBundle { ticket, name });
+        self.event(Event::RemoveBundle { request_id, name });
     }
 
     /// What a child's process that has not joined comes to.

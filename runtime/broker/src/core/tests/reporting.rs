@@ -19,7 +19,7 @@ enum Letter {
 
 /// Everything about the reporter, its processes, and what the journal knows of it.
 #[derive(Default)]
-pub struct Desk {
+pub struct Requests {
     /// Whether this world has a reporter.
     pub open: bool,
     processes: BTreeMap<SessionId, VecDeque<Letter>>,
@@ -50,13 +50,13 @@ impl World {
     /// A world with a reporter.
     pub fn with_a_reporter() -> World {
         let mut world = World::new();
-        world.desk.open = true;
+        world.requests.open = true;
         world.manifest(None);
         world
     }
 
     /// What the reporter and the journal learn of an action.
-    pub fn desk_hears(&mut self, action: &Action) {
+    pub fn requests_hear(&mut self, action: &Action) {
         match action {
             Action::Deliver {
                 session, delivery, ..
@@ -64,15 +64,15 @@ impl World {
                 let file = file_of(&delivery.path);
                 let about = |it: &Letter| matches!(it, Letter::Result(it, _) if *it == file);
                 assert!(
-                    !self.desk.processes.values().flatten().any(about),
+                    !self.requests.processes.values().flatten().any(about),
                     "two results of one file are not under way side by side"
                 );
-                let process = self.desk.processes.get_mut(session);
+                let process = self.requests.processes.get_mut(session);
                 let process = process.expect("no result goes to a closed session");
                 process.push_back(Letter::Result(file, delivery.job));
             }
             Action::Void { session, path, .. } => {
-                let process = self.desk.processes.get_mut(session);
+                let process = self.requests.processes.get_mut(session);
                 let process = process.expect("nothing goes to a closed session");
                 // What is read back only now is not sent any more.
                 let file = file_of(path);
@@ -80,21 +80,21 @@ impl World {
                 process.push_back(Letter::Gone(file));
             }
             Action::Delivered { path, job, .. } => {
-                assert!(self.desk.written.contains(job), "only what was written");
-                self.desk.delivered.insert(file_of(path), *job);
+                assert!(self.requests.written.contains(job), "only what was written");
+                self.requests.delivered.insert(file_of(path), *job);
             }
             Action::Voided { path, .. } => {
-                assert!(!self.desk.reports.contains_key(&file_of(path)));
-                self.desk.voids.remove(&file_of(path));
+                assert!(!self.requests.reports.contains_key(&file_of(path)));
+                self.requests.voids.remove(&file_of(path));
             }
             Action::Withdraw { path, reporters } => {
-                self.desk.delivered.remove(&file_of(path));
+                self.requests.delivered.remove(&file_of(path));
                 if !reporters.is_empty() {
-                    self.desk.voids.insert(file_of(path));
+                    self.requests.voids.insert(file_of(path));
                 }
             }
             Action::Disconnect { session } | Action::Refuse { session, .. } => {
-                self.desk.processes.remove(session);
+                self.requests.processes.remove(session);
             }
             _ => {}
         }
@@ -104,7 +104,7 @@ impl World {
     pub fn reporter_joins(&mut self, launch: Launch) {
         self.sessions += 1;
         let session = SessionId(self.sessions);
-        self.desk.processes.insert(session, VecDeque::new());
+        self.requests.processes.insert(session, VecDeque::new());
         let hello = Hello {
             protocol: PROTOCOL_VERSION,
             role: Role::Reporter,
@@ -121,7 +121,7 @@ impl World {
 
     /// The reporter does the next thing that it was told. `heard`: it lives to say so.
     pub fn report(&mut self, heard: bool) {
-        let Some((session, letters)) = self.desk.processes.iter_mut().next() else {
+        let Some((session, letters)) = self.requests.processes.iter_mut().next() else {
             return;
         };
         let (session, letter) = (*session, letters.pop_front());
@@ -134,12 +134,12 @@ impl World {
                     let why = "replaced".to_owned();
                     return self.event(Event::Undeliverable { session, job, why });
                 }
-                self.desk.reports.insert(file, job);
-                self.desk.written.insert(job);
+                self.requests.reports.insert(file, job);
+                self.requests.written.insert(job);
                 FromPeer::ResultDone { job, report }
             }
             Some(Letter::Gone(file)) => {
-                self.desk.reports.remove(&file);
+                self.requests.reports.remove(&file);
                 let input = path_of(file).display().to_string();
                 FromPeer::WithdrawalDone { input, report }
             }
@@ -152,28 +152,28 @@ impl World {
     }
 
     pub fn reporter_dies(&mut self) {
-        if let Some((session, _)) = self.desk.processes.pop_first() {
+        if let Some((session, _)) = self.requests.processes.pop_first() {
             self.event(Event::Gone { session });
         }
     }
 
     /// Whether the reporter is there and has nothing left to do.
     pub fn reporter_rests(&self) -> bool {
-        let idle = self.desk.processes.values().any(VecDeque::is_empty);
-        !self.desk.open || (idle && self.state.all_delivered())
+        let idle = self.requests.processes.values().any(VecDeque::is_empty);
+        !self.requests.open || (idle && self.state.all_delivered())
     }
 
     /// The broker is killed, and with it whatever was under way.
-    pub fn desk_restarts(&mut self) {
-        self.desk.processes.clear();
-        for file in &self.desk.voids {
+    pub fn requests_restart(&mut self) {
+        self.requests.processes.clear();
+        for file in &self.requests.voids {
             self.state.remember_void(&path_of(*file), REPORTER);
         }
     }
 
     /// What the journal says that the reporter has of a file.
     pub fn delivered(&self, file: u8) -> Vec<(String, Reported)> {
-        let job = self.desk.delivered.get(&file);
+        let job = self.requests.delivered.get(&file);
         job.map(|job| (REPORTER.to_owned(), Reported::Of(*job)))
             .into_iter()
             .collect()

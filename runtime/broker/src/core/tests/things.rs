@@ -67,7 +67,7 @@ pub fn fresh_state(generation: u64, configuration: u8) -> State {
         max_preparing: 2,
         max_storing: 2,
         max_findings_bytes: 1000,
-        // In random worlds bundles change all the time; `restless.rs` says what comes of that.
+        // In random worlds bundles change all the time; `flapping.rs` says what comes of that.
         changes_forgiven: u32::MAX,
         ..Settings::default()
     };
@@ -75,9 +75,9 @@ pub fn fresh_state(generation: u64, configuration: u8) -> State {
 }
 
 /// A jury as it can be compared.
-pub fn named(jury: &Jury) -> Vec<(String, Option<Mark>)> {
-    let juror = |it: &Juror| (it.name.clone(), it.mark);
-    jury.0.iter().map(juror).collect()
+pub fn named(required_set: &RequiredSet) -> Vec<(String, Option<VersionDigest>)> {
+    let required_bundle = |it: &RequiredBundle| (it.name.clone(), it.version_digest);
+    required_set.0.iter().map(required_bundle).collect()
 }
 
 /// The first six are checked, the next two are only dependencies of them; of what comes then nobody knows but

@@ -85,7 +85,7 @@ impl World {
 
 /// What a shadow finds as the store would tell it: an error where it has anything to say.
 pub fn found_in(job: &FinishedJob) -> TrialEnd {
-    let said: Vec<_> = job.bundles.iter().map(ShareOutcome::said).collect();
+    let said: Vec<_> = job.bundles.iter().map(TaskOutcome::said).collect();
     let names: Vec<&str> = said.iter().map(|it| &*it.name).collect();
     assert_eq!(names, [SHADOW], "nobody else is asked");
     let mut checkers = said.iter().flat_map(|it| &it.checkers);
@@ -272,7 +272,7 @@ fn a_shadow_that_comes_has_no_other_try_anything_again() {
     let mut actions = Vec::new();
     world
         .state
-        .shadow_is_ready("Another", Mark(1), &mut actions);
+        .shadow_is_ready("Another", VersionDigest(1), &mut actions);
     let waiting = |name: &str| world.state.trial_counts(name).unwrap().waiting;
     assert_eq!((waiting("Another"), world.trials().0), (1, before));
 }
@@ -296,7 +296,7 @@ fn shadow_that_is_ready_before_the_files_are_seen_tries_them() {
         let mut actions = Vec::new();
         world
             .state
-            .shadow_is_ready("Another", Mark(1), &mut actions);
+            .shadow_is_ready("Another", VersionDigest(1), &mut actions);
         let waiting = |world: &World| world.state.trial_counts("Another").unwrap().waiting;
         assert_eq!(waiting(&world), 0);
         for _ in 0..2 {

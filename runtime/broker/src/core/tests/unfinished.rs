@@ -15,17 +15,17 @@ fn write_slowly(world: &mut World) -> Vec<Action> {
     actions
 }
 
-fn shuts(actions: &[Action], file: u8) -> bool {
+fn unpublishes(actions: &[Action], file: u8) -> bool {
     let path = path_of(file);
-    let shut = |it: &Action| matches!(it, Action::CloseGate { path: shut } if *shut == path);
-    actions.iter().any(shut)
+    let closes = |it: &Action| matches!(it, Action::CloseGate { path: closed } if *closed == path);
+    actions.iter().any(closes)
 }
 
 #[test]
 fn what_is_being_written_is_not_behind_the_gate_and_not_told() {
     let mut world = judged_world();
-    assert!(shuts(&write_slowly(&mut world), 1));
-    assert!(!shuts(&write_slowly(&mut world), 1), "once");
+    assert!(unpublishes(&write_slowly(&mut world), 1));
+    assert!(!unpublishes(&write_slowly(&mut world), 1), "once");
     let asked = comes_of(&mut world, waits(1, None, None));
     assert!(answers(&asked).is_empty());
     assert!(world.preparing.is_empty(), "it is not read");
@@ -50,7 +50,7 @@ fn file_that_was_opened_and_not_written_to_keeps_its_verdict() {
         path,
         stamp: Some(stamp),
     };
-    assert!(!shuts(&comes_of(&mut world, event), 1));
+    assert!(!unpublishes(&comes_of(&mut world, event), 1));
     let asked = comes_of(&mut world, waits(1, None, Some(stamp)));
     assert!(matches!(answers(&asked)[..], [Response::Verdict(_)]));
 }

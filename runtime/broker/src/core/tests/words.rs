@@ -153,7 +153,7 @@ fn a_file_that_cannot_be_read_is_undetermined() {
     let finished = &world.storing[0];
     assert_eq!(finished.unreadable.as_deref(), Some("it is a directory"));
     assert!(finished.prepared.is_none(), "there is nothing to refer to");
-    assert_eq!(named(&finished.jury), world.expected_jury());
+    assert_eq!(named(&finished.required_set), world.expected_set());
     let failure = finished.bundles[0].failure.as_deref();
     assert_eq!(failure, Some("it is a directory"));
 }
@@ -346,7 +346,7 @@ pub(super) fn answers(actions: &[Action]) -> Vec<&Response> {
 
 pub(super) fn waits(file: u8, unwatched: Option<String>, stamp: Option<Stamp>) -> Event {
     Event::Wait {
-        ticket: Ticket(9),
+        request_id: RequestId(9),
         path: path_of(file),
         stamp,
         unwatched,
@@ -473,21 +473,21 @@ fn who_waits_for_what_is_not_there_is_not_told_what_was() {
     let went: fn(&mut World) = |world| world.delete(1);
     for ends in [came_back, went] {
         let mut world = judged_world();
-        let ticket = Ticket(7);
-        world.waiting.insert(ticket, 1);
+        let request_id = RequestId(7);
+        world.waiting.insert(request_id, 1);
         // Its directory is away, so the verdict is kept.
         world.event(Event::Wait {
-            ticket,
+            request_id,
             path: path_of(1),
             stamp: None,
             unwatched: None,
             until: Until::default(),
         });
         world.pass(Duration::from_secs(30));
-        assert!(world.waiting.contains_key(&ticket));
+        assert!(world.waiting.contains_key(&request_id));
         ends(&mut world);
         assert!(
-            !world.waiting.contains_key(&ticket),
+            !world.waiting.contains_key(&request_id),
             "now there is an answer"
         );
     }
@@ -577,7 +577,7 @@ fn a_run_does_not_wait_for_a_reporter_that_cannot_start() {
 fn a_verdict_that_stands_after_all_is_not_told_of_what_is_not_there() {
     let mut world = judged_world();
     let waits = Event::Wait {
-        ticket: Ticket(7),
+        request_id: RequestId(7),
         path: path_of(1),
         stamp: None,
         unwatched: None,

@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::super::*;
 use super::behind_the_gate::Published;
 use super::clients::Clients;
-use super::reporting::Desk;
+use super::reporting::Requests;
 use super::things::*;
 use qcbus_messages::{JobId, Verdict};
 
@@ -52,16 +52,16 @@ pub struct World {
     pub journal: BTreeMap<u8, Judged>,
     pub generation: u64,
     pub reconfigured: u8,
-    pub tickets: u64,
-    pub waiting: BTreeMap<Ticket, u8>,
+    pub request_ids: u64,
+    pub waiting: BTreeMap<RequestId, u8>,
     /// Until when those wait who do not wait for ever.
-    pub until: BTreeMap<Ticket, Duration>,
+    pub until: BTreeMap<RequestId, Duration>,
     /// What writers have done and the state machine has not heard.
     pub told: Vec<((u8, JobId), StoreOutcome)>,
     /// What is watched because verdicts depend on it.
     pub watched: BTreeSet<u8>,
     pub gate: Published,
-    pub desk: Desk,
+    pub requests: Requests,
     pub clients: Clients,
     /// Why bundles have failed on each file, as stored.
     pub failures: BTreeMap<u8, Vec<String>>,
@@ -132,13 +132,13 @@ impl World {
             journal: BTreeMap::new(),
             generation: 1,
             reconfigured: 0,
-            tickets: 0,
+            request_ids: 0,
             waiting: BTreeMap::new(),
             until: BTreeMap::new(),
             told: Vec::new(),
             watched: BTreeSet::new(),
             gate: Published::new(),
-            desk: Desk::default(),
+            requests: Requests::default(),
             clients: Clients::default(),
             failures: BTreeMap::new(),
             rejected: BTreeSet::new(),
@@ -152,7 +152,7 @@ impl World {
 
     pub fn event(&mut self, event: Event) {
         self.clients_look();
-        let other_terms = self.brings_other_terms(&event);
+        let another_context = self.brings_another_context(&event);
         let (mut withdrawn, mut opened) = (Vec::new(), Vec::new());
         for action in self.state.handle(self.now, event) {
             if let Action::Withdraw { path, .. } = &action {
@@ -162,7 +162,7 @@ impl World {
                 opened.push(path.clone());
             }
             self.is_for_clients_alone(&action);
-            self.desk_hears(&action);
+            self.requests_hear(&action);
             self.gate_follows(&action);
             self.act(action);
         }
@@ -174,21 +174,21 @@ impl World {
         }
         self.gate_must_be_true();
         self.clients_leave_no_trace();
-        if other_terms {
-            self.terms_are_others();
+        if another_context {
+            self.context_differs();
         }
     }
 
     /// Who must judge, each as what it is.
-    pub fn expected_jury(&self) -> Vec<(String, Option<Mark>)> {
-        let mark = |(name, version): (&String, &Option<u8>)| {
-            let mark = version.map(|it| {
+    pub fn expected_set(&self) -> Vec<(String, Option<VersionDigest>)> {
+        let version_digest = |(name, version): (&String, &Option<u8>)| {
+            let version_digest = version.map(|it| {
                 let started = (*name == CHILD).then(|| child(it).digest());
-                Mark::of(&it.to_string(), &catalogue(name), started)
+                VersionDigest::of(&it.to_string(), &catalogue(name), started)
             });
-            (name.clone(), mark)
+            (name.clone(), version_digest)
         };
-        self.demanded.iter().map(mark).collect()
+        self.demanded.iter().map(version_digest).collect()
     }
 
     pub fn write(&mut self, file: u8) {
@@ -247,14 +247,15 @@ impl World {
     }
 
     pub fn wait_until(&mut self, file: u8, timeout: Option<Duration>) {
-        self.tickets += 1;
-        self.waiting.insert(Ticket(self.tickets), file);
+        self.request_ids += 1;
+        self.waiting.insert(RequestId(self.request_ids), file);
         if let Some(timeout) = timeout {
-            self.until.insert(Ticket(self.tickets), self.now + timeout);
+            self.until
+                .insert(RequestId(self.request_ids), self.now + timeout);
         }
         let path = path_of(file);
         self.event(Event::Wait {
-            ticket: Ticket(self.tickets),
+            request_id: RequestId(self.request_ids),
             stamp: self.there.get(&path).map(|number| stamp(*number)),
             path,
             unwatched: None,

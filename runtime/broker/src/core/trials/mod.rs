@@ -18,15 +18,15 @@ use qcbus_document::FileKind;
 use qcbus_messages::{JobId, Verdict};
 
 use super::action::Action;
-use super::errands::Errand;
 use super::files::{FileId, Stage};
-use super::jobs::ShareState;
-use super::jury::{Mark, Seat};
-use super::types::Ticket;
+use super::jobs::TaskState;
+use super::on_demand::OnDemand;
+use super::required_set::{Requirement, VersionDigest};
+use super::types::RequestId;
 use super::{Actions, Phase, State};
 
 /// Tickets of clients count up from 1, those of trials from here.
-const FIRST_TICKET: u64 = 1 << 63;
+const FIRST_REQUEST_ID: u64 = 1 << 63;
 
 /// While files wait for their verdicts, the pause between two trials of a shadow: it gets on all the same where a farm
 /// never rests.
@@ -53,10 +53,10 @@ pub struct TrialEnd {
     pub result: Option<PathBuf>,
 }
 
-impl Ticket {
+impl RequestId {
     /// Whether it is of no client, but of a trial of the broker's own.
     pub(super) fn is_trial(self) -> bool {
-        self.0 >= FIRST_TICKET
+        self.0 >= FIRST_REQUEST_ID
     }
 }
 
@@ -64,17 +64,17 @@ impl Ticket {
 #[derive(Debug, Default)]
 pub(super) struct Trials {
     shadows: BTreeMap<String, Shadow>,
-    last_ticket: u64,
+    last_request_id: u64,
 }
 
 #[derive(Debug, Default)]
 struct Shadow {
     /// As what it has tried.
-    mark: Option<Mark>,
+    version_digest: Option<VersionDigest>,
     waiting: VecDeque<Arc<Path>>,
     /// The same, to be found.
     waits: HashSet<Arc<Path>>,
-    under_way: Option<(Ticket, Arc<Path>)>,
+    under_way: Option<(RequestId, Arc<Path>)>,
     /// How often it has died in a row with the file that is first in line.
     deaths: u8,
     tried: BTreeMap<Arc<Path>, Result<TrialEnd, String>>,
@@ -117,14 +117,18 @@ impl Trials {
         shadows.filter(|it| it.under_way.is_some()).count()
     }
 
-    fn of(&mut self, ticket: Ticket) -> Option<&mut Shadow> {
+    fn of(&mut self, request_id: RequestId) -> Option<&mut Shadow> {
         let mut shadows = self.shadows.values_mut();
-        shadows.find(|it| it.under_way.as_ref().is_some_and(|(its, _)| *its == ticket))
+        shadows.find(|it| {
+            it.under_way
+                .as_ref()
+                .is_some_and(|(its, _)| *its == request_id)
+        })
     }
 
-    fn next_ticket(&mut self) -> Ticket {
-        self.last_ticket += 1;
-        Ticket(FIRST_TICKET + self.last_ticket)
+    fn next_request_id(&mut self) -> RequestId {
+        self.last_request_id += 1;
+        RequestId(FIRST_REQUEST_ID + self.last_request_id)
     }
 }
 
@@ -136,8 +140,11 @@ impl State {
 
     /// The shadow that a job is a trial of, if it is one.
     pub fn tried_out(&self, job: JobId) -> Option<&str> {
-        let errand = self.jobs.get(&job)?.errand.as_ref()?;
-        let name = errand.bundles.first().filter(|_| errand.ticket.is_trial());
+        let on_demand = self.jobs.get(&job)?.on_demand.as_ref()?;
+        let name = on_demand
+            .bundles
+            .first()
+            .filter(|_| on_demand.request_id.is_trial());
         name.map(String::as_str)
     }
 
@@ -167,18 +174,27 @@ impl State {
     }
 
     /// A shadow has said what it checks: unless it has tried everything as this already, it begins.
-    pub(super) fn shadow_is_ready(&mut self, name: &str, mark: Mark, actions: &mut Actions) {
-        let known = self.trials.shadows.get(name).and_then(|it| it.mark);
-        if known == Some(mark) {
+    pub(super) fn shadow_is_ready(
+        &mut self,
+        name: &str,
+        version_digest: VersionDigest,
+        actions: &mut Actions,
+    ) {
+        let known = self
+            .trials
+            .shadows
+            .get(name)
+            .and_then(|it| it.version_digest);
+        if known == Some(version_digest) {
             return;
         }
         self.end_trial_of(name, actions);
         let mut shadow = Shadow {
-            mark: Some(mark),
+            version_digest: Some(version_digest),
             ..Shadow::default()
         };
         let files = self.files.iter().map(|(_, it)| it);
-        let judged = files.filter(|it| it.present && it.errand.is_none() && it.judged.is_some());
+        let judged = files.filter(|it| it.present && it.on_demand.is_none() && it.judged.is_some());
         judged.for_each(|it| shadow.wait(&it.path));
         self.trials.shadows.insert(name.to_owned(), shadow);
         actions.push(Action::ForgetTrials {
@@ -195,7 +211,7 @@ impl State {
         };
         // One that has never said what it checks gets all files when it does.
         let ready = self.trials.shadows.values_mut();
-        for shadow in ready.filter(|it| it.mark.is_some()) {
+        for shadow in ready.filter(|it| it.version_digest.is_some()) {
             shadow.tried.remove(&entry.path);
             shadow.wait(&entry.path);
         }
@@ -214,13 +230,17 @@ impl State {
     }
 
     /// What a shadow has to look at in files of a kind; empty when that is nothing, or nobody knows.
-    pub(super) fn seats_of_trial(&self, names: &[String], kind: FileKind) -> Arc<[Seat]> {
-        let seat = |name: &String| {
+    pub(super) fn requirements_of_trial(
+        &self,
+        names: &[String],
+        kind: FileKind,
+    ) -> Arc<[Requirement]> {
+        let requirement = |name: &String| {
             let bundle = self.bundles.get(name)?;
             bundle.catalogue.as_ref()?;
             self.place_of(name, bundle, kind)
         };
-        names.iter().filter_map(seat).collect()
+        names.iter().filter_map(requirement).collect()
     }
 
     /// Begins the trials whose time it is.
@@ -261,27 +281,30 @@ impl State {
                 continue;
             };
             let kind = entry.kind;
-            if !matches!(entry.stage(), Stage::Idle) || entry.doubted {
+            if !matches!(entry.stage(), Stage::Idle) || entry.stale {
                 shadow.wait(&path);
                 continue;
             }
-            if self.seats_of_trial(&[name.to_owned()], kind).is_empty() {
+            if self
+                .requirements_of_trial(&[name.to_owned()], kind)
+                .is_empty()
+            {
                 continue;
             }
-            let ticket = self.trials.next_ticket();
+            let request_id = self.trials.next_request_id();
             let Some(shadow) = self.trials.shadows.get_mut(name) else {
                 return;
             };
-            shadow.under_way = Some((ticket, path.clone()));
-            let errand = Errand {
-                ticket,
+            shadow.under_way = Some((request_id, path.clone()));
+            let on_demand = OnDemand {
+                request_id,
                 bundles: Arc::new([name.to_owned()]),
             };
-            let id = self.files.insert_errand(&path, kind, errand);
+            let id = self.files.insert_on_demand(&path, kind, on_demand);
             if let Some(entry) = self.files.get_mut(id) {
                 entry.asked = self.now;
             }
-            self.errands.insert(ticket, id);
+            self.on_demand_checks.insert(request_id, id);
             return self.take(id, actions);
         }
         // None of them is at rest.
@@ -295,16 +318,16 @@ impl State {
         let Some(job) = self.jobs.get(&id) else {
             return;
         };
-        let failed = |state: &ShareState| match state {
-            ShareState::Failed(why) => Some(why.clone()),
+        let failed = |state: &TaskState| match state {
+            TaskState::Failed(why) => Some(why.clone()),
             _ => None,
         };
-        let mut shares = job.shares.values();
-        let Some(share) = shares.next().filter(|share| !share.absent) else {
+        let mut tasks = job.tasks.values();
+        let Some(task) = tasks.next().filter(|task| !task.missing) else {
             // It is not there: its file waits for it.
             return self.end_job(id, actions);
         };
-        match failed(&share.state) {
+        match failed(&task.state) {
             Some(why) => self.send_elsewhere(id, why, actions),
             None => {
                 let finished = self.finished(id);
@@ -314,9 +337,9 @@ impl State {
     }
 
     /// A trial has come to its end.
-    pub(super) fn trial_ended(&mut self, ticket: Ticket, end: Result<TrialEnd, String>) {
+    pub(super) fn trial_ended(&mut self, request_id: RequestId, end: Result<TrialEnd, String>) {
         let now = self.now;
-        let Some(shadow) = self.trials.of(ticket) else {
+        let Some(shadow) = self.trials.of(request_id) else {
             return;
         };
         let Some((_, path)) = shadow.under_way.take() else {
@@ -331,9 +354,9 @@ impl State {
     }
 
     /// A trial was not to be; its file is the next.
-    pub(super) fn put_trial_back(&mut self, ticket: Ticket) {
+    pub(super) fn put_trial_back(&mut self, request_id: RequestId) {
         let now = self.now;
-        if let Some(shadow) = self.trials.of(ticket)
+        if let Some(shadow) = self.trials.of(request_id)
             && let Some((_, path)) = shadow.under_way.take()
         {
             shadow.put_back(path);
@@ -343,19 +366,19 @@ impl State {
 
     /// A shadow has died with the file of a trial. Whether it is tried again.
     pub(super) fn try_again(&mut self, id: JobId, actions: &mut Actions) -> bool {
-        let errand = self.jobs.get(&id).and_then(|job| job.errand.as_ref());
-        let Some(ticket) = errand.map(|it| it.ticket).filter(|it| it.is_trial()) else {
+        let on_demand = self.jobs.get(&id).and_then(|job| job.on_demand.as_ref());
+        let Some(request_id) = on_demand.map(|it| it.request_id).filter(|it| it.is_trial()) else {
             return false;
         };
-        let Some(shadow) = self.trials.of(ticket) else {
+        let Some(shadow) = self.trials.of(request_id) else {
             return false;
         };
         shadow.deaths += 1;
         if shadow.deaths >= DEATHS {
             return false;
         }
-        self.put_trial_back(ticket);
-        self.abandon(ticket, actions);
+        self.put_trial_back(request_id);
+        self.abandon(request_id, actions);
         true
     }
 
@@ -378,9 +401,9 @@ impl State {
     fn end_trial_of(&mut self, name: &str, actions: &mut Actions) {
         let shadow = self.trials.shadows.get(name);
         let under_way = shadow.and_then(|it| it.under_way.as_ref());
-        if let Some((ticket, _)) = under_way.cloned() {
-            self.put_trial_back(ticket);
-            self.abandon(ticket, actions);
+        if let Some((request_id, _)) = under_way.cloned() {
+            self.put_trial_back(request_id);
+            self.abandon(request_id, actions);
         }
     }
 }

@@ -69,7 +69,7 @@ impl State {
                 [trial.errors, trial.warnings, trial.information] = found.counts;
                 trial.why.clone_from(&found.why);
                 trial.result = found.result.clone().unwrap_or_default();
-                trial.would = match self.seats(entry.kind).is_empty() {
+                trial.would = match self.requirements(entry.kind).is_empty() {
                     true => found.alone,
                     false => verdict.and(found.adds),
                 };

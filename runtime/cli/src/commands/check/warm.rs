@@ -10,10 +10,10 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use qcbus_broker::control::Line;
-use qcbus_broker::{Announcement, GivenResults, InForce, Notice, Options, Told, terms};
+use qcbus_broker::{Announcement, GivenResults, InForce, Notice, Options, Told, check_context};
 use qcbus_document::FileKind;
 use qcbus_ingest::modular::SearchPath;
-use qcbus_messages::control::{Checked, Referenced, Request, Response, Terms};
+use qcbus_messages::control::{CheckContext, Checked, Referenced, Request, Response};
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Digest, Exit, Verdict};
 
@@ -65,7 +65,7 @@ enum Elsewhere {
 }
 
 /// A file, and the terms under which it is to be checked.
-type Question = (PathBuf, Terms);
+type Question = (PathBuf, CheckContext);
 
 /// Everything that was answered.
 struct Given {
@@ -155,8 +155,8 @@ impl Asking {
         files: Vec<PathBuf>,
     ) -> Result<Vec<(PathBuf, Checked)>, String> {
         let question = |file: &PathBuf| {
-            let terms = terms_of(&self.options, self.config, file);
-            (file.clone(), terms)
+            let check_context = context_of(&self.options, self.config, file);
+            (file.clone(), check_context)
         };
         let questions: Vec<Question> = files.iter().map(question).collect();
         let answers = match questions.as_slice() {
@@ -180,7 +180,7 @@ fn may_ask(args: &CheckArgs, options: &Options) -> bool {
 }
 
 /// The terms under which a file would be checked here.
-fn terms_of(options: &Options, config: Digest, file: &Path) -> Terms {
+fn context_of(options: &Options, config: Digest, file: &Path) -> CheckContext {
     let kind = FileKind::of_path(file);
     let takes = |name: &str| {
         let bundle = standard::bundle(name);
@@ -188,14 +188,14 @@ fn terms_of(options: &Options, config: Digest, file: &Path) -> Terms {
     };
     let bundles = options.standard.iter().filter(|spec| takes(&spec.name));
     let bundles: Vec<_> = bundles.cloned().collect();
-    terms(options, config, &bundles)
+    check_context(options, config, &bundles)
 }
 
 /// Asks for one file; why it is to be checked here, if it is.
-fn ask_for(line: &mut Line, (file, terms): &Question) -> Result<Checked, String> {
+fn ask_for(line: &mut Line, (file, check_context): &Question) -> Result<Checked, String> {
     let request = Request::Check {
         file: file.clone(),
-        terms: terms.clone(),
+        check_context: check_context.clone(),
     };
     match line.ask(&request) {
         Ok(Response::Checked(checked)) => Ok(*checked),

@@ -1,0 +1,295 @@
+//! The process that runs modules: one run after the other, as it is asked.
+
+use std::ffi::OsString;
+use std::io;
+use std::os::fd::{AsFd as _, OwnedFd};
+use std::path::{Path, PathBuf};
+
+use qcbus_confine::Orders;
+use qcbus_formats::manifest::May;
+use qcbus_messages::Exit;
+
+use crate::channel::{Channel, Message};
+use crate::configuration::{Configuration, of_report};
+use crate::family;
+use crate::fork_server::ForkServer;
+use crate::hosted::Hosted;
+use crate::messages::{Answer, MOST, Ran, Request};
+use crate::pending::Staged;
+use crate::process::{self, Broken, Run};
+use crate::program::Programs;
+use crate::scratch::{Room, Scratch};
+use crate::written;
+
+/// Serves until nobody is at the other end of the socket, which stands where a program's input does.
+pub(crate) fn serve(hosted: &Hosted) -> Exit {
+    match runner(hosted) {
+        Ok(()) => Exit::Accepted,
+        Err(error) => {
+            tracing::error!(module = hosted.name, %error, "the office cannot go on");
+            Exit::Internal
+        }
+    }
+}
+
+fn runner(hosted: &Hosted) -> io::Result<()> {
+    // Closed when a run becomes a program, which has an input of its own.
+    let socket: OwnedFd = io::stdin().as_fd().try_clone_to_owned()?;
+    family::adopt()?;
+    let may = match Orders::given() {
+        Ok(Orders::On(may)) => Some(may),
+        Ok(Orders::Off) => None,
+        Err(error) => return Err(io::Error::other(error)),
+    };
+    let mut runner = Runner {
+        hosted,
+        scratch: Scratch::open(&hosted.scratch)?,
+        channel: Channel::from_socket(socket),
+        may,
+        fork_server: ForkServer::new(hosted.is_cold),
+        programs: Programs::new(&hosted.programs),
+    };
+    while let Some(message) = runner.channel.receive(MOST)? {
+        let (answer, result) = match runner.answer(&message) {
+            Ok((ran, result)) => (Answer::Ran(ran), result),
+            Err(NotRun::Why(why) | NotRun::Unkept(why)) => (Answer::Not(why), Vec::new()),
+            Err(NotRun::Changed(why)) => (Answer::Changed(why), Vec::new()),
+            Err(NotRun::Over) => return Ok(()),
+            Err(NotRun::Lost(error)) => return Err(io::Error::other(error)),
+        };
+        match runner.channel.send(message.number, &answer, &[&result]) {
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
+            sent => sent?,
+        }
+    }
+    Ok(())
+}
+
+/// Why there was no run.
+enum NotRun {
+    /// For a person.
+    Why(String),
+    /// The program is not the one that was learned.
+    Changed(String),
+    /// Its interpreter has gone.
+    Unkept(String),
+    /// Nobody waits for it any more.
+    Over,
+    /// Nothing can be run here any more.
+    Lost(Broken),
+}
+
+impl From<io::Error> for NotRun {
+    fn from(error: io::Error) -> NotRun {
+        NotRun::Why(error.to_string())
+    }
+}
+
+struct Runner<'h> {
+    hosted: &'h Hosted,
+    scratch: Scratch,
+    channel: Channel,
+    /// What runs may do. `None`: they are not confined.
+    may: Option<May>,
+    fork_server: ForkServer,
+    programs: Programs,
+}
+
+/// What a run is prepared with.
+struct Prepared {
+    room: Room,
+    directory: PathBuf,
+    /// Its own directory, in which it runs unless its manifest says otherwise.
+    work: PathBuf,
+    config: PathBuf,
+    staged: Staged,
+    /// The names of sections, each with the file for its result.
+    sections: Vec<(String, String)>,
+}
+
+impl Runner<'_> {
+    fn answer(&mut self, message: &Message) -> Result<(Ran, Vec<u8>), NotRun> {
+        match self.run(message, false) {
+            // It may have been the run that has ended its interpreter: plainly there is none.
+            Err(NotRun::Unkept(why)) => {
+                tracing::warn!(
+                    module = self.hosted.name,
+                    why,
+                    "it is run plainly once more"
+                );
+                self.run(message, true)
+            }
+            answer => answer,
+        }
+    }
+
+    fn run(&mut self, message: &Message, plainly: bool) -> Result<(Ran, Vec<u8>), NotRun> {
+        let request: Request = message.head()?;
+        self.is_as_learned()?;
+        let prepared = self.prepare(&request, &message.body)?;
+        let environment = self.environment(&prepared);
+        let run = Run {
+            command: &self.hosted.command,
+            environment: &environment,
+            directory: &prepared.directory,
+            limits: self.hosted.limits,
+            may: self.may_in(&prepared.room),
+        };
+        let ended = match process::run(&run, self.channel.as_fd(), &mut self.fork_server, plainly) {
+            Ok(ended) => ended,
+            Err(Broken::Unwanted) => return Err(NotRun::Over),
+            Err(Broken::Unkept(error)) => return Err(NotRun::Unkept(error.to_string())),
+            Err(error @ Broken::Start(_)) => return Err(NotRun::Why(error.to_string())),
+            Err(error @ Broken::Lasts(_)) => return Err(NotRun::Lost(error)),
+        };
+        // It may have become another just before it was started.
+        self.is_as_learned()?;
+        let text = |path: &Path| path.to_string_lossy().into_owned();
+        let mut ran = Ran {
+            fault: ended.fault,
+            said: ended.said,
+            application: None,
+            input: text(prepared.staged.input()),
+            packed: request
+                .files
+                .first()
+                .and_then(|it| it.packed.as_deref().map(text)),
+            staged: text(&prepared.staged.directory),
+            real: text(&prepared.staged.real),
+            room: text(prepared.room.path()),
+            reports: Vec::new(),
+        };
+        let result = match &request.report {
+            Some(_) if ran.fault.is_none() => {
+                let written = written::in_directory(&prepared.work, self.hosted.limits.output);
+                let (reports, body) = written.map_err(NotRun::Why)?;
+                ran.reports = reports;
+                body
+            }
+            Some(_) => Vec::new(),
+            None => self.collect(&prepared, &mut ran),
+        };
+        Ok((ran, result))
+    }
+
+    fn is_as_learned(&mut self) -> Result<(), NotRun> {
+        self.programs
+            .changed()
+            .map_or(Ok(()), |why| Err(NotRun::Changed(why)))
+    }
+
+    fn prepare(&mut self, request: &Request, body: &[u8]) -> Result<Prepared, NotRun> {
+        let room = self.scratch.for_a_run()?;
+        let staged = Staged::write(&request.files, body, &room.directory("input")?)?;
+        let own = room.directory("work")?;
+        room.directory("tmp")?;
+        let directory = self.hosted.directory.clone().unwrap_or(own.clone());
+        let input = staged.input().to_str().ok_or_else(|| {
+            let why = "its path is no UTF-8, and a configuration cannot name it";
+            NotRun::Why(why.to_owned())
+        })?;
+        let is_own = self.hosted.directory.is_none();
+        let sections = (1..)
+            .zip(&request.applications)
+            .map(|(number, application)| {
+                let name = format!("result-{number}.xqar");
+                let result = match is_own {
+                    true => name,
+                    false => own.join(name).to_string_lossy().into_owned(),
+                };
+                (application.clone(), result)
+            });
+        let sections: Vec<(String, String)> = sections.collect();
+        let config = room.path().join("config.xml");
+        let text = match &request.report {
+            Some(params) => of_report(&request.applications, input, params),
+            None => Configuration {
+                name: &self.hosted.name,
+                input,
+                config: request.config.as_ref(),
+                sections: &sections,
+            }
+            .text(),
+        };
+        std::fs::write(&config, text)?;
+        Ok(Prepared {
+            room,
+            directory,
+            work: own,
+            config,
+            staged,
+            sections,
+        })
+    }
+
+    fn environment(&self, prepared: &Prepared) -> Vec<(OsString, OsString)> {
+        let own = self.hosted.environment.iter();
+        let mut all: Vec<(OsString, OsString)> = own
+            .map(|(name, value)| (name.into(), value.into()))
+            .collect();
+        let mut add = |name: &str, path: &Path| all.push((name.into(), path.into()));
+        add("ASAM_QC_FRAMEWORK_CONFIG_FILE", &prepared.config);
+        add("ASAM_QC_FRAMEWORK_WORKING_DIR", &prepared.directory);
+        add("TMPDIR", &prepared.room.path().join("tmp"));
+        all
+    }
+
+    /// What a run may do: what the module's manifest declares, and anything in its own room. The rooms of others are
+    /// no more its business than the rest of the disk.
+    fn may_in(&self, room: &Room) -> Option<May> {
+        let mut may = self.may.clone()?;
+        may.write.retain(|it| *it != self.hosted.scratch);
+        may.write.push(room.path().to_path_buf());
+        Some(may)
+    }
+
+    /// The result file, once nobody can write to it any more; what is wrong with it is the run's fault.
+    fn collect(&self, prepared: &Prepared, ran: &mut Ran) -> Vec<u8> {
+        if ran.fault.is_some() {
+            return Vec::new();
+        }
+        if let Some(changed) = prepared.staged.changed() {
+            let changed = changed.display();
+            ran.fault = Some(format!(
+                "has changed its copy of {changed}, and judged something else"
+            ));
+            return Vec::new();
+        }
+        for (application, result) in &prepared.sections {
+            let path = prepared.directory.join(result);
+            match self.read(&path, &prepared.config) {
+                Ok(None) => {}
+                Ok(Some(bytes)) => {
+                    ran.application = Some(application.clone());
+                    return bytes;
+                }
+                Err(why) => {
+                    ran.fault = Some(why);
+                    return Vec::new();
+                }
+            }
+        }
+        Vec::new()
+    }
+
+    fn read(&self, path: &Path, config: &Path) -> Result<Option<Vec<u8>>, String> {
+        let unreadable = |error: &io::Error| format!("left a result that cannot be read: {error}");
+        let found = match std::fs::symlink_metadata(path) {
+            Ok(found) => found,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(unreadable(&error)),
+        };
+        if !found.is_file() {
+            return Err("left something as its result that is no file".to_owned());
+        }
+        let modified = |it: &Path| std::fs::metadata(it).and_then(|it| it.modified());
+        // On the same disk, so by the same clock.
+        if let (Ok(config), Ok(result)) = (modified(config), found.modified())
+            && result < config
+        {
+            return Err("left a result that is older than its run".to_owned());
+        }
+        let bytes = qcbus_disk::foreign::read(path, self.hosted.limits.output);
+        bytes.map(Some).map_err(|error| unreadable(&error))
+    }
+}

@@ -1,0 +1,279 @@
+//! Models of linked documents that are kept from job to job: a hundred scenarios on one map read
+//! its roads once.
+
+use std::any::{Any, TypeId};
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+
+use qcbus_document::Image;
+
+/// A model of a document that others refer to, such as the road network of a scenario's map.
+/// Rules get it by [`crate::Linked::cached`].
+///
+/// It outlives the check for which it was built, so it owns the image that it was made of. A model
+/// that borrows from a document is put beside its image in one value, as `self_cell` does.
+///
+/// Whatever a rule finds must not depend on whether a model was built for it or was there: it is
+/// the same for the same image, and may only remember what it has found out about that image.
+pub trait LinkedModel: Send + Sync + Sized + 'static {
+    /// Builds the model. Does no I/O; `None` when nothing can be made of the image.
+    fn build(image: Image) -> Option<Self>;
+}
+
+/// Models that are kept between two jobs at most. Each holds its image, and with it a slot of the
+/// bus's large class, of which the jobs under way need their share.
+const MOST: usize = 2;
+/// Bytes of their images at most.
+const MOST_BYTES: usize = 256 << 20;
+/// The model of an image of fewer bytes is made anew in less time than it takes to send a result.
+const WORTH_KEEPING: usize = 512 << 10;
+
+/// Tells images apart: no two that are given to the same [`CachedModels`] have the same one, whatever
+/// lies between them.
+pub(crate) type ImageId = (u64, u64);
+
+/// The models of one process, or of one check where there is no next.
+#[derive(Clone, Default)]
+pub(crate) struct CachedModels(Arc<Mutex<Vec<Arc<Cached>>>>);
+
+/// The models of one job: those that it has asked for, as long as it lasts, whatever other jobs do
+/// meanwhile.
+#[derive(Clone, Default)]
+pub(crate) struct JobModels {
+    cached: CachedModels,
+    own: Arc<Mutex<Vec<Arc<Cached>>>>,
+}
+
+/// One model, for which those that ask for it at the same time have one place.
+struct Cached {
+    of: ImageId,
+    kind: TypeId,
+    bytes: usize,
+    /// Built by the first who asks; `None` inside when nothing can be made of the image.
+    model: OnceLock<Option<Arc<dyn Any + Send + Sync>>>,
+}
+
+impl JobModels {
+    /// The model of an image, built if nobody has.
+    pub(crate) fn get<M: LinkedModel>(&self, of: ImageId, image: &Image) -> Option<Arc<M>> {
+        let place = {
+            let mut own = lock(&self.own);
+            match find::<M>(&own, of) {
+                Some(at) => own[at].clone(),
+                None => {
+                    let place = self.cached.place::<M>(of, image);
+                    own.push(place.clone());
+                    place
+                }
+            }
+        };
+        // Unlocked: a model may ask for another one, and may panic. Then the next who asks builds it.
+        let build = || Some(Arc::new(M::build(image.clone())?) as Arc<dyn Any + Send + Sync>);
+        place.model.get_or_init(build).clone()?.downcast().ok()
+    }
+
+    /// The job is over: what is worth its memory until the next one is kept.
+    pub(crate) fn keep(&self) {
+        self.cached.tidy();
+    }
+}
+
+impl CachedModels {
+    /// For one job.
+    pub(crate) fn for_job(&self) -> JobModels {
+        JobModels {
+            cached: self.clone(),
+            own: Arc::default(),
+        }
+    }
+
+    /// The place of a model, and puts it last: the first were not used for longest.
+    fn place<M: LinkedModel>(&self, of: ImageId, image: &Image) -> Arc<Cached> {
+        let mut models = lock(&self.0);
+        let place = match find::<M>(&models, of) {
+            Some(at) => models.remove(at),
+            None => Arc::new(Cached {
+                of,
+                kind: TypeId::of::<M>(),
+                bytes: image.len(),
+                model: OnceLock::new(),
+            }),
+        };
+        models.push(place.clone());
+        place
+    }
+
+    /// What is not worth its memory until the next job goes.
+    fn tidy(&self) {
+        let mut models = lock(&self.0);
+        models.retain(|cached| {
+            cached.bytes >= WORTH_KEEPING && !matches!(cached.model.get(), Some(None))
+        });
+        let surplus = models.len().saturating_sub(MOST);
+        models.drain(..surplus);
+        while models.iter().map(|cached| cached.bytes).sum::<usize>() > MOST_BYTES {
+            models.remove(0);
+        }
+    }
+
+    /// Drops all models, and with them its hold on images. Jobs that are under way have theirs.
+    pub(crate) fn clear(&self) {
+        lock(&self.0).clear();
+    }
+
+    /// How many there are.
+    #[cfg(test)]
+    pub(crate) fn len(&self) -> usize {
+        lock(&self.0).len()
+    }
+}
+
+fn find<M: LinkedModel>(models: &[Arc<Cached>], of: ImageId) -> Option<usize> {
+    let kind = TypeId::of::<M>();
+    models.iter().position(|it| it.of == of && it.kind == kind)
+}
+
+fn lock(models: &Mutex<Vec<Arc<Cached>>>) -> MutexGuard<'_, Vec<Arc<Cached>>> {
+    models.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl fmt::Debug for CachedModels {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("KeptModels").finish_non_exhaustive()
+    }
+}
+
+impl fmt::Debug for JobModels {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("JobModels").finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// The first byte of an image, and which of several models of it this is.
+    #[derive(Debug, PartialEq)]
+    pub(crate) struct First(u8);
+
+    impl LinkedModel for First {
+        fn build(image: Image) -> Option<First> {
+            image.first().copied().map(First)
+        }
+    }
+
+    struct Len(usize);
+
+    impl LinkedModel for Len {
+        fn build(image: Image) -> Option<Len> {
+            Some(Len(image.len()))
+        }
+    }
+
+    struct Slow;
+
+    impl LinkedModel for Slow {
+        fn build(_: Image) -> Option<Slow> {
+            // So that the others ask meanwhile.
+            for _ in 0..1000 {
+                std::thread::yield_now();
+            }
+            Some(Slow)
+        }
+    }
+
+    struct Panics;
+
+    impl LinkedModel for Panics {
+        fn build(_: Image) -> Option<Panics> {
+            panic!("on purpose")
+        }
+    }
+
+    /// Memory that nobody writes to costs nothing.
+    pub(crate) fn image(first: u8, bytes: usize) -> Image {
+        let mut all = vec![0; bytes];
+        all.iter_mut().take(1).for_each(|byte| *byte = first);
+        Image::new(all)
+    }
+
+    fn large(first: u8) -> Image {
+        image(first, WORTH_KEEPING)
+    }
+
+    #[test]
+    fn a_model_is_built_once_for_each_image() {
+        let models = CachedModels::default();
+        let one = models.for_job().get::<First>((1, 1), &large(1)).unwrap();
+        models.tidy();
+        // Another generation has another document of that number.
+        let two = models.for_job().get::<First>((2, 1), &large(2)).unwrap();
+        models.tidy();
+        assert_eq!((&*one, &*two), (&First(1), &First(2)));
+        let job = models.for_job();
+        let again = job.get::<First>((1, 1), &large(1)).unwrap();
+        assert!(Arc::ptr_eq(&one, &again));
+        assert_eq!(job.get::<Len>((1, 1), &large(1)).unwrap().0, large(1).len());
+    }
+
+    #[test]
+    fn the_images_used_last_are_kept() {
+        let models = CachedModels::default();
+        let id = |number: u8| (1, u64::from(number));
+        let of =
+            |job: &JobModels, number: u8| job.get::<First>(id(number), &large(number)).unwrap();
+        let get = |number: u8| of(&models.for_job(), number);
+        let one = get(1);
+        get(2);
+        get(1);
+        get(3);
+        assert_eq!(models.len(), 3, "while the job lasts");
+        models.tidy();
+        assert_eq!(models.len(), MOST);
+        assert!(Arc::ptr_eq(&get(1), &one), "used after the second");
+        assert_eq!(models.len(), MOST);
+        get(2);
+        assert_eq!(models.len(), MOST + 1, "built anew");
+        models.clear();
+        assert!(!Arc::ptr_eq(&get(1), &one));
+    }
+
+    #[test]
+    fn what_is_small_or_enormous_is_kept_for_its_job_only() {
+        for bytes in [1, WORTH_KEEPING - 1, MOST_BYTES + 1] {
+            let models = CachedModels::default();
+            let image = image(1, bytes);
+            let job = models.for_job();
+            let one = job.get::<First>((1, 1), &image).unwrap();
+            // Another job ends meanwhile.
+            models.for_job().keep();
+            assert_eq!(models.len(), 0, "{bytes}");
+            let again = job.get::<First>((1, 1), &image).unwrap();
+            assert!(Arc::ptr_eq(&one, &again));
+        }
+    }
+
+    #[test]
+    fn two_jobs_that_ask_at_once_build_one_model() {
+        let models = CachedModels::default();
+        let image = large(1);
+        let got: Vec<Arc<Slow>> = std::thread::scope(|scope| {
+            let ask = || models.for_job().get::<Slow>((1, 1), &image).unwrap();
+            let threads: Vec<_> = (0..4).map(|_| scope.spawn(ask)).collect();
+            threads.into_iter().map(|it| it.join().unwrap()).collect()
+        });
+        assert!(got.iter().all(|it| Arc::ptr_eq(it, &got[0])));
+    }
+
+    #[test]
+    fn without_a_model_there_is_nothing_to_keep() {
+        let models = CachedModels::default();
+        let job = models.for_job();
+        assert!(job.get::<First>((1, 1), &image(1, 0)).is_none());
+        let asked = std::panic::AssertUnwindSafe(|| job.get::<Panics>((1, 1), &large(1)));
+        assert!(std::panic::catch_unwind(asked).is_err());
+        models.clear();
+        assert!(models.for_job().get::<First>((1, 1), &large(1)).is_some());
+    }
+}

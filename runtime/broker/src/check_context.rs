@@ -1,0 +1,131 @@
+//! Under what a broker checks files, so that a run of `check` knows whether one that is there would find what it would
+//! find itself.
+
+use qcbus_messages::Digest;
+use qcbus_messages::control::CheckContext;
+use sha2::{Digest as _, Sha256};
+
+use crate::core::{ChildSpec, Settings};
+use crate::options::Options;
+
+/// Takes from the command of a bundle what changes nothing that it finds.
+const WITHOUT: &str = "--threads";
+
+/// The terms of a broker that was told `options` and has a configuration of this digest in force. `children` are those
+/// that it starts. Only brokers of the same program can be compared: the digests are over what its types look like.
+pub fn check_context(options: &Options, config: Digest, children: &[ChildSpec]) -> CheckContext {
+    let general = format!(
+        "{config}{:?}{:?}{:?}{:?}{}",
+        options.dialect,
+        options.sandbox,
+        options.memory_limit,
+        options.limits,
+        of_settings(&options.settings)
+    );
+    let bundles = children.iter().filter(|it| it.judges());
+    CheckContext {
+        general: digest(&general),
+        bundles: bundles
+            .map(|spec| (spec.name.clone(), digest(&how_started(spec))))
+            .collect(),
+    }
+}
+
+/// Whether who offers `ours` finds what somebody asks for under `asked`; if not, why not, for a person.
+pub fn differs(ours: &CheckContext, asked: &CheckContext) -> Option<&'static str> {
+    if ours.general != asked.general {
+        return Some(
+            "it works with another configuration, other limits or another form of results",
+        );
+    }
+    let same = |(name, digest): (&String, &String)| ours.bundles.get(name) == Some(digest);
+    if asked.bundles.is_empty() || !asked.bundles.iter().all(same) {
+        return Some("it has not the same bundles, or starts them otherwise");
+    }
+    None
+}
+
+fn of_settings(settings: &Settings) -> String {
+    let Settings {
+        job_deadline,
+        silence_limit,
+        max_issues,
+        max_facts,
+        max_pending_bytes,
+        max_text,
+        room_limit,
+        ..
+    } = settings;
+    let limits = [max_issues, max_facts, max_pending_bytes, max_text];
+    format!("{job_deadline:?}{silence_limit:?}{room_limit:?}{limits:?}")
+}
+
+fn how_started(spec: &ChildSpec) -> String {
+    let mut command = spec.command.clone();
+    if let Some(at) = command.iter().position(|it| it == WITHOUT) {
+        command.drain(at..command.len().min(at + 2));
+    }
+    format!("{:?}{command:?}{:?}", spec.version, spec.may)
+}
+
+fn digest(text: &str) -> String {
+    Digest(Sha256::digest(text).into()).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use qcbus_formats::manifest::May;
+    use qcbus_messages::Role;
+
+    use super::*;
+    use crate::core::Restart;
+
+    fn spec(name: &str, arguments: &[&str]) -> ChildSpec {
+        ChildSpec {
+            name: name.to_owned(),
+            role: Role::Bundle,
+            version: Some("1".to_owned()),
+            command: arguments.iter().map(|it| (*it).to_owned()).collect(),
+            restart: Restart::Always,
+            may: May::default(),
+            programs: Vec::new(),
+            shadow: false,
+            slow_start: false,
+        }
+    }
+
+    fn of(bundles: &[ChildSpec]) -> CheckContext {
+        let digests = bundles
+            .iter()
+            .map(|it| (it.name.clone(), digest(&how_started(it))));
+        CheckContext {
+            general: String::new(),
+            bundles: digests.collect(),
+        }
+    }
+
+    #[test]
+    fn bundles_that_are_started_otherwise_are_others() {
+        let ours = of(&[spec("a", &["a", "--threads", "4"]), spec("b", &["b"])]);
+        let same = [spec("a", &["a"])];
+        assert_eq!(differs(&ours, &of(&same)), None);
+        let others = [
+            vec![],
+            vec![spec("c", &["c"])],
+            vec![spec("a", &["a", "--schema-dir", "x"])],
+            vec![ChildSpec {
+                version: Some("2".to_owned()),
+                ..spec("a", &["a"])
+            }],
+            vec![spec("a", &["a"]), spec("c", &["c"])],
+        ];
+        for other in others {
+            assert!(differs(&ours, &of(&other)).is_some(), "{other:?}");
+        }
+        let other = CheckContext {
+            general: "other".to_owned(),
+            ..of(&same)
+        };
+        assert!(differs(&ours, &other).is_some());
+    }
+}

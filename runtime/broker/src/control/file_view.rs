@@ -1,0 +1,63 @@
+//! Whether a broker would see what its client sees.
+
+use std::fs::Metadata;
+use std::os::unix::fs::MetadataExt;
+
+use qcbus_bus::Process;
+
+/// Whether another process is this very program, with our rights and with the same files in the same places.
+/// What cannot be seen is not the same.
+pub(super) fn is_like_us(process: &Process) -> bool {
+    let of = |id: &str, what: &str| std::fs::metadata(format!("/proc/{id}/{what}")).ok();
+    let file_view = |what: &str, is: fn(&Metadata, &Metadata) -> bool| {
+        let id = process.id().to_string();
+        let both = of(&id, what).zip(of("self", what));
+        both.is_some_and(|(theirs, ours)| is(&theirs, &ours))
+    };
+    let same_file = |a: &Metadata, b: &Metadata| (a.dev(), a.ino()) == (b.dev(), b.ino());
+    may_what_we_may(process)
+        && file_view("exe", same_file)
+        && file_view("ns/mnt", same_file)
+        && file_view("root", same_file)
+        // Its id was not given to somebody else meanwhile.
+        && process.is_alive()
+}
+
+/// Whether another process has the rights that this one has: with others it reads what we cannot, or cannot what we can.
+fn may_what_we_may(process: &Process) -> bool {
+    let of = |id: &str| std::fs::read_to_string(format!("/proc/{id}/status")).ok();
+    let both = of(&process.id().to_string()).zip(of("self"));
+    both.is_some_and(|(theirs, ours)| rights(&theirs).eq(rights(&ours)))
+}
+
+/// Of what `/proc` says of a process, what it may.
+fn rights(status: &str) -> impl Iterator<Item = &str> {
+    let counts = ["Uid:", "Gid:", "Groups:", "CapEff:"];
+    let lines = status.lines();
+    lines.filter(move |line| counts.iter().any(|it| line.starts_with(it)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_program_is_not_like_us() {
+        let own = Process::open(std::process::id(), None).unwrap();
+        assert!(is_like_us(&own));
+        let mut other = std::process::Command::new("sleep")
+            .arg("1000")
+            .spawn()
+            .unwrap();
+        let process = Process::open(other.id(), None).unwrap();
+        // Until it is another program it is a copy of this one.
+        let exe = || std::fs::read_link(format!("/proc/{}/exe", other.id())).unwrap();
+        while exe() == std::env::current_exe().unwrap() {
+            std::thread::yield_now();
+        }
+        assert!(!is_like_us(&process));
+        other.kill().unwrap();
+        other.wait().unwrap();
+        assert!(!is_like_us(&process));
+    }
+}

@@ -1,0 +1,86 @@
+//! Bundles that must judge and are not there: how long they are waited for, and what their share of
+//! a job comes to.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use qcbus_messages::JobId;
+
+use super::State;
+use super::jobs::TaskState;
+use super::required_set::Origin;
+
+impl State {
+    /// Fails the shares of bundles that are not there and will not come in time.
+    pub(super) fn fail_missing(&mut self) {
+        let names: BTreeSet<String> = self
+            .jobs
+            .values()
+            .flat_map(|job| job.tasks.iter())
+            .filter(|(_, task)| task.state == TaskState::Queued)
+            .map(|(name, _)| name.clone())
+            .collect();
+        for name in names {
+            if let Some(why) = self.hopeless(&name) {
+                self.fail_queued(&name, &why);
+            }
+        }
+    }
+
+    /// Why there is no use in waiting for this bundle, if there is none.
+    pub(super) fn hopeless(&self, name: &str) -> Option<String> {
+        let Some(bundle) = self.bundles.get(name) else {
+            let text = format!("the configuration demands {name}, which has not joined");
+            return (!self.child_is_coming(name)).then_some(text);
+        };
+        if let Some(why) = self.is_flapping(name, bundle) {
+            return Some(why);
+        }
+        let away = self.away_for(bundle)?;
+        let note = &bundle.note;
+        if let Some(why) = self.child_cannot_start(name) {
+            Some(format!("{name} cannot be started: {why}"))
+        } else if self.child_gave_up(name) {
+            Some(format!(
+                "{name} keeps failing and is not started for the time being: {note}"
+            ))
+        } else if away < self.patience_with(name) {
+            None
+        } else if bundle.origin == Some(Origin::Joined) {
+            Some(format!(
+                "{name} is not there: {note}; if it need not judge any more: `qcbus bundle remove \
+                 {name}`"
+            ))
+        } else {
+            Some(format!("{name} is not there: {note}"))
+        }
+    }
+
+    /// How long a bundle that is not there is waited for: one that starts slowly as long as it may take to start.
+    fn patience_with(&self, name: &str) -> Duration {
+        let child = self.children.get(name);
+        let slow = child.filter(|it| it.spec.slow_start && self.child_is_coming(name));
+        let limit = self.settings.absence_limit;
+        slow.map_or(limit, |it| it.start_limit().max(limit))
+    }
+
+    fn fail_queued(&mut self, name: &str, why: &str) {
+        if let Some(bundle) = self.bundles.get_mut(name) {
+            bundle.queue.clear();
+            bundle.quarantine.clear();
+        }
+        let ids: Vec<JobId> = self.jobs.keys().copied().collect();
+        for id in ids {
+            let task = self
+                .jobs
+                .get_mut(&id)
+                .and_then(|job| job.tasks.get_mut(name))
+                .filter(|task| task.state == TaskState::Queued);
+            if let Some(task) = task {
+                task.state = TaskState::Failed(why.to_owned());
+                task.missing = true;
+                self.finish_if_over(id);
+            }
+        }
+    }
+}

@@ -1,0 +1,294 @@
+//! Errands: checks that clients ask for, of any file that this broker may read.
+//!
+//! An errand is a job like others, without anything that lasts: no verdict that stands, no result among the others,
+//! no gate, no journal, no reporter. Whoever asked gets what a run of its own would find, or is told to
+//! make one: that is what becomes of all that would be otherwise here than there.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use qcbus_document::FileKind;
+use qcbus_messages::control::{Checked, Response};
+use qcbus_messages::{Absence, JobId, MissingDocument};
+
+use super::action::Action;
+use super::files::{FileId, Priority, Stage};
+use super::jobs::{ActiveJob, JobStage, TaskState};
+use super::required_set::{Origin, Requirement};
+use super::trials::TrialEnd;
+use super::types::RequestId;
+use super::{Actions, Phase, State};
+
+/// What a client asked for.
+#[derive(Debug, Clone)]
+pub struct OnDemand {
+    /// The client.
+    pub request_id: RequestId,
+    /// The bundles that are to look at the file, and nobody else.
+    pub bundles: Arc<[String]>,
+}
+
+/// What became of an errand whose file was checked.
+#[derive(Debug, Clone, PartialEq)]
+pub enum OnDemandOutcome {
+    /// Here is what was found.
+    Pooled(Box<Checked>),
+    /// This is what a shadow found.
+    Tried(TrialEnd),
+    /// The file has changed since it was read.
+    Stale,
+    /// Others must judge by now, or otherwise.
+    Outdated,
+    /// It cannot be told; the reason is for a person.
+    Failed(String),
+}
+
+/// The errands that are under way, by client.
+pub(super) type OnDemandChecks = BTreeMap<RequestId, FileId>;
+
+impl State {
+    /// A client wants a file checked.
+    pub(super) fn on_demand(
+        &mut self,
+        path: &Arc<Path>,
+        on_demand: OnDemand,
+        actions: &mut Actions,
+    ) {
+        let request_id = on_demand.request_id;
+        let kind = match self.takes_on_demand(path, &on_demand) {
+            Ok(kind) => kind,
+            Err(reason) => return elsewhere(request_id, reason, actions),
+        };
+        let id = self.files.insert_on_demand(path, kind, on_demand);
+        self.on_demand_checks.insert(request_id, id);
+        self.files.enqueue(id, Priority::OnDemand, self.now);
+    }
+
+    /// Whether a job is done for a client alone.
+    pub fn is_on_demand(&self, job: JobId) -> bool {
+        self.jobs.get(&job).is_some_and(|it| it.on_demand.is_some())
+    }
+
+    fn takes_on_demand(&self, path: &Path, on_demand: &OnDemand) -> Result<FileKind, String> {
+        if self.phase != Phase::Running {
+            return Err("the broker is stopping".to_owned());
+        }
+        let fails = |name: &&String| !self.is_as_started(name) || self.hopeless(name).is_some();
+        if let Some(name) = on_demand.bundles.iter().find(fails) {
+            return Err(format!("{name} is not there"));
+        }
+        FileKind::of_path(path).ok_or_else(|| "it is no file that qcbus checks".to_owned())
+    }
+
+    /// Whether a bundle is there as the very program that is started under its name now.
+    fn is_as_started(&self, name: &str) -> bool {
+        let bundle = self.bundles.get(name);
+        let bundle = bundle.filter(|it| it.origin == Some(Origin::Supervised));
+        let launch = bundle.and_then(|it| it.launch.filter(|_| it.catalogue.is_some()));
+        let child = self.children.get(name);
+        launch
+            .zip(child)
+            .is_some_and(|(launch, child)| launch.is_of(&child.spec))
+    }
+
+    /// Those of the seats that an errand asks for.
+    pub(super) fn requirements_of(&self, job: &ActiveJob) -> Arc<[Requirement]> {
+        let requirements = self.requirements(job.kind);
+        match &job.on_demand {
+            None => requirements,
+            Some(on_demand) if on_demand.request_id.is_trial() => {
+                self.requirements_of_trial(&on_demand.bundles, job.kind)
+            }
+            Some(on_demand) => {
+                let asked =
+                    |requirement: &&Requirement| on_demand.bundles.contains(&requirement.name);
+                requirements.iter().filter(asked).cloned().collect()
+            }
+        }
+    }
+
+    /// An errand whose shares are all there is pooled, if what was found is what whoever asked would find.
+    pub(super) fn pool_on_demand(&mut self, id: JobId, actions: &mut Actions) {
+        let Some(job) = self.jobs.get_mut(&id) else {
+            return;
+        };
+        let Some(on_demand) = job.on_demand.clone() else {
+            return;
+        };
+        job.stage = JobStage::Storing;
+        if on_demand.request_id.is_trial() {
+            return self.pool_trial(id, actions);
+        }
+        let whole = job.tasks.len() == on_demand.bundles.len();
+        // Why a bundle has failed need not lie in the file: another process of it may find what there is.
+        let mut tasks = job.tasks.values();
+        let done = tasks.all(|task| task.state == TaskState::Done);
+        // Whoever asks may have rights that this process has not.
+        let refused = |it: &MissingDocument| matches!(it.why, Absence::Unreadable { .. });
+        let prepared = job.prepared.as_deref();
+        if prepared.is_some_and(|it| it.missing.iter().any(refused)) {
+            let reason = "something that the file refers to cannot be read".to_owned();
+            return self.send_elsewhere(id, reason, actions);
+        }
+        let same = on_demand
+            .bundles
+            .iter()
+            .all(|name| self.is_as_started(name));
+        if whole && done && same {
+            let finished = self.finished(id);
+            actions.extend(finished.map(|it| Action::Pool(Box::new(it))));
+        } else {
+            let reason = "a bundle that is to look at it has failed or is not there".to_owned();
+            self.send_elsewhere(id, reason, actions);
+        }
+    }
+
+    /// What became of an errand after its file was checked.
+    pub(super) fn pooled(&mut self, id: JobId, outcome: OnDemandOutcome, actions: &mut Actions) {
+        let Some(job) = self.jobs.get_mut(&id) else {
+            return;
+        };
+        let Some(on_demand) = job.on_demand.clone() else {
+            return;
+        };
+        let request_id = on_demand.request_id;
+        if !self.on_demand_checks.contains_key(&request_id) {
+            return self.end_job(id, actions);
+        }
+        match outcome {
+            OnDemandOutcome::Pooled(checked) => {
+                self.on_demand_checks.remove(&request_id);
+                let response = Response::Checked(checked);
+                actions.push(Action::Answer {
+                    request_id,
+                    response,
+                });
+                self.end_job(id, actions);
+            }
+            OnDemandOutcome::Tried(found) => {
+                self.on_demand_checks.remove(&request_id);
+                self.trial_ended(request_id, Ok(found));
+                self.end_job(id, actions);
+            }
+            OnDemandOutcome::Stale => self.end_job(id, actions),
+            // The configuration is the same, or the errand would have been dismissed.
+            OnDemandOutcome::Outdated => {
+                job.stage = JobStage::Checking;
+                self.reseat(id, actions);
+            }
+            OnDemandOutcome::Failed(reason) => self.send_elsewhere(id, reason, actions),
+        }
+    }
+
+    /// Ends the job of an errand that cannot be done here.
+    pub(super) fn send_elsewhere(&mut self, id: JobId, reason: String, actions: &mut Actions) {
+        let on_demand = self.jobs.get(&id).and_then(|job| job.on_demand.as_ref());
+        if let Some(request_id) = on_demand.map(|it| it.request_id)
+            && self.on_demand_checks.remove(&request_id).is_some()
+        {
+            if request_id.is_trial() {
+                self.trial_ended(request_id, Err(reason));
+            } else {
+                elsewhere(request_id, reason, actions);
+            }
+        }
+        self.end_job(id, actions);
+    }
+
+    /// The job of an errand is over: it is begun again, unless somebody was answered or has left.
+    pub(super) fn on_demand_is_over(
+        &mut self,
+        file: FileId,
+        request_id: RequestId,
+        actions: &mut Actions,
+    ) {
+        let Some(entry) = self.files.get(file) else {
+            return;
+        };
+        if !self.on_demand_checks.contains_key(&request_id) {
+            self.files.remove(file);
+        } else if request_id.is_trial() {
+            self.on_demand_checks.remove(&request_id);
+            self.files.remove(file);
+            self.put_trial_back(request_id);
+        } else if entry.present {
+            self.files.enqueue(file, Priority::OnDemand, self.now);
+        } else {
+            self.on_demand_checks.remove(&request_id);
+            self.files.remove(file);
+            elsewhere(request_id, "it is not there any more".to_owned(), actions);
+        }
+    }
+
+    /// Nobody who has asked can be answered any more: configuration or bundles are others, so that what would be found
+    /// now is not what was asked for, or the broker has stopped.
+    pub(super) fn dismiss_on_demand(&mut self, reason: &str, actions: &mut Actions) {
+        let request_ids: Vec<RequestId> = self.on_demand_checks.keys().copied().collect();
+        for request_id in request_ids {
+            if request_id.is_trial() {
+                self.put_trial_back(request_id);
+            } else {
+                elsewhere(request_id, reason.to_owned(), actions);
+            }
+            self.abandon(request_id, actions);
+        }
+    }
+
+    /// Nobody needs any more what a client asked for.
+    pub(super) fn abandon(&mut self, request_id: RequestId, actions: &mut Actions) {
+        let Some(file) = self.on_demand_checks.remove(&request_id) else {
+            return;
+        };
+        match self.files.get(file).map(|entry| entry.stage().clone()) {
+            Some(Stage::Active(job)) => {
+                let job = self.jobs.get(&job).map(|it| (job, it.stage));
+                if let Some((job, stage)) = job
+                    && stage.is_before_storing()
+                {
+                    self.end_job(job, actions);
+                }
+            }
+            _ => self.files.remove(file),
+        }
+    }
+
+    /// A bundle died that had errands. They are not tried again: a verdict would keep others from that, but of an errand
+    /// nothing is known when the next one asks, and this bundle is needed by all.
+    pub(super) fn refuse_quarantined(&mut self, actions: &mut Actions) {
+        let quarantined = |job: &ActiveJob| job.tasks.values().any(|task| task.quarantined);
+        let jobs = self.jobs.iter();
+        let quarantine = jobs.filter(|(_, job)| job.on_demand.is_some() && quarantined(job));
+        let quarantine: Vec<JobId> = quarantine.map(|(id, _)| *id).collect();
+        for id in quarantine {
+            if self.try_again(id, actions) {
+                continue;
+            }
+            let reason = "a bundle has failed while it looked at it".to_owned();
+            self.send_elsewhere(id, reason, actions);
+        }
+    }
+
+    /// No new jobs are begun any more: whoever still waits for one makes it himself.
+    pub(super) fn refuse_waiting_on_demand(&mut self, actions: &mut Actions) {
+        let waits = |file: &FileId| {
+            let stage = self.files.get(*file).map(|entry| entry.stage());
+            !matches!(stage, Some(Stage::Active(_)))
+        };
+        let waiting = self.on_demand_checks.iter().filter(|(_, file)| waits(file));
+        let waiting: Vec<(RequestId, FileId)> = waiting.map(|(it, file)| (*it, *file)).collect();
+        for (request_id, file) in waiting {
+            self.on_demand_checks.remove(&request_id);
+            self.files.remove(file);
+            elsewhere(request_id, "the broker is stopping".to_owned(), actions);
+        }
+    }
+}
+
+fn elsewhere(request_id: RequestId, reason: String, actions: &mut Actions) {
+    let response = Response::Elsewhere { reason };
+    actions.push(Action::Answer {
+        request_id,
+        response,
+    });
+}

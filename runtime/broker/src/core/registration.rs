@@ -1,0 +1,265 @@
+//! What bundles say that they are: how much that may be, and how often it may change. Every change has
+//! everything judged again, so one that changes all the time is believed at growing intervals only.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::Duration;
+
+use qcbus_document::FileKind;
+use qcbus_messages::Catalogue;
+use qcbus_messages::shown::moves;
+
+use super::bundles::Bundle;
+use super::notice::Notice;
+use super::required_set::VersionDigest;
+use super::types::Launch;
+use super::{Actions, State};
+
+/// Checkers of one bundle.
+const MOST_CHECKERS: usize = 4096;
+/// Bytes of a catalogue: each result holds all of it that was demanded.
+const MOST_OF_A_CATALOGUE: usize = 1 << 20;
+/// Bytes of a name in it: of a checker, a rule, a parameter, and so on.
+const MOST_OF_A_NAME: usize = 256;
+
+/// Names whose changes are remembered at once.
+const MOST_FLAPPING: usize = 1024;
+/// All bundles that were started by somebody, taken together: no bundle is called so.
+const EVERYBODY: &str = "";
+
+/// How often a name has changed what it is.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Changes {
+    /// Changes that were believed since it was last calm.
+    changes: u32,
+    /// The last of them.
+    last: Duration,
+}
+
+/// What a bundle says that it is, and is not believed yet.
+#[derive(Debug)]
+pub(super) struct Registration {
+    catalogue: Arc<Catalogue>,
+    /// From when it is believed.
+    at: Duration,
+}
+
+impl Changes {
+    /// When the next change may be believed.
+    fn next(&self, forgiven: u32, shortest: Duration, longest: Duration) -> Duration {
+        let Some(beyond) = self.changes.checked_sub(forgiven) else {
+            return self.last;
+        };
+        let pause = shortest.saturating_mul(1 << beyond.min(20));
+        self.last + pause.min(longest)
+    }
+
+    fn is_over(&self, now: Duration, calm: Duration) -> bool {
+        now.saturating_sub(self.last) > calm
+    }
+}
+
+impl State {
+    /// A bundle says what it checks.
+    pub(super) fn catalogue(&mut self, name: &str, catalogue: Catalogue, actions: &mut Actions) {
+        if let Some(why) = unsound(&catalogue) {
+            return self.bundle_fails(name, &why, actions);
+        }
+        let Some(bundle) = self.bundles.get(name) else {
+            return;
+        };
+        if bundle.ready && bundle.catalogue.as_deref() == Some(&catalogue) {
+            return;
+        }
+        let catalogue = Arc::new(catalogue);
+        let waits_until = bundle.registered.as_ref().map(|it| it.at);
+        let version_digest = self.version_digest_of(name, bundle, &catalogue);
+        let is_new = bundle.origin.is_none() && !self.is_shadow(name);
+        let changes = bundle.version_digest != Some(version_digest) || is_new;
+        let at = waits_until.or_else(|| changes.then(|| self.accepted_from(name, bundle)));
+        match at.filter(|at| *at > self.now) {
+            Some(at) => self.distrust(name, Registration { catalogue, at }, actions),
+            None => self.accept(name, catalogue, actions),
+        }
+    }
+
+    /// Takes what bundles have said for true whose pause is over.
+    pub(super) fn accept_registrations(&mut self, actions: &mut Actions) {
+        let now = self.now;
+        let due = self.bundles.iter_mut().filter_map(|(name, bundle)| {
+            let said = bundle.registered.take_if(|it| it.at <= now)?;
+            bundle.session?;
+            Some((name.clone(), said.catalogue))
+        });
+        for (name, catalogue) in due.collect::<Vec<_>>() {
+            self.accept(&name, catalogue, actions);
+        }
+    }
+
+    fn accept(&mut self, name: &str, catalogue: Arc<Catalogue>, actions: &mut Actions) {
+        let Some(bundle) = self.bundles.get(name) else {
+            return;
+        };
+        let changes =
+            bundle.version_digest != Some(self.version_digest_of(name, bundle, &catalogue));
+        if changes || (bundle.origin.is_none() && !self.is_shadow(name)) {
+            self.note_change(name);
+        }
+        if let Some(bundle) = self.bundles.get_mut(name) {
+            bundle.catalogue = Some(catalogue);
+            bundle.ready = true;
+            bundle.registered = None;
+            bundle.note.clear();
+            bundle.accepted_spec = bundle.launch.map(Launch::started);
+            self.is_ready(name);
+            self.enrol(name, actions);
+        }
+    }
+
+    /// Keeps what a restless bundle says for later. It may not judge as what it no longer is.
+    fn distrust(&mut self, name: &str, said: Registration, actions: &mut Actions) {
+        let changes = self.changes.get(name).map_or(0, |it| it.changes);
+        let pause = said.at.saturating_sub(self.now).as_secs_f64();
+        let why = if changes >= self.settings.changes_forgiven {
+            format!(
+                "it has changed what it is or checks {changes} times: everything was judged again \
+                 each time, and it is believed again in {pause:.1} s"
+            )
+        } else {
+            format!(
+                "too many bundles that nobody supervises come and change: it is heard in {pause:.1} s"
+            )
+        };
+        self.take_back(name, false);
+        let Some(bundle) = self.bundles.get_mut(name) else {
+            return;
+        };
+        bundle.ready = false;
+        let is_news = bundle.registered.replace(said).is_none();
+        if is_news {
+            bundle.note.clone_from(&why);
+            let name = name.to_owned();
+            self.notice(Notice::Flapping { name, why }, actions);
+        }
+        self.fail_missing();
+    }
+
+    /// What a bundle would judge as.
+    pub(super) fn version_digest_of(
+        &self,
+        name: &str,
+        bundle: &Bundle,
+        catalogue: &Catalogue,
+    ) -> VersionDigest {
+        let supervised = self.children.contains_key(name);
+        let launch = bundle.launch.filter(|_| supervised);
+        VersionDigest::of(&bundle.version, catalogue, launch.map(Launch::started))
+    }
+
+    /// When a change of this bundle may be believed.
+    fn accepted_from(&self, name: &str, bundle: &Bundle) -> Duration {
+        let settings = &self.settings;
+        let started = bundle.launch.map(Launch::started);
+        if self.children.contains_key(name) && bundle.accepted_spec != started {
+            // The change is not its own: somebody has changed what is started.
+            return self.now;
+        }
+        let of = |name: &str, forgiven: u32, longest: Duration| {
+            let changes = self.changes.get(name);
+            changes
+                .filter(|it| !it.is_over(self.now, settings.calm_after))
+                .map_or(self.now, |it| it.next(forgiven, settings.distrust, longest))
+        };
+        let own = of(name, settings.changes_forgiven, settings.distrust_max);
+        if self.children.contains_key(name) {
+            return own;
+        }
+        let all = settings.changes_forgiven.saturating_mul(8);
+        // For all of them no pause grows long: an honest newcomer pays for the others.
+        own.max(of(EVERYBODY, all, settings.distrust * 4))
+    }
+
+    fn note_change(&mut self, name: &str) {
+        let (now, calm) = (self.now, self.settings.calm_after);
+        self.changes.retain(|_, it| !it.is_over(now, calm));
+        let joined = !self.children.contains_key(name);
+        for of in [Some(name), joined.then_some(EVERYBODY)]
+            .into_iter()
+            .flatten()
+        {
+            if self.changes.len() < MOST_FLAPPING || self.changes.contains_key(of) {
+                let changes = self.changes.entry(of.to_owned()).or_default();
+                changes.changes = changes.changes.saturating_add(1);
+                changes.last = now;
+            }
+        }
+    }
+
+    /// Why a bundle that is there is not asked: it is not believed for the time being.
+    pub(super) fn is_flapping(&self, name: &str, bundle: &Bundle) -> Option<String> {
+        bundle.registered.as_ref()?;
+        let in_the_registry = bundle.session.is_some() && bundle.origin.is_some();
+        in_the_registry.then(|| format!("{name} is not asked for the time being: {}", bundle.note))
+    }
+}
+
+/// Why a catalogue is none, if so.
+fn unsound(catalogue: &Catalogue) -> Option<String> {
+    let ids: BTreeSet<&str> = catalogue.checkers.iter().map(|it| &*it.id).collect();
+    if catalogue.checkers.len() > MOST_CHECKERS {
+        let checkers = catalogue.checkers.len();
+        return Some(format!(
+            "its catalogue names {checkers} checkers; at most {MOST_CHECKERS} are taken"
+        ));
+    }
+    if ids.len() < catalogue.checkers.len() || ids.contains("") {
+        return Some("its catalogue names a checker twice or not at all".to_owned());
+    }
+    let bytes = catalogue_weight(catalogue);
+    if bytes > MOST_OF_A_CATALOGUE {
+        return Some(format!(
+            "its catalogue takes {bytes} bytes; at most {MOST_OF_A_CATALOGUE} are taken"
+        ));
+    }
+    let mut names = names(catalogue);
+    let odd = names.find(|name| name.len() > MOST_OF_A_NAME || name.chars().any(moves))?;
+    let start: String = odd.chars().take(40).collect();
+    Some(format!(
+        "its catalogue has the name {start:?}: names have no control characters and at most \
+         {MOST_OF_A_NAME} bytes"
+    ))
+}
+
+/// Whatever results and people call a thing by.
+fn names(catalogue: &Catalogue) -> impl Iterator<Item = &str> {
+    let checkers = catalogue.checkers.iter().flat_map(|checker| {
+        let params = checker.params.iter().map(|param| param.name.as_str());
+        std::iter::once(&*checker.id)
+            .chain(checker.rule_uids.iter().map(|uid| &**uid))
+            .chain(params)
+    });
+    [&*catalogue.alias, &*catalogue.build_date]
+        .into_iter()
+        .chain(checkers)
+}
+
+/// Roughly the memory that a catalogue holds.
+fn catalogue_weight(catalogue: &Catalogue) -> usize {
+    let texts = |texts: &[&str]| texts.iter().map(|text| 24 + text.len()).sum::<usize>();
+    let kinds = |kinds: &[FileKind]| size_of_val(kinds);
+    let checkers = catalogue.checkers.iter().map(|it| {
+        let uids: Vec<&str> = it.rule_uids.iter().map(|uid| &**uid).collect();
+        let params = it.params.iter();
+        let params = params.map(|it| texts(&[&it.name, &it.default, &it.description]));
+        64 + texts(&[&it.id, &it.description])
+            + texts(&uids)
+            + kinds(&it.kinds)
+            + params.sum::<usize>()
+    });
+    let own = [
+        catalogue.alias.as_str(),
+        catalogue.description.as_str(),
+        catalogue.build_date.as_str(),
+    ];
+    texts(&own) + kinds(&catalogue.kinds) + checkers.sum::<usize>()
+}

@@ -1,0 +1,232 @@
+//! Who must judge a file, and who did.
+
+use std::sync::Arc;
+
+use qcbus_document::FileKind;
+use qcbus_messages::Catalogue;
+use sha2::{Digest as _, Sha256};
+
+/// Counts up with every change of who must judge, or of what is demanded of them. The upper half
+/// is above all that the journal knows, so that a number never comes back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct Epoch(pub u64);
+
+impl Epoch {
+    /// The first epoch of a broker's numbers (`Settings::numbers`).
+    pub fn first_of(numbers: u64) -> Epoch {
+        Epoch(numbers << 32)
+    }
+
+    pub(super) fn next(self) -> Epoch {
+        Epoch(self.0 + 1)
+    }
+}
+
+/// Tells apart versions and catalogues of a bundle: with another one it judges otherwise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct VersionDigest(pub u64);
+
+impl VersionDigest {
+    /// The mark of a version with what it offers; of a child, with what its manifest starts: scripts
+    /// and arguments change without a version.
+    pub fn of(version: &str, catalogue: &Catalogue, started: Option<u64>) -> VersionDigest {
+        let mut hash = Hash::default();
+        hash.list(started, |hash, it| hash.0.update(it.to_le_bytes()));
+        hash.text(version);
+        hash.text(&catalogue.build_date);
+        hash.text(&catalogue.alias);
+        hash.kinds(&catalogue.kinds);
+        hash.list(&catalogue.checkers, |hash, checker| {
+            hash.text(&checker.id);
+            hash.list(checker.rule_uids.iter(), |hash, uid| hash.text(uid));
+            hash.0.update([u8::from(checker.default_on)]);
+            hash.kinds(&checker.kinds);
+            // Another default is another result.
+            hash.list(&checker.params, |hash, param| {
+                hash.text(&param.name);
+                hash.text(&param.default);
+            });
+        });
+        let digest = hash.0.finalize();
+        let first = digest.iter().take(8);
+        VersionDigest(first.fold(0, |number, byte| (number << 8) | u64::from(*byte)))
+    }
+}
+
+/// A hash over parts none of which can be taken for another: a text begins with its length, and
+/// each part of a list with a mark.
+#[derive(Default)]
+struct Hash(Sha256);
+
+impl Hash {
+    fn text(&mut self, text: &str) {
+        self.0.update((text.len() as u64).to_le_bytes());
+        self.0.update(text);
+    }
+
+    fn kinds(&mut self, kinds: &[FileKind]) {
+        self.list(kinds, |hash, kind| hash.0.update([*kind as u8]));
+    }
+
+    fn list<T>(&mut self, parts: impl IntoIterator<Item = T>, each: impl Fn(&mut Hash, T)) {
+        for part in parts {
+            self.0.update([1]);
+            each(self, part);
+        }
+        self.0.update([0]);
+    }
+}
+
+/// One bundle that had to judge a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RequiredBundle {
+    /// Its name.
+    pub name: String,
+    /// What it judged as; `None`: it was not there.
+    pub version_digest: Option<VersionDigest>,
+}
+
+/// The bundles that had to judge a file, by name. A verdict stands as long as the same must.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct RequiredSet(pub Vec<RequiredBundle>);
+
+impl RequiredSet {
+    /// Nobody knows who judged: no verdict of this jury stands.
+    pub fn unknown() -> RequiredSet {
+        // No peer may be called so.
+        let name = "?".to_owned();
+        RequiredSet(vec![RequiredBundle {
+            name,
+            version_digest: None,
+        }])
+    }
+}
+
+/// A bundle that must judge files of a kind, as things are now.
+#[derive(Debug, Clone)]
+pub(super) struct Requirement {
+    pub name: String,
+    pub version: String,
+    /// `None`: nobody has seen it, so nobody knows what it checks.
+    pub catalogue: Option<Arc<Catalogue>>,
+    pub version_digest: Option<VersionDigest>,
+    /// Indexes of the checkers that are to run.
+    pub demanded: Arc<[u32]>,
+}
+
+/// What brought a bundle onto the roster.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Origin {
+    /// A manifest, or it comes with the program: it leaves with its manifest.
+    Supervised,
+    /// It was started by somebody and joined: it leaves by drain, or when somebody removes it.
+    Joined,
+}
+
+impl Origin {
+    /// The word in the journal.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Origin::Supervised => "supervised",
+            Origin::Joined => "joined",
+        }
+    }
+
+    /// The origin of this word.
+    pub fn of(word: &str) -> Option<Origin> {
+        let all = [Origin::Supervised, Origin::Joined];
+        all.into_iter().find(|it| it.as_str() == word)
+    }
+}
+
+/// A bundle on the roster, as the journal remembers it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Member {
+    /// Its name.
+    pub name: String,
+    /// The version that joined last.
+    pub version: String,
+    /// What it offered then, if that can still be read.
+    pub catalogue: Option<Arc<Catalogue>>,
+    /// What brought it.
+    pub origin: Origin,
+}
+
+#[cfg(test)]
+mod tests {
+    use qcbus_document::FileKind;
+    use qcbus_formats::pool::RuleUids;
+    use qcbus_formats::xqar::Level;
+    use qcbus_messages::{CheckerInfo, ParamInfo};
+
+    use super::*;
+
+    #[test]
+    fn a_jury_that_nobody_knows_is_not_one_without_members() {
+        // That one is demanded where nobody checks a kind of file.
+        assert_ne!(RequiredSet::unknown(), RequiredSet::default());
+    }
+
+    #[test]
+    fn epochs_go_up_over_every_restart() {
+        let (first, second) = (Epoch::first_of(1), Epoch::first_of(2));
+        assert!(Epoch::default() < first && first < first.next());
+        assert!(first.next().next() < second);
+    }
+
+    #[test]
+    fn whatever_a_bundle_would_judge_otherwise_has_another_mark() {
+        let checker = CheckerInfo {
+            id: "one".into(),
+            description: "".into(),
+            rule_uids: ["uid"].into_iter().collect(),
+            kinds: vec![FileKind::Xodr],
+            default_on: true,
+            level: Level::Error,
+            params: vec![ParamInfo {
+                name: "tolerance".to_owned(),
+                default: "1".to_owned(),
+                description: String::new(),
+            }],
+        };
+        let catalogue = Catalogue {
+            alias: "mine".to_owned(),
+            build_date: "2026-11-22".to_owned(),
+            kinds: vec![FileKind::Xodr],
+            checkers: vec![checker],
+            ..Catalogue::default()
+        };
+        let changes: [fn(&mut Catalogue); 8] = [
+            |it| it.alias.push('r'),
+            |it| it.build_date.push('1'),
+            |it| it.kinds.push(FileKind::Xosc),
+            |it| it.checkers[0].id = "oner".into(),
+            |it| it.checkers[0].rule_uids = RuleUids::default(),
+            |it| it.checkers[0].kinds.push(FileKind::Xosc),
+            |it| it.checkers[0].default_on = false,
+            |it| it.checkers[0].params[0].default.push('0'),
+        ];
+        let mut version_digests = vec![
+            VersionDigest::of("1", &catalogue, None),
+            VersionDigest::of("2", &catalogue, None),
+            VersionDigest::of("1", &catalogue, Some(7)),
+            VersionDigest::of("1", &catalogue, Some(8)),
+        ];
+        for change in changes {
+            let mut changed = catalogue.clone();
+            change(&mut changed);
+            version_digests.push(VersionDigest::of("1", &changed, None));
+        }
+        assert_eq!(VersionDigest::of("1", &catalogue, None), version_digests[0]);
+        // All of a mark's bits tell them apart.
+        let halves = |shift: u32| {
+            version_digests
+                .iter()
+                .map(move |it| it.0 >> shift & 0xffff_ffff)
+        };
+        for shift in [0, 32] {
+            let different: std::collections::BTreeSet<u64> = halves(shift).collect();
+            assert_eq!(different.len(), version_digests.len());
+        }
+    }
+}

@@ -1,0 +1,383 @@
+//! Errands: what clients have checked for themselves alone.
+
+use qcbus_formats::xqar::Level;
+use qcbus_messages::control::Response;
+use qcbus_messages::{Absence, DocumentRole, MissingDocument};
+
+use super::*;
+
+/// A world in which the child of a manifest can be asked, besides a bundle that joined by hand.
+fn world_that_can_be_asked() -> World {
+    let mut world = World::new();
+    world.join("First");
+    world.child_is_there();
+    world
+}
+
+/// The same, and a client has asked for a file that nobody watches.
+fn world_with_a_client() -> (World, RequestId) {
+    let mut world = world_that_can_be_asked();
+    world.write(8);
+    let request_id = world.ask(8);
+    (world, request_id)
+}
+
+/// Everybody does what there is to do, once; those with errands until they have none.
+fn go_round(world: &mut World) {
+    for n in 0..4 {
+        world.prepare(n, true);
+        world.answer(n);
+        world.store(n, true);
+        world.pool(n, true);
+        world.tell_pooled();
+    }
+}
+
+fn is_checked(world: &World, request_id: RequestId) -> bool {
+    match world.clients.answers.get(&request_id) {
+        Some(Response::Checked(_)) => true,
+        Some(Response::Elsewhere { .. }) => false,
+        other => panic!("there is no answer: {other:?}"),
+    }
+}
+
+fn is_open(world: &World, request_id: RequestId) -> bool {
+    world.clients.open.contains_key(&request_id)
+}
+
+fn jobs_of(world: &World, name: &str) -> usize {
+    let peers = world.peers.values().filter(|it| it.name == name);
+    peers.map(|it| it.jobs.len()).sum()
+}
+
+#[test]
+fn a_client_gets_what_the_bundles_that_it_names_find_in_a_file_that_nobody_watches() {
+    let (mut world, request_id) = world_with_a_client();
+    world.prepare(0, true);
+    assert_eq!(jobs_of(&world, CHILD), 1);
+    assert_eq!(jobs_of(&world, "First"), 0, "it is not named");
+    go_round(&mut world);
+    assert!(is_checked(&world, request_id));
+    world.clients_are_content();
+    assert!(world.judged.is_empty() && world.journal.is_empty());
+    assert!(world.watched.is_empty());
+}
+
+#[test]
+fn a_watched_file_is_judged_by_all_beside_the_errand_of_a_client() {
+    let mut world = world_that_can_be_asked();
+    world.write(0);
+    let request_id = world.ask(0);
+    go_round(&mut world);
+    assert!(is_checked(&world, request_id));
+    assert_eq!(world.names_that_judged(0), [CHILD, "First"]);
+    assert_eq!(world.stored.len(), 1);
+}
+
+#[test]
+fn files_of_clients_do_not_count() {
+    let (mut world, _) = world_with_a_client();
+    world.write(0);
+    world.ask(0);
+    let files = world.state.status().files;
+    assert_eq!((files.total, files.judged), (1, 0));
+    world.settle();
+    let files = world.state.status().files;
+    assert_eq!((files.total, files.judged, files.accepted), (1, 1, 1));
+}
+
+#[test]
+fn who_names_a_bundle_that_is_not_there_as_it_is_started_makes_a_run_of_its_own() {
+    let joined_manually: fn(&mut World) -> RequestId = |world| world.ask_by(8, &[CHILD, "First"]);
+    let unknown: fn(&mut World) -> RequestId = |world| world.ask_by(8, &["Nobody"]);
+    let of_an_older_manifest: fn(&mut World) -> RequestId = |world| {
+        world.manifest(Some(2));
+        world.ask(8)
+    };
+    let without_a_manifest: fn(&mut World) -> RequestId = |world| {
+        world.manifest(None);
+        world.ask(8)
+    };
+    let broken: fn(&mut World) -> RequestId = |world| {
+        let child = world.peers.values().position(|it| it.name == CHILD);
+        world.kill(child.unwrap() as u8);
+        world.pass(Duration::from_secs(1));
+        world.child_ends(ChildEnd::NotStarted("no such program".to_owned()));
+        world.ask(8)
+    };
+    let asks = [
+        joined_manually,
+        unknown,
+        of_an_older_manifest,
+        without_a_manifest,
+        broken,
+    ];
+    for (number, asks) in asks.into_iter().enumerate() {
+        let mut world = world_that_can_be_asked();
+        world.write(8);
+        let request_id = asks(&mut world);
+        assert!(!is_open(&world, request_id), "{number}: at once");
+        assert!(!is_checked(&world, request_id), "{number}");
+        world.clients_are_content();
+    }
+}
+
+#[test]
+fn who_asks_for_what_is_no_file_to_check_or_is_not_there_is_told_so() {
+    let mut world = world_that_can_be_asked();
+    let part = world.ask(10);
+    assert!(!is_checked(&world, part));
+    let missing = world.ask(8);
+    assert!(is_open(&world, missing));
+    world.prepare(0, true);
+    assert!(!is_checked(&world, missing));
+    world.clients_are_content();
+}
+
+#[test]
+fn a_file_that_changes_while_it_is_checked_for_a_client_is_checked_again() {
+    let (mut world, request_id) = world_with_a_client();
+    world.prepare(0, true);
+    world.write(8);
+    world.write(10);
+    while !world.preparing.is_empty() || is_open(&world, request_id) {
+        go_round(&mut world);
+    }
+    assert!(is_checked(&world, request_id));
+}
+
+#[test]
+fn what_cannot_be_read_for_a_client_it_is_to_read_itself() {
+    let failures = [
+        PrepareFailure::Unreadable("no right".to_owned()),
+        PrepareFailure::Moment("too many open files".to_owned()),
+        PrepareFailure::NoRoom("full".to_owned()),
+        PrepareFailure::Busy,
+    ];
+    for failure in failures {
+        let (mut world, request_id) = world_with_a_client();
+        let limit = world.state.settings.room_limit + Duration::from_secs(60);
+        while is_open(&world, request_id) {
+            assert!(world.now < limit, "{failure:?}");
+            match world.preparing.pop() {
+                Some((job, _)) => world.event(Event::Prepared {
+                    job,
+                    result: Err(failure.clone()),
+                }),
+                None => world.pass(Duration::from_millis(50)),
+            }
+        }
+        assert!(!is_checked(&world, request_id), "{failure:?}");
+        world.clients_are_content();
+    }
+}
+
+#[test]
+fn a_client_may_read_what_the_broker_may_not() {
+    let (mut world, request_id) = world_with_a_client();
+    let (job, file) = world.preparing.remove(0);
+    let inputs = world.inputs(file);
+    let result = Ok(Box::new(PreparedJob {
+        basis: basis(&inputs),
+        inputs,
+        racy: false,
+        documents: Vec::new(),
+        missing: vec![MissingDocument {
+            role: DocumentRole::Map,
+            reference: "map.xodr".to_owned(),
+            path: "/private/map.xodr".to_owned(),
+            why: Absence::Unreadable {
+                why: "no right".to_owned(),
+            },
+            level: Level::Warning,
+            referred_at: 0,
+            within: None,
+        }],
+        rests_on: Vec::new(),
+        unwatched: Vec::new(),
+        bytes: 1,
+    }));
+    world.event(Event::Prepared { job, result });
+    world.answer(1);
+    assert!(world.clients.pooling.is_empty());
+    assert!(!is_checked(&world, request_id));
+}
+
+#[test]
+fn a_bundle_that_dies_of_what_a_client_asks_for_dies_of_it_once() {
+    let (mut world, request_id) = world_with_a_client();
+    let waits = world.ask(8);
+    world.prepare(0, true);
+    world.kill(1);
+    assert!(!is_checked(&world, request_id));
+    assert!(is_open(&world, waits), "the bundle did not have it");
+    world.settle();
+    assert!(is_checked(&world, waits));
+}
+
+#[test]
+fn a_bundle_that_does_not_come_back_finds_nothing_for_a_client() {
+    let (mut world, request_id) = world_with_a_client();
+    world.kill(1);
+    world.prepare(0, true);
+    world.pass(Duration::from_secs(1));
+    assert!(is_open(&world, request_id), "it may come back");
+    world.child_ends(ChildEnd::NotStarted("no such program".to_owned()));
+    assert!(!is_checked(&world, request_id));
+    world.clients_are_content();
+}
+
+#[test]
+fn what_became_another_bundle_before_it_was_pooled_found_nothing() {
+    let (mut world, request_id) = world_with_a_client();
+    world.prepare(0, true);
+    world.answer(1);
+    world.pool(0, true);
+    world.manifest(Some(2));
+    world.tell_pooled();
+    assert!(!is_checked(&world, request_id));
+    world.settle();
+    world.clients_are_content();
+}
+
+#[test]
+fn what_was_found_for_a_client_stays_when_others_join_meanwhile() {
+    let (mut world, request_id) = world_with_a_client();
+    world.prepare(0, true);
+    world.answer(1);
+    world.join("Second");
+    world.pool(0, true);
+    world.tell_pooled();
+    assert!(is_open(&world, request_id), "of an older epoch");
+    assert_eq!(jobs_of(&world, CHILD), 0, "nobody is asked twice");
+    world.pool(0, true);
+    world.tell_pooled();
+    assert!(is_checked(&world, request_id));
+}
+
+#[test]
+fn what_a_client_asked_for_counts_for_nothing_under_another_configuration() {
+    for rounds in 0..3 {
+        let (mut world, request_id) = world_with_a_client();
+        if rounds > 0 {
+            world.prepare(0, true);
+        }
+        if rounds > 1 {
+            world.answer(1);
+        }
+        world.step(&Step::Reconfigure(1));
+        assert!(!is_checked(&world, request_id));
+        world.settle();
+        world.clients_are_content();
+    }
+}
+
+#[test]
+fn nothing_is_done_for_a_client_that_has_left() {
+    // While its file waits, is read, is checked, or is pooled.
+    for rounds in 0..4 {
+        let mut world = world_that_can_be_asked();
+        world.write(8);
+        world.state.settings.max_preparing = rounds.min(1);
+        world.ask(8);
+        if rounds > 1 {
+            world.prepare(0, true);
+        }
+        if rounds > 2 {
+            world.answer(1);
+        }
+        world.client_leaves(0);
+        world.prepare(0, true);
+        assert_eq!(jobs_of(&world, CHILD), 0, "{rounds}");
+        world.pool(0, true);
+        world.tell_pooled();
+        assert!(world.state.jobs.is_empty(), "{rounds}");
+        world.clients_are_content();
+    }
+}
+
+#[test]
+fn a_broker_that_stops_finishes_errands_and_begins_none() {
+    let (mut world, begun) = world_with_a_client();
+    world.prepare(0, true);
+    world.state.settings.max_preparing = 0;
+    let waits = world.ask(8);
+    world.event(Event::Drain);
+    assert!(!is_checked(&world, waits));
+    let late = world.ask(8);
+    assert!(!is_checked(&world, late));
+    world.answer(1);
+    world.pool(0, true);
+    world.tell_pooled();
+    assert!(is_checked(&world, begun));
+    world.drain();
+}
+
+#[test]
+fn nobody_is_left_without_an_answer_by_a_broker_that_cannot_finish() {
+    let (mut world, request_id) = world_with_a_client();
+    world.state.settings.job_deadline = Duration::from_secs(1000);
+    world.state.settings.silence_limit = Duration::from_secs(1000);
+    world.prepare(0, true);
+    world.event(Event::Drain);
+    world.pass(world.state.settings.drain_limit + Duration::from_millis(1));
+    world.pass(Duration::from_secs(4));
+    world.pass(Duration::ZERO);
+    assert_eq!(world.stopped, 1);
+    assert!(!is_checked(&world, request_id));
+    world.clients_are_content();
+}
+
+/// A world in which clients ask again as soon as they have an answer, more of them than the child takes at a time.
+fn world_of_busy_clients() -> World {
+    let mut world = world_that_can_be_asked();
+    for file in [8, 9] {
+        world.write(file);
+    }
+    for _ in 0..4 {
+        world.ask(8);
+    }
+    world
+}
+
+/// Whatever can be done at once is, and then the child ends one job.
+fn keep_asking(world: &mut World) {
+    for _ in 0..8 {
+        world.prepare(0, true);
+        world.pool(0, true);
+        world.tell_pooled();
+        if world.clients.open.len() < 4 {
+            world.ask(8);
+        }
+    }
+    world.answer(0);
+    world.answer(1);
+}
+
+#[test]
+fn a_watched_file_gets_its_turn_however_many_clients_ask() {
+    let mut world = world_of_busy_clients();
+    for bundle in world.state.bundles.values_mut() {
+        bundle.capacity = 1;
+    }
+    world.write(0);
+    for _ in 0..20 {
+        keep_asking(&mut world);
+        world.store(0, true);
+        if !world.judged.is_empty() {
+            return;
+        }
+    }
+    panic!("it waits for ever");
+}
+
+#[test]
+fn no_client_waits_for_ever_behind_those_that_came_after_it() {
+    let mut world = world_of_busy_clients();
+    world.state.bundles.get_mut(CHILD).unwrap().capacity = 1;
+    let first: Vec<RequestId> = world.clients.open.keys().copied().collect();
+    for _ in 0..20 {
+        keep_asking(&mut world);
+    }
+    assert!(first.iter().all(|it| !is_open(&world, *it)), "{first:?}");
+}

@@ -1,0 +1,221 @@
+//! Processes that bundles have started and left behind.
+//!
+//! The broker is their next of kin: whatever a child has started, in whatever session or group it has placed itself,
+//! becomes a child of the broker when its parent ends.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use qcbus_bus::Process;
+use rustix::process::{Pid, Signal, WaitOptions, kill_process, waitpid};
+
+use crate::core::Launch;
+use crate::launches::Launches;
+
+/// Children of this process that no bundle has left: it may have had some before it became a broker, as when a script
+/// starts something and then becomes it.
+#[derive(Debug)]
+pub struct Strangers {
+    before: BTreeSet<i32>,
+    /// The first process of a container is given everybody's orphans.
+    is_first: bool,
+}
+
+/// Makes this process the one that orphans are given to. Returns whom to leave alone.
+pub fn adopt() -> Strangers {
+    let strangers = Strangers {
+        before: children(),
+        is_first: std::process::id() == 1,
+    };
+    if let Err(error) = rustix::process::set_child_subreaper(Some(rustix::process::getpid())) {
+        tracing::warn!(%error, "what bundles leave behind cannot be found");
+    }
+    strangers
+}
+
+/// A process as the kernel lists it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Listed {
+    parent: i32,
+    is_dead: bool,
+}
+
+/// All processes.
+fn processes() -> BTreeMap<i32, Listed> {
+    let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    let numbers = entries.filter_map(|entry| entry.file_name().to_str()?.parse::<i32>().ok());
+    numbers
+        .filter_map(|pid| Some((pid, listed(pid)?)))
+        .collect()
+}
+
+fn listed(pid: i32) -> Option<Listed> {
+    let stat =
+        std::fs::read_to_string(Path::new("/proc").join(pid.to_string()).join("stat")).ok()?;
+    // The command stands in parentheses and may contain anything; behind it come state and parent.
+    let (_, rest) = stat.rsplit_once(')')?;
+    let mut fields = rest.split_whitespace();
+    let state = fields.next()?;
+    let parent = fields.next()?.parse().ok()?;
+    Some(Listed {
+        parent,
+        is_dead: matches!(state, "Z" | "X"),
+    })
+}
+
+/// Kills what a process has started, and what that has started. It is to be stopped or killed itself at once after.
+pub fn kill_below(process: &Process) {
+    // It must not come to an end of its own, with a code that says something else, when it misses its children.
+    if let Some(pid) = Pid::from_raw(process.id().cast_signed()) {
+        let _ = kill_process(pid, Signal::STOP);
+    }
+    // What is started while we look is found by looking again; a hostile one may go on for as long as it likes,
+    // so not for ever.
+    for _ in 0..8 {
+        let living = living_below(process.id().cast_signed());
+        if living.is_empty() {
+            return;
+        }
+        living.into_iter().for_each(kill);
+    }
+}
+
+/// Those who live of what a process has started, and of what that has started. By the kernel's lists of children
+/// where it keeps some: to look through all processes of a machine takes milliseconds. A list may lack one while
+/// others of it end; whoever is missed so comes to us when its parent ends, and is found then.
+fn living_below(root: i32) -> Vec<i32> {
+    let is_alive = |pid: &i32| listed(*pid).is_some_and(|it| !it.is_dead);
+    let mut found = BTreeSet::from([root]);
+    let mut open = vec![root];
+    while let Some(parent) = open.pop() {
+        let Some(children) = children_of(&parent.to_string()) else {
+            let all = processes();
+            let below = below(&all, root).into_iter();
+            return below.filter(|it| !all[it].is_dead).collect();
+        };
+        open.extend(children.into_iter().filter(|it| found.insert(*it)));
+    }
+    found.remove(&root);
+    found.into_iter().filter(is_alive).collect()
+}
+
+/// Whether a process was started by another one, or by what that has started.
+pub fn is_below(pid: u32, root: u32) -> bool {
+    let mut pid = pid.cast_signed();
+    // No family is that old; should the kernel's lists change while we look, this ends all the same.
+    for _ in 0..64 {
+        match listed(pid) {
+            Some(found) if found.parent == root.cast_signed() => return true,
+            Some(found) if found.parent > 1 => pid = found.parent,
+            _ => return false,
+        }
+    }
+    false
+}
+
+fn below(all: &BTreeMap<i32, Listed>, root: i32) -> BTreeSet<i32> {
+    let mut found = BTreeSet::from([root]);
+    loop {
+        let children = all
+            .iter()
+            .filter(|(pid, it)| found.contains(&it.parent) && !found.contains(pid));
+        let children: Vec<i32> = children.map(|(pid, _)| *pid).collect();
+        if children.is_empty() {
+            found.remove(&root);
+            return found;
+        }
+        found.extend(children);
+    }
+}
+
+/// Kills and buries orphans: children of this process that are none of `ours`. Those that a start among `ours` has left
+/// on purpose stay as long as it does. Whose it is, its environment tells; one that has none of that is nobody's, unless
+/// it may be a stranger. Returns how many are still there.
+pub fn sweep(
+    ours: &BTreeMap<Launch, Option<u32>>,
+    strangers: &Strangers,
+    launches: &Launches,
+) -> usize {
+    let known = ours.values().flatten().map(|pid| pid.cast_signed());
+    let known: BTreeSet<i32> = known.collect();
+    let mut left = 0;
+    let theirs = |pid: &i32| known.contains(pid) || strangers.before.contains(pid);
+    for pid in children().into_iter().filter(|pid| !theirs(pid)) {
+        let Some(descendant) = listed(pid) else {
+            continue;
+        };
+        if descendant.is_dead {
+            bury(pid);
+            continue;
+        }
+        let is_left = match launches.of_process(pid.unsigned_abs()) {
+            Some(launch) => !ours.contains_key(&launch),
+            None => !strangers.is_first,
+        };
+        if is_left {
+            left += 1;
+            // With what it has started in turn, or that would only be an orphan at the next look.
+            living_below(pid).into_iter().for_each(kill);
+            kill(pid);
+        }
+    }
+    left
+}
+
+/// Whether the kernel lists the children of a process.
+pub fn are_listed() -> bool {
+    let own = std::process::id().to_string();
+    Path::new("/proc/self/task")
+        .join(own)
+        .join("children")
+        .exists()
+}
+
+/// All children of this process.
+fn children() -> BTreeSet<i32> {
+    children_of("self").unwrap_or_else(|| {
+        let own = std::process::id().cast_signed();
+        let all = processes().into_iter();
+        all.filter(|(_, it)| it.parent == own)
+            .map(|(pid, _)| pid)
+            .collect()
+    })
+}
+
+/// All children of a process, whichever of its threads they are listed with. `None`: kernels are built without these
+/// lists, too.
+fn children_of(process: &str) -> Option<BTreeSet<i32>> {
+    let threads = Path::new("/proc").join(process).join("task");
+    let threads = std::fs::read_dir(threads).into_iter().flatten().flatten();
+    let lists = threads.map(|thread| std::fs::read_to_string(thread.path().join("children")));
+    let mut found = BTreeSet::new();
+    for list in lists {
+        match list {
+            Ok(list) => found.extend(
+                list.split_whitespace()
+                    .filter_map(|it| it.parse::<i32>().ok()),
+            ),
+            // The thread has ended meanwhile.
+            Err(error) if error.raw_os_error() == Some(ESRCH) => {}
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound && are_listed() => {}
+            Err(_) => return None,
+        }
+    }
+    Some(found)
+}
+
+const ESRCH: i32 = rustix::io::Errno::SRCH.raw_os_error();
+
+fn kill(pid: i32) {
+    if let Some(pid) = Pid::from_raw(pid) {
+        // It may have ended by itself.
+        let _ = kill_process(pid, Signal::KILL);
+    }
+}
+
+/// Waits for one that has ended. Only for orphans: others are waited for by whoever has started them.
+fn bury(pid: i32) {
+    if let Some(pid) = Pid::from_raw(pid) {
+        let _ = waitpid(Some(pid), WaitOptions::NOHANG);
+    }
+}

@@ -1,0 +1,173 @@
+//! The thread that looks at outputs: when the kernel tells of them, and in turn.
+
+use std::ops::Bound;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use rustix::fs::inotify::ReadFlags;
+
+use super::{Shared, TellLost, Written};
+use crate::core::LostOutput;
+use crate::environment::now;
+use crate::watch::{Told, Tree, Unwatched, below};
+
+/// How often some of the outputs are looked at.
+const INTERVAL: Duration = Duration::from_secs(1);
+
+/// In so many intervals all outputs are looked at once.
+const TURNS: usize = 30;
+
+/// The thread that looks at the outputs.
+pub(super) struct Scanner {
+    shared: Arc<Shared>,
+    tell: TellLost,
+    tree: Tree,
+    /// The last output that was looked at in turn.
+    last: Option<Arc<Path>>,
+    lost: Vec<LostOutput>,
+}
+
+impl Scanner {
+    pub(super) fn new(shared: Arc<Shared>, tell: TellLost) -> Scanner {
+        let mut tree = Tree::default();
+        if let Err(error) = tree.open() {
+            let seconds = TURNS as u64 * INTERVAL.as_secs();
+            tracing::warn!(
+                "changes of results are found within {seconds} s, not at once, because the kernel gives no events: {error}"
+            );
+        }
+        Scanner {
+            shared,
+            tell,
+            tree,
+            last: None,
+            lost: Vec::new(),
+        }
+    }
+
+    pub(super) fn run(mut self) {
+        let mut next_turn = now() + INTERVAL;
+        while !self.shared.is_over.load(Ordering::Acquire) {
+            self.watch_fresh();
+            self.take_events();
+            if now() >= next_turn {
+                self.turn();
+                next_turn = now() + INTERVAL;
+            }
+            if !self.lost.is_empty() {
+                (self.tell)(std::mem::take(&mut self.lost));
+            }
+            self.wait(next_turn);
+        }
+    }
+
+    fn wait(&self, until: Instant) {
+        let rest = until.saturating_duration_since(now());
+        self.shared.bell.wait(self.tree.kernel(), rest);
+    }
+
+    /// Watches directories that have got their first output, and then looks at what is in them: it may have been
+    /// lost before.
+    fn watch_fresh(&mut self) {
+        let fresh = std::mem::take(&mut self.shared.book().fresh);
+        for directory in fresh {
+            match self.tree.watch(&directory) {
+                // The outputs in it are looked at in turn.
+                Ok(()) | Err(Unwatched::NoneLeft | Unwatched::Closed | Unwatched::Refused(_)) => {}
+                Err(Unwatched::Gone) => self.let_go(&directory),
+            }
+            self.look_below(&directory);
+        }
+    }
+
+    /// A directory is not watched any more; the next output in it has it watched again.
+    fn let_go(&mut self, directory: &Path) {
+        self.tree.remove_below(directory);
+        let mut book = self.shared.book();
+        book.directories.retain(|it| !it.starts_with(directory));
+    }
+
+    fn take_events(&mut self) {
+        let events = match self.tree.events() {
+            Ok(events) => events,
+            Err(error) => {
+                tracing::warn!("changes of results cannot be read from the kernel: {error}");
+                Vec::new()
+            }
+        };
+        for told in events {
+            if told.what.contains(ReadFlags::QUEUE_OVERFLOW) {
+                self.look_at_all();
+            }
+            for directory in self.tree.places(&told) {
+                self.event(&directory, &told);
+            }
+        }
+    }
+
+    fn event(&mut self, directory: &Path, told: &Told) {
+        let itself =
+            ReadFlags::DELETE_SELF | ReadFlags::MOVE_SELF | ReadFlags::UNMOUNT | ReadFlags::IGNORED;
+        match &told.name {
+            Some(name) if told.what.contains(ReadFlags::ISDIR) => {
+                let path = directory.join(name);
+                let went = ReadFlags::DELETE | ReadFlags::MOVED_FROM;
+                if told.what.intersects(went) {
+                    self.let_go(&path);
+                }
+                self.look_below(&path);
+            }
+            Some(name) => self.look(&directory.join(name)),
+            None if told.what.intersects(itself) => {
+                self.let_go(directory);
+                self.look_below(directory);
+            }
+            None => {}
+        }
+    }
+
+    fn look(&mut self, output: &Path) {
+        let is_new = |it: &mut Written| !std::mem::replace(&mut it.is_told, true);
+        let lost = self.shared.look(output, is_new);
+        self.lost.extend(lost);
+    }
+
+    fn look_below(&mut self, directory: &Path) {
+        let outputs: Vec<Arc<Path>> = {
+            let book = self.shared.book();
+            let below = below(&book.written, directory);
+            below.map(|(path, _)| path.clone()).collect()
+        };
+        for output in outputs {
+            self.look(&output);
+        }
+    }
+
+    /// Events were lost.
+    fn look_at_all(&mut self) {
+        let all: Vec<Arc<Path>> = self.shared.book().written.keys().cloned().collect();
+        for output in all {
+            self.look(&output);
+        }
+    }
+
+    /// Looks at the few outputs whose turn it is, and removes what could not be removed before.
+    fn turn(&mut self) {
+        qcbus_disk::remove_left();
+        let due: Vec<Arc<Path>> = {
+            let book = self.shared.book();
+            let begin = self.last.take().map_or(Bound::Unbounded, Bound::Excluded);
+            let rest = book
+                .written
+                .range::<Arc<Path>, _>((begin, Bound::Unbounded));
+            let due = book.written.len().div_ceil(TURNS);
+            rest.take(due).map(|(path, _)| path.clone()).collect()
+        };
+        self.last = due.last().cloned();
+        for output in due {
+            self.look(&output);
+        }
+    }
+}

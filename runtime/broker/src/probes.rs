@@ -1,0 +1,220 @@
+//! Threads that look at files of others for those who must not wait for ever.
+
+use std::collections::VecDeque;
+use std::io;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use qcbus_disk::foreign::IoWatchdog;
+
+use crate::environment::{is_simulated, spawn_blocking};
+
+/// How long the system may take to answer about a file. A disk that spins up takes less, one that is
+/// gone answers never.
+pub const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Threads that stay when there is nothing to look at.
+const RESERVE: usize = 4;
+
+/// Sends threads to look at files. Those that do not come back in time are given up.
+#[derive(Debug, Clone)]
+pub struct Probes {
+    io_watchdog: Arc<IoWatchdog>,
+    orders: Arc<Orders>,
+    next: Arc<AtomicU64>,
+    patience: Duration,
+}
+
+impl Default for Probes {
+    fn default() -> Probes {
+        Probes::new(Arc::default(), PATIENCE)
+    }
+}
+
+type Work = Box<dyn FnOnce() + Send>;
+
+#[derive(Default)]
+struct Orders {
+    waiting: Mutex<Waiting>,
+    more: Condvar,
+}
+
+impl std::fmt::Debug for Orders {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Orders").finish_non_exhaustive()
+    }
+}
+
+#[derive(Default)]
+struct Waiting {
+    works: VecDeque<(u64, Work)>,
+    idle: usize,
+}
+
+impl Probes {
+    /// None yet; they are seen by `io_watchdog`, and given up after `patience`.
+    pub fn new(io_watchdog: Arc<IoWatchdog>, patience: Duration) -> Probes {
+        Probes {
+            io_watchdog,
+            orders: Arc::default(),
+            // Jobs are owners, too; their numbers never come here.
+            next: Arc::new(AtomicU64::new(1 << 63)),
+            patience,
+        }
+    }
+
+    /// Has something looked at; the number tells whose visit it is to the lookout.
+    ///
+    /// # Errors
+    /// When no thread can be started.
+    pub fn send(&self, work: impl FnOnce() + Send + 'static) -> io::Result<u64> {
+        let owner = self.next.fetch_add(1, Ordering::Relaxed);
+        if is_simulated() {
+            spawn_blocking(work);
+            return Ok(owner);
+        }
+        let mut waiting = self.orders.lock();
+        if waiting.idle <= waiting.works.len() {
+            let (io_watchdog, orders) = (self.io_watchdog.clone(), self.orders.clone());
+            std::thread::Builder::new()
+                .name("scout".to_owned())
+                .spawn(move || orders.serve(&io_watchdog))?;
+        }
+        waiting.works.push_back((owner, Box::new(work)));
+        drop(waiting);
+        self.orders.more.notify_one();
+        Ok(owner)
+    }
+
+    /// Has something looked at, and waits for what comes of it as long as the system answers.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::TimedOut`] when it does not answer; what comes of it later is dropped.
+    pub fn within<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> io::Result<T> {
+        if is_simulated() {
+            return Ok(work());
+        }
+        let (tell, told) = channel();
+        let owner = self.send(move || {
+            // Whoever has given it up listens no more.
+            let _ = tell.send(work());
+        })?;
+        loop {
+            match told.recv_timeout(self.patience) {
+                Ok(found) => return Ok(found),
+                Err(RecvTimeoutError::Timeout) => {
+                    if self.io_watchdog.is_given_up(owner, self.patience) {
+                        return Err(io::Error::new(io::ErrorKind::TimedOut, NO_ANSWER));
+                    }
+                }
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(io::Error::other("looking at it has failed"));
+                }
+            }
+        }
+    }
+}
+
+const NO_ANSWER: &str = "a file that it depends on has not answered for too long";
+
+impl Orders {
+    fn lock(&self) -> MutexGuard<'_, Waiting> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn serve(&self, io_watchdog: &Arc<IoWatchdog>) {
+        while let Some((owner, work)) = self.next() {
+            let _attendance = io_watchdog.attend(owner);
+            work();
+        }
+    }
+
+    /// Waits for something to do; `None` when there are enough who wait.
+    fn next(&self) -> Option<(u64, Work)> {
+        let mut waiting = self.lock();
+        loop {
+            if let Some(work) = waiting.works.pop_front() {
+                return Some(work);
+            }
+            if waiting.idle >= RESERVE {
+                return None;
+            }
+            waiting.idle += 1;
+            waiting = self
+                .more
+                .wait(waiting)
+                .unwrap_or_else(PoisonError::into_inner);
+            waiting.idle -= 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::process::Command;
+    use std::time::Instant;
+
+    use qcbus_disk::foreign;
+
+    use super::*;
+
+    #[test]
+    fn scouts_come_back_with_what_they_have_seen() {
+        let probes = Probes::default();
+        for number in 0..100 {
+            assert_eq!(probes.within(move || number * 2).unwrap(), number * 2);
+        }
+        let slow = probes.clone();
+        let many = std::thread::scope(|scope| {
+            let all: Vec<_> = (0..20)
+                .map(|number| {
+                    let slow = &slow;
+                    scope.spawn(move || slow.within(move || number).unwrap())
+                })
+                .collect();
+            all.into_iter().map(|it| it.join().unwrap()).sum::<i32>()
+        });
+        assert_eq!(many, 190);
+    }
+
+    #[test]
+    fn a_scout_that_does_not_come_back_is_given_up() {
+        let dir = tempfile::tempdir().unwrap();
+        let pipe = dir.path().join("pipe");
+        assert!(
+            Command::new("mkfifo")
+                .arg(&pipe)
+                .status()
+                .unwrap()
+                .success()
+        );
+        let io_watchdog = Arc::new(IoWatchdog::default());
+        let probes = Probes::new(io_watchdog.clone(), Duration::from_millis(50));
+        let at = pipe.clone();
+        // Nothing of ours waits for a pipe; this does what a disk does that is gone.
+        let lost = probes.within(move || foreign::access(&at, || std::fs::read(&at)));
+        assert_eq!(lost.unwrap_err().kind(), io::ErrorKind::TimedOut);
+        assert_eq!(io_watchdog.hanging(), std::slice::from_ref(&pipe));
+        let found = probes.within(|| Path::new("/").is_dir());
+        assert!(found.unwrap(), "others go on");
+        std::fs::write(&pipe, "at last").unwrap();
+        let begun = Instant::now();
+        while !io_watchdog.hanging().is_empty() {
+            assert!(begun.elapsed() < Duration::from_secs(60), "the watchdog");
+            std::thread::yield_now();
+        }
+    }
+
+    #[test]
+    fn work_that_takes_long_without_waiting_for_a_file_is_not_given_up() {
+        let probes = Probes::new(Arc::default(), Duration::from_millis(1));
+        let slow = probes.within(|| std::thread::sleep(Duration::from_millis(20)));
+        assert!(slow.is_ok());
+    }
+}

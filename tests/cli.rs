@@ -1,0 +1,277 @@
+//! What is typed at a desk must not succeed by doing nothing: bundles that cannot be added, removed
+//! or found, and configurations that ask for what is not there.
+
+#![expect(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails where it stands"
+)]
+
+mod support;
+
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::process::Output;
+
+use support::cli::{Cli, Said};
+use support::content::Content;
+use support::farm::{Farm, zoo};
+use support::watchdog;
+
+/// A program that can be started and joins no bus.
+fn idler(directory: &Path) -> String {
+    let path = directory.join("idler");
+    std::fs::write(&path, "#!/bin/sh\nexec sleep 600\n").unwrap();
+    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+fn refused(said: &Said, cli: &Cli, code: i32, words: &str) {
+    assert_eq!(said.code, Some(code), "{}", said.whole(cli));
+    assert!(said.stderr.contains(words), "{}", said.whole(cli));
+}
+
+fn told(said: &Output) -> (Option<i32>, String) {
+    (
+        said.status.code(),
+        String::from_utf8_lossy(&said.stderr).into_owned(),
+    )
+}
+
+#[test]
+fn a_directory_of_bundles_that_is_not_there_is_refused() {
+    let cli = Cli::new();
+    cli.write("a.xodr", Content::Good(1).bytes());
+    let words = "cannot take bundles from --bundles-d";
+    let said = cli.qcbus(&["check", "a.xodr", "--bundles-d", "/nosuch"]);
+    refused(&said, &cli, 2, words);
+    let said = cli.qcbus(&["check", "a.xodr", "--bundles-d", "a.xodr"]);
+    refused(&said, &cli, 2, words);
+    let said = cli.qcbus(&["serve", ".", "--bundles-d", "/nosuch"]);
+    refused(&said, &cli, 2, words);
+    assert!(!cli.path().join("qcbus-out").exists());
+}
+
+#[test]
+fn a_bundle_whose_program_cannot_be_run_is_not_added() {
+    let cli = Cli::new();
+    cli.write("notes", "no program");
+    for program in [
+        "/nosuch/bundle",
+        "./notes",
+        ".",
+        "surely-no-program-of-PATH",
+    ] {
+        for offline in [&[][..], &["--offline"]] {
+            let words = [&["bundle", "add", "mine", program][..], offline].concat();
+            refused(&cli.qcbus(&words), &cli, 2, "cannot run");
+        }
+    }
+    assert!(!cli.path().join("qcbus-out").exists());
+}
+
+#[test]
+fn without_a_broker_a_bundle_is_added_and_removed_only_by_saying_so() {
+    let cli = Cli::new();
+    let program = idler(cli.path());
+    let add = ["bundle", "add", "mine", &program, "--bundles-d", "d"];
+    refused(&cli.qcbus(&add), &cli, 4, "nothing was done: no broker");
+    assert!(!cli.path().join("d").exists());
+    let said = cli.qcbus(&[&add[..], &["--offline"]].concat());
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
+    assert!(
+        said.stderr
+            .contains("no broker of this instance watches it now")
+    );
+    assert!(cli.path().join("d/mine.json").exists());
+
+    let remove = ["bundle", "remove", "mine", "--bundles-d", "d"];
+    refused(&cli.qcbus(&remove), &cli, 4, "nothing was done: no broker");
+    assert!(cli.path().join("d/mine.json").exists());
+    let offline = [&remove[..], &["--offline"]].concat();
+    assert_eq!(cli.qcbus(&offline).code, Some(0));
+    assert!(!cli.path().join("d/mine.json").exists());
+    refused(&cli.qcbus(&offline), &cli, 2, "no bundle `mine` was added");
+}
+
+#[test]
+fn a_program_is_written_by_its_whole_path() {
+    let cli = Cli::new();
+    idler(cli.path());
+    let add = |program: &str| {
+        let said = cli.qcbus(&["bundle", "add", "mine", program, "--offline"]);
+        assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
+        cli.command_in("qcbus-out/.qcbus/bundles.d/mine.json")
+    };
+    let beside = cli.path().join("./idler");
+    assert_eq!(Path::new(&add("./idler")), beside);
+    let found = add("sh");
+    assert!(found.starts_with('/') && found.ends_with("/sh"), "{found}");
+}
+
+#[test]
+fn a_running_broker_takes_a_bundle_or_nothing_is_added() {
+    let farm = Farm::new();
+    let program = zoo().display().to_string();
+    let elsewhere = farm.base().join("elsewhere");
+    let _broker = farm.serve_ready();
+
+    let elsewhere_named = elsewhere.to_string_lossy();
+    let add = ["bundle", "add", "polite", &program, "polite"];
+    let (code, text) = told(&farm.qcbus(&[&add[..], &["--bundles-d", &elsewhere_named]].concat()));
+    assert_eq!(code, Some(2), "{text}");
+    assert!(text.contains("watches"), "{text}");
+    assert!(!elsewhere.exists());
+
+    let (code, text) = told(&farm.qcbus(&add));
+    assert_eq!(code, Some(0), "{text}");
+    assert!(farm.bundles_d().join("polite.json").exists());
+    // It has been taken before the command ends.
+    let is_known = || {
+        let status = farm.status().unwrap();
+        status.peers.iter().any(|peer| peer.name == "polite")
+    };
+    assert!(is_known());
+
+    let (code, text) = told(&farm.qcbus(&["bundle", "remove", "polite"]));
+    assert_eq!(code, Some(0), "{text}");
+    watchdog::until("the bundle has gone", || (!is_known()).then_some(()));
+    for name in ["polite", "nobody", "xodrBundle"] {
+        let (code, text) = told(&farm.qcbus(&["bundle", "remove", name]));
+        assert_eq!(code, Some(2), "{name}: {text}");
+    }
+
+    // One bad manifest keeps the broker from taking any.
+    std::fs::write(farm.bundles_d().join("broken.json"), "{").unwrap();
+    let (code, text) = told(&farm.qcbus(&add));
+    assert_eq!(code, Some(2), "{text}");
+    assert!(
+        text.contains("nothing was added") && text.contains("broken.json"),
+        "{text}"
+    );
+    assert!(!farm.bundles_d().join("polite.json").exists());
+}
+
+/// Everything that a configuration can name and nobody has.
+const ODD: &str = r#"<Config>
+<Param name="InputFile" value="a.xodr"/>
+<CheckerBundle application="xodr">
+  <Checker checkerId="check_asam_xodr_road_lane_level_true_one_side"/>
+  <Checker checkerId="check_asam_xodr_road_length_sum_geometrie"><Param name="x" value="1"/></Checker>
+  <Checker checkerId="check_asam_xodr_junctions_no_overlap"><Param name="dept" value="1"/></Checker>
+</CheckerBundle>
+<CheckerBundle application="xodrBundel"/>
+<ReportModule application="GitforgeReport"/>
+</Config>"#;
+
+/// Words of what is wrong with it, and the rows.
+const ODDITIES: [(&str, u32); 4] = [
+    (
+        "`check_asam_xodr_road_length_sum_geometrie`; did you mean",
+        5,
+    ),
+    ("no parameter `dept`; did you mean `depth`", 6),
+    ("no bundle is called `xodrBundel`; did you mean", 8),
+    ("no reporter is called `GitforgeReport`", 9),
+];
+
+fn says_it_all(text: &str) {
+    for (words, row) in ODDITIES {
+        let place = format!("config.xml:{row}:");
+        let said = text.lines().any(|line| {
+            line.contains(&place) && line.contains(": warning: ") && line.contains(words)
+        });
+        assert!(said, "{words}: {text}");
+    }
+}
+
+#[test]
+fn what_a_configuration_names_in_vain_is_said_wherever_it_is_used() {
+    let cli = Cli::new();
+    cli.write("a.xodr", Content::Good(1).bytes());
+    cli.write("config.xml", ODD);
+    let said = cli.qcbus(&["config", "check", "config.xml"]);
+    refused(&said, &cli, 2, "not in order, 4 warnings");
+    says_it_all(&said.stdout);
+
+    // The unknown checker and the unknown bundle are demanded, and nobody can run them.
+    let said = cli.qcbus(&["check", "-c", "config.xml", "--quiet"]);
+    assert_eq!(said.code, Some(3), "{}", said.whole(&cli));
+    says_it_all(&said.stderr);
+}
+
+#[test]
+fn a_misspelt_parameter_alone_is_said_and_judges_nothing() {
+    let cli = Cli::new();
+    cli.write("a.xodr", Content::Good(1).bytes());
+    let kept: Vec<&str> = ODD
+        .lines()
+        .filter(|line| !line.contains("geometrie\"") && !line.contains("Bundel"))
+        .filter(|line| !line.contains("Gitforge"))
+        .collect();
+    cli.write("config.xml", kept.join("\n"));
+    let said = cli.qcbus(&["check", "-c", "config.xml"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
+    assert!(
+        said.stderr.contains("did you mean `depth`"),
+        "{}",
+        said.whole(&cli)
+    );
+    assert_eq!(cli.qcbus(&["config", "check", "config.xml"]).code, Some(2));
+
+    cli.write(
+        "config.xml",
+        kept.join("\n").replace("\"dept\"", "\"depth\""),
+    );
+    let said = cli.qcbus(&["config", "check", "config.xml"]);
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
+    let said = cli.qcbus(&["check", "-c", "config.xml"]);
+    assert_eq!(
+        (said.code, said.stderr.contains("warning")),
+        (Some(0), false)
+    );
+}
+
+#[test]
+fn serve_and_reload_say_what_a_configuration_names_in_vain() {
+    let mut farm = Farm::new();
+    let config = farm.base().join("config.xml");
+    std::fs::write(&config, ODD).unwrap();
+    let config_named = config.to_string_lossy().into_owned();
+    farm.arguments.extend(["-c".to_owned(), config_named]);
+    let _broker = farm.serve_ready();
+    let notices = farm.status().unwrap().notices;
+    let texts: Vec<&str> = notices.iter().map(|it| it.text.as_str()).collect();
+    says_it_all(&texts.join("\n"));
+    std::fs::write(&config, ODD.replace("<Config>", "<Config><!-- new -->")).unwrap();
+    let (code, text) = told(&farm.qcbus(&["reload"]));
+    assert_eq!(code, Some(0), "{text}");
+    says_it_all(&text);
+}
+
+#[test]
+fn a_bundle_of_ones_own_is_known_by_its_manifest() {
+    let cli = Cli::new();
+    let program = idler(cli.path());
+    let add = [
+        "bundle",
+        "add",
+        "mine",
+        &program,
+        "--offline",
+        "--bundles-d",
+        "d",
+    ];
+    assert_eq!(cli.qcbus(&add).code, Some(0));
+    let text = r#"<Config><CheckerBundle application="mine"><Checker checkerId="c"/></CheckerBundle></Config>"#;
+    cli.write("config.xml", text);
+    let check = ["config", "check", "config.xml"];
+    refused(&cli.qcbus(&check), &cli, 2, "not in order, 1 warning:");
+    let said = cli.qcbus(&[&check[..], &["--bundles-d", "d"]].concat());
+    assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
+    assert!(
+        said.stdout.contains("is known only when it has joined"),
+        "{}",
+        said.stdout
+    );
+}
