@@ -19,7 +19,7 @@ use support::content::{CATALOG, Content, Mark};
 use support::farm::{Farm, copy_program, tail, zoo};
 use support::inside::skip;
 use support::judge::{Files, judge};
-use support::tracer::{Answer, Kind, Traced, Failure, no_other_answers};
+use support::tracer::{Answer, Failure, Kind, Traced, no_other_answers};
 use support::watchdog::{pause, until_or};
 
 /// A farm whose broker gets other answers.

@@ -419,7 +419,7 @@ fn whoever_is_killed_the_file_is_judged_and_nothing_is_left() {
     // Until it is told to go on a run takes for ever, with children that have gone their own way.
     let script = r#"[ -e "GO" ] || { setsid sh -c "sleep 86399.MARK & sleep 86399.MARK" & sleep 86399.MARK; }
         polite"#;
-    for victim in ["--office", "asam-adapter"] {
+    for victim in ["--runner", "asam-adapter"] {
         let (farm, program, _broker) = farm_with("polite");
         let tmp = farm.base().join("tmp");
         let (go, mark) = (farm.base().join("go"), std::process::id().to_string());

@@ -97,7 +97,7 @@ fn children_stay_what_the_broker_is(replace: impl FnOnce(&Path, &Path)) {
         let listed = std::fs::read_to_string(format!("/proc/{pid}/comm")).unwrap();
         assert_eq!(listed, "qcbus\n", "{name}");
     }
-    let runners = all_with("--office").into_iter();
+    let runners = all_with("--runner").into_iter();
     let guest = farm.base().join("guest").display().to_string();
     let runners = runners.filter(|it| it.words.contains(&guest));
     let speaks_to = |it: Process| std::fs::read_link(format!("/proc/{}/fd/2", it.pid)).ok();

@@ -205,7 +205,7 @@ fn floods_with_huge_messages() {
 fn never_the_same() {
     let (farm, _broker) = beside("never_the_same", "");
     let status = farm.status().unwrap();
-    let restless = status.notices.iter().filter(|it| it.kind == "restless");
+    let restless = status.notices.iter().filter(|it| it.kind == "flapping");
     assert!(restless.count() > 0, "{:#?}", status.notices);
     // An epoch began with each change that was believed: of hundreds, those that were forgiven and a
     // few later ones.

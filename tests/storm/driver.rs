@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use qcbus_messages::control::{PeerStatus, Request, Response};
 use rustix::process::Signal;
 
-use super::failures::{self, ANIMALS, GUESTS, Failure};
+use super::failures::{self, ANIMALS, Failure, GUESTS};
 use super::files::Writer;
 use super::ledger::Ledger;
 use super::tally::Tally;

@@ -6,7 +6,7 @@ use std::time::Duration;
 use qcbus_messages::Verdict;
 
 use super::history::{Seen, Told, What};
-use super::ledger::{Offered, Ledger};
+use super::ledger::{Ledger, Offered};
 use crate::support::content::{Content, STRICT};
 
 /// The bundle of one's own that must judge everything, whatever happens to it.

@@ -127,7 +127,7 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Ask
             Long("memory-mb") => limits.memory = positive(&mut parser)?.saturating_mul(1 << 20),
             Long("output-mb") => limits.output = positive(&mut parser)?.saturating_mul(1 << 20),
             Long("cold") => hosted.is_cold = true,
-            Long("office") => asked.is_runner = true,
+            Long("runner") => asked.is_runner = true,
             Long(option @ ("instance" | "instance-dir" | "launch" | "threads" | "format")) => {
                 asked.rest.push(format!("--{option}").into());
                 asked.rest.push(parser.value()?);

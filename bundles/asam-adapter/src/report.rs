@@ -68,7 +68,7 @@ impl ReportModule {
         let answered = self.runners.ask(&request, &[&bytes]);
         // Whoever started this process starts a new one.
         let answered = answered.unwrap_or_else(|error| {
-            tracing::error!(module = name, %error, "the office is gone");
+            tracing::error!(module = name, %error, "the runner is gone");
             std::process::exit(i32::from(Exit::Internal.code()))
         });
         let (ran, body) =

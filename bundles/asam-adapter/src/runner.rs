@@ -26,7 +26,7 @@ pub(crate) fn serve(hosted: &Hosted) -> Exit {
     match runner(hosted) {
         Ok(()) => Exit::Accepted,
         Err(error) => {
-            tracing::error!(module = hosted.name, %error, "the office cannot go on");
+            tracing::error!(module = hosted.name, %error, "the runner cannot go on");
             Exit::Internal
         }
     }

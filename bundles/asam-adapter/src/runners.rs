@@ -131,7 +131,7 @@ fn start(hosted: &Hosted, program: &[&str]) -> io::Result<Channel> {
     }
     command
         .args(arguments)
-        .arg("--office")
+        .arg("--runner")
         .args(hosted.arguments())
         .stdin(Stdio::from(other.into_socket()))
         .spawn()?;

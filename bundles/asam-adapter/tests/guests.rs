@@ -392,15 +392,15 @@ fn who_is_killed_leaves_no_process_and_the_next_no_directory() {
     }
     // Whatever is left of it in its own directory, and without a word of its command line.
     let script = "sleep $MARK & sleep $MARK";
-    for victim in ["the bus process", "the office"] {
+    for victim in ["the bus process", "the runner"] {
         let guest = Guest::doing(script);
         let child = guest.command(&[]).spawn().unwrap();
         until("it runs", || {
             (processes_with(&guest.mark).len() >= 2).then_some(())
         });
-        let runner = until("the office", || child_of(child.id(), "--office"));
+        let runner = until("the runner", || child_of(child.id(), "--runner"));
         match victim {
-            "the office" => kill(runner),
+            "the runner" => kill(runner),
             _ => kill(child.id().cast_signed()),
         }
         let output = within(child);

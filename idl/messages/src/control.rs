@@ -162,7 +162,7 @@ pub struct BundleReadiness {
 
 /// How the process stands that is wanted of a bundle.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(tag = "standing", rename_all = "kebab-case")]
+#[serde(tag = "readiness", rename_all = "kebab-case")]
 pub enum Readiness {
     /// It has joined, has said what it checks, and is asked from now on.
     Ready,

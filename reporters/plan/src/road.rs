@@ -5,7 +5,7 @@ use qcbus_opendrive::geometry::Cubic;
 
 use crate::frame::{Piece, Rows};
 use crate::origin::Shift;
-use crate::sample::{Sampler, NotDrawn};
+use crate::sample::{NotDrawn, Sampler};
 use crate::section::{self, SectionPlan, TOLERANCE};
 use crate::simplify::{Vertex, profile};
 

@@ -6,7 +6,7 @@ use qcbus_opendrive::{LaneRef, Road, SectionRef, Side};
 use crate::columns::{Flank, mark_starts};
 use crate::frame::{Piece, Rows, valid};
 use crate::origin::Spot;
-use crate::sample::{Sampler, NotDrawn};
+use crate::sample::{NotDrawn, Sampler};
 use crate::simplify::{Vertex, levels, profile};
 
 /// Stations closer together than this, in metres, are one.

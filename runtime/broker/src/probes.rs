@@ -79,7 +79,7 @@ impl Probes {
         if waiting.idle <= waiting.works.len() {
             let (io_watchdog, orders) = (self.io_watchdog.clone(), self.orders.clone());
             std::thread::Builder::new()
-                .name("scout".to_owned())
+                .name("probe".to_owned())
                 .spawn(move || orders.serve(&io_watchdog))?;
         }
         waiting.works.push_back((owner, Box::new(work)));

@@ -61,7 +61,10 @@ impl LauncherEnd {
 /// # Errors
 /// [`SandboxError::Kernel`]: there are threads, or no process can be made. Nothing has been run then, unless it was
 /// a later session that could not be started.
-pub fn run_sessions(unsupervised: bool, session: impl Fn(u32) -> After) -> Result<LauncherEnd, SandboxError> {
+pub fn run_sessions(
+    unsupervised: bool,
+    session: impl Fn(u32) -> After,
+) -> Result<LauncherEnd, SandboxError> {
     if threads() != Some(1) {
         let why = "this process has started threads before";
         return Err(SandboxError::kernel("a session's own process", why));
@@ -184,7 +187,9 @@ impl Signals {
                 done if done == child => {
                     let status = ExitStatus::from_raw(raw);
                     return Ok(match (status.code(), status.signal()) {
-                        (Some(code), _) => LauncherEnd::Ended(u8::try_from(code).unwrap_or(u8::MAX)),
+                        (Some(code), _) => {
+                            LauncherEnd::Ended(u8::try_from(code).unwrap_or(u8::MAX))
+                        }
                         (None, signal) => LauncherEnd::Killed(signal.unwrap_or(libc::SIGKILL)),
                     });
                 }

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use qcbus_bus::{Claims, Instance, JoinError, Peer, PeerEvent, PeerOptions};
-use qcbus_confine::{After, Sandboxed, Orders};
+use qcbus_confine::{After, Orders, Sandboxed};
 use qcbus_document::FileKind;
 use qcbus_formats::manifest::May;
 use qcbus_formats::pool::Ending;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use qcbus_bus::{Instance, PeerOptions, SendSide};
-use qcbus_confine::{After, Sandboxed, Orders, run_sessions};
+use qcbus_confine::{After, Orders, Sandboxed, run_sessions};
 use qcbus_formats::manifest::May;
 
 use super::file::complain;

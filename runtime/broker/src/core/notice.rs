@@ -98,7 +98,7 @@ impl Notice {
             Notice::TurnedAway(_) => "turned-away",
             Notice::Ended { .. } => "ended",
             Notice::Killed { .. } => "killed",
-            Notice::Flapping { .. } => "restless",
+            Notice::Flapping { .. } => "flapping",
             Notice::GaveUp { .. } => "gave-up",
             Notice::NotUpgraded { .. } => "not-upgraded",
             Notice::NoRoom(_) => "no-room",

@@ -10,7 +10,7 @@ CREATE TABLE IF NOT EXISTS files (
     digest   TEXT NOT NULL,         -- of the file's bytes
     basis    TEXT NOT NULL,         -- digest over everything that the verdict depends on
     config   TEXT NOT NULL,         -- digest of the configuration
-    jury     TEXT NOT NULL,         -- JSON list of [bundle, mark]: those who had to judge; null: not there
+    required_set TEXT NOT NULL,     -- JSON list of [bundle, version digest]; null: the bundle was missing
     errors   INTEGER NOT NULL,
     warnings INTEGER NOT NULL,
     information INTEGER NOT NULL,

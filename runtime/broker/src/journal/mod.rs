@@ -31,7 +31,7 @@ use schema::prepare;
 use write::{Change, changes};
 
 /// Version of the schema, kept in SQLite's `user_version`.
-pub const SCHEMA_VERSION: i64 = 5;
+pub const SCHEMA_VERSION: i64 = 6;
 
 /// A file with its verdict, as the journal remembers it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -250,7 +250,7 @@ impl Journal {
             delivered.entry(row.get(0)?).or_default().push(entry);
         }
         let mut query = self.connection.prepare(
-            "SELECT path, job, verdict, digest, basis, config, jury, errors, warnings, \
+            "SELECT path, job, verdict, digest, basis, config, required_set, errors, warnings, \
              information, why, xqar, inputs, racy, epoch, written, own, own_errors, rests_on FROM files ORDER BY path",
         )?;
         let mut rows = query.query([])?;

@@ -51,6 +51,13 @@ pub(super) fn prepare(connection: &Connection, path: &Path) -> Result<(), Journa
                      PRAGMA user_version = 5; COMMIT;";
         connection.execute_batch(newer).map_err(fail)?;
     }
+    if (1..=5).contains(&found) {
+        connection
+            .execute_batch(
+                "BEGIN; ALTER TABLE files RENAME COLUMN jury TO required_set; PRAGMA user_version = 6; COMMIT;",
+            )
+            .map_err(fail)?;
+    }
     connection.set_prepared_statement_cache_capacity(STATEMENTS);
     // WAL with synchronous=NORMAL survives a killed process; after a power cut the last verdicts
     // may be missing, and their files are judged anew.

@@ -141,7 +141,7 @@ fn a_journal_of_schema_1_opens_and_its_stamps_fit_nothing() {
         .execute_batch(
             "DROP VIEW job_checkers; DROP TABLE job_skipped; DROP TABLE checker_lists; \
              ALTER TABLE job_findings RENAME TO job_checkers; \
-             ALTER TABLE files RENAME COLUMN jury TO bundles; \
+             ALTER TABLE files RENAME COLUMN required_set TO bundles; \
              ALTER TABLE files DROP COLUMN epoch; ALTER TABLE files DROP COLUMN written; \
              ALTER TABLE files DROP COLUMN own; ALTER TABLE files DROP COLUMN own_errors; \
              ALTER TABLE files DROP COLUMN rests_on; \

@@ -132,7 +132,7 @@ fn delivery(path: &str, reporter: &str, reported: Reported) -> Change {
 
 fn file(path: &Path, judged: &Judged, written: Option<&FileFingerprint>) -> Change {
     // Whoever writes no verdict file leaves the mark of the one that is there.
-    let sql = "INSERT OR REPLACE INTO files (path, job, verdict, digest, basis, config, jury, errors, \
+    let sql = "INSERT OR REPLACE INTO files (path, job, verdict, digest, basis, config, required_set, errors, \
          warnings, information, why, xqar, inputs, racy, at, epoch, own, own_errors, rests_on, written) \
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, \
          coalesce(?20, (SELECT written FROM files WHERE path = ?1), ''))";

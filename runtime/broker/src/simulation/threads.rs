@@ -70,7 +70,11 @@ impl Task {
 
     fn await_control(&self, mine: bool) {
         let has_control = self.has_control.lock().unwrap();
-        drop(self.changed.wait_while(has_control, |it| *it != mine).unwrap());
+        drop(
+            self.changed
+                .wait_while(has_control, |it| *it != mine)
+                .unwrap(),
+        );
     }
 
     /// Lets it run until it stops the next time. To be called by who has the turn.

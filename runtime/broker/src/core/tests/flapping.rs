@@ -54,7 +54,7 @@ fn changes_without_end_are_believed_less_and_less_often_and_said() {
     let epochs = world.state.epoch().0 - before;
     // Three at once, then with pauses of 2, 4, 8 … 256 s.
     assert_eq!(epochs, 3 + 8, "of 6,000 changes");
-    let flapping = |it: &&(Notice, Duration)| it.0.kind() == "restless";
+    let flapping = |it: &&(Notice, Duration)| it.0.kind() == "flapping";
     assert!(world.state.notices.iter().filter(flapping).count() >= 8);
     let status = world.state.status();
     let first = status.peers.iter().find(|it| it.name == "First").unwrap();

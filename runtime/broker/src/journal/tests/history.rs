@@ -104,6 +104,7 @@ fn the_history_of_schema_3_is_kept() {
              ALTER TABLE job_findings RENAME TO job_checkers; \
              ALTER TABLE files DROP COLUMN own; ALTER TABLE files DROP COLUMN own_errors; \
              ALTER TABLE files DROP COLUMN rests_on; \
+             ALTER TABLE files RENAME COLUMN required_set TO jury; \
              INSERT INTO jobs VALUES (7, '/a', '', '', 'accepted', 0, 0, 0, 1, 1, 1); \
              INSERT INTO job_checkers VALUES (7, 'xodrBundle', 'old', 'skipped', 0); \
              PRAGMA user_version = 3",
@@ -115,6 +116,24 @@ fn the_history_of_schema_3_is_kept() {
     assert_eq!(checkers_of(&journal, 7), [skipped]);
     assert_eq!(journal.prune(Duration::from_secs(60)).unwrap(), 1);
     assert_eq!(checkers_of(&journal, 7), [], "it goes with its job");
+}
+
+#[test]
+fn verdicts_of_schema_5_are_kept() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut journal = Journal::open(dir.path(), "test").unwrap();
+    let entry = with_history(7, history_of(&["old"]));
+    journal.write(&[entry]).unwrap();
+    let before = journal.remembered().unwrap();
+    journal
+        .connection
+        .execute_batch(
+            "ALTER TABLE files RENAME COLUMN required_set TO jury; PRAGMA user_version = 5",
+        )
+        .unwrap();
+    drop(journal);
+    let journal = Journal::open(dir.path(), "test").unwrap();
+    assert_eq!(journal.remembered().unwrap(), before);
 }
 
 #[test]
