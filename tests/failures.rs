@@ -1,4 +1,4 @@
-//! What a person reads when something is wrong: each message says what, and what to do.
+//! Tests of error messages: each message names the problem and the remedy.
 
 #![allow(
     clippy::unwrap_used,
@@ -22,7 +22,7 @@ use support::inside::{is_inside, run_inside};
 use support::processes::signal_pid;
 use support::watchdog::until_or;
 
-/// The words of a run, with this test's own paths, process ids and numbers taken out.
+/// Returns the output of a run without this test's paths, process ids and numbers.
 fn told(farm: &Farm, text: &str) -> String {
     let base = farm.base().to_string_lossy();
     let text = text.replace(&*base, "BASE");
@@ -30,7 +30,7 @@ fn told(farm: &Farm, text: &str) -> String {
     words.collect::<Vec<_>>().join("\n")
 }
 
-/// Process ids and byte counts differ from run to run.
+/// Replaces long numbers, because process ids and byte counts differ from run to run.
 fn without_numbers(line: &str) -> String {
     let mut out = String::new();
     let mut digits = String::new();
@@ -51,7 +51,7 @@ fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// A notice in the status of the broker that begins or goes on like this.
+/// Waits for a notice in the broker's status that contains these words, and returns its text.
 fn notice(farm: &Farm, words: &str) -> String {
     let look = || {
         let notices = farm.status()?.notices;
@@ -90,7 +90,7 @@ fn a_second_broker_on_the_same_instance() {
     assert_eq!(output.status.code(), Some(2));
     insta::assert_snapshot!(told(&farm, &stderr(&output)));
     farm.write("a.xodr", &Content::Good(1).bytes());
-    // The first one has not noticed.
+    // The first broker is not affected.
     farm.verdict("a.xodr");
 }
 
@@ -101,7 +101,7 @@ fn a_bundle_of_another_version() {
     farm.let_in("speaks_another_protocol", "");
     let said = notice(&farm, "turned away");
     let ours = qcbus_messages::PROTOCOL_VERSION;
-    // The animal's is far from it; neither number is what this is about.
+    // The bundle's version is far from the broker's. The test does not depend on either number.
     let words: Vec<&str> = said.split(' ').collect();
     let number = |word: &str| word.trim_end_matches([':', ',']).parse::<u32>().is_ok();
     assert!(words.contains(&&*format!("{ours}:")), "{said}");
@@ -154,7 +154,7 @@ fn a_watched_directory_that_goes_and_comes_back() {
         farm.out().join("a.xodr.xqar").exists(),
         "its results are kept"
     );
-    // What was accepted is not there: nobody is told that it is.
+    // The accepted file is missing, so the broker must not report it as accepted.
     let wait = |timeout_ms| Request::Wait {
         file: farm.root().join("a.xodr"),
         timeout_ms: Some(timeout_ms),
@@ -178,7 +178,7 @@ fn what_takes_the_place_of_a_watched_directory_is_not_said_to_be_gone() {
     let _broker = farm.serve_ready();
     let aside = farm.base().join("aside");
     std::fs::write(&aside, "no directory").unwrap();
-    // At once: otherwise it would be gone in between.
+    // The exchange is atomic. Otherwise the directory would be missing in between.
     let exchange = || {
         let flags = rustix::fs::RenameFlags::EXCHANGE;
         rustix::fs::renameat_with(rustix::fs::CWD, &aside, rustix::fs::CWD, farm.root(), flags)
@@ -189,7 +189,8 @@ fn what_takes_the_place_of_a_watched_directory_is_not_said_to_be_gone() {
     notice(&farm, "is back");
 }
 
-/// A bundle comes, so that every verdict is outdated, and nothing can be read.
+/// Checks that files are judged again after their directory was away. A new bundle makes every
+/// verdict outdated while nothing can be read.
 fn what_must_be_judged_again_while_its_directory_is_away(farm: &Farm, aside: &Path) {
     std::fs::rename(farm.root(), aside).unwrap();
     farm.let_in("polite", "");
@@ -213,7 +214,7 @@ fn a_watched_directory_that_is_not_there() {
     insta::assert_snapshot!(told(&farm, &stderr(&output)));
 }
 
-/// Runs inside what may mount, or says why it cannot.
+/// Runs the test in a namespace where it may mount, or prints why this is not possible.
 fn inside(test: &str, prepare: &str, body: fn()) {
     if is_inside() {
         return body();
@@ -236,12 +237,12 @@ fn an_output_directory_that_cannot_be_written() {
     inside("an_output_directory_that_cannot_be_written", "true", || {
         let mut farm = Farm::new();
         std::fs::create_dir(farm.out()).unwrap();
-        // Root may write anywhere but on a file system that is read-only.
+        // Root may write anywhere except on a read-only file system.
         mount(&farm.out(), "ro,size=1m");
         let output = farm.serve_command().output().unwrap();
         assert_eq!(output.status.code(), Some(5));
         insta::assert_snapshot!(told(&farm, &stderr(&output)));
-        // With the state elsewhere it starts, and says why results do not come.
+        // With the state elsewhere the broker starts, and reports why results are missing.
         let state = farm.base().join("state").to_string_lossy().into_owned();
         farm.arguments = vec!["--state".to_owned(), state];
         let _broker = farm.serve_ready();
@@ -275,10 +276,10 @@ fn an_output_disk_that_is_full() {
         farm.write("lost.xosc", &lost.bytes());
         notice(&farm, "lost.xosc");
         std::fs::remove_file(&filler).unwrap();
-        // With room again, the verdict comes by itself.
+        // When there is space again, the verdict appears by itself.
         let verdict = farm.verdict("a.xodr");
         assert_eq!(verdict.verdict, Content::Good(1).verdict());
-        // What was seen when the file was read is said also by the second attempt.
+        // The second attempt also reports the diagnostics from reading the file.
         let verdict = farm.verdict("lost.xosc");
         assert_eq!(verdict.verdict, Verdict::Rejected, "{verdict:?}");
     });
@@ -290,7 +291,8 @@ fn a_state_disk_that_is_full() {
         let mut farm = Farm::new();
         let state = farm.base().join("state");
         std::fs::create_dir(&state).unwrap();
-        // Room enough for the journal with what bundles offer (0.2 MiB) and its log, once there is room.
+        // The size is enough for the journal with the bundles' catalogues (0.2 MiB) and its log,
+        // once there is space.
         mount(&state, "size=4m,mode=700");
         farm.arguments = vec!["--state".to_owned(), state.to_string_lossy().into_owned()];
         let _broker = farm.serve_ready();

@@ -1,5 +1,6 @@
-//! What another user of the host puts where a broker looks: it is not run, not believed and not changed.
-//! The broker is root here, as whoever plants things hopes; or a user whom a third one wants to fool.
+//! Tests files that another user of the host puts where a broker reads. They must not be run,
+//! trusted or changed. The broker runs as root, which such a user hopes for, or as a user that a
+//! third one wants to deceive.
 
 #![expect(
     clippy::unwrap_used,
@@ -19,12 +20,12 @@ use support::broker::Broker;
 use support::farm::Farm;
 use support::watchdog::{until_or, until_so};
 
-/// Who plants things.
+/// User id of the hostile user.
 const NEIGHBOUR: u32 = 12_345;
-/// A user who is not root.
+/// User id of a user who is not root.
 const NOBODY: u32 = 65_534;
 
-/// Whether there can be a neighbour here.
+/// Checks whether the test can act as a hostile user.
 fn is_root() -> bool {
     let is_root = rustix::process::geteuid().is_root();
     if !is_root {
@@ -41,7 +42,7 @@ fn give(path: &Path, user: u32) {
     chown(path, Some(user), Some(user)).unwrap();
 }
 
-/// A manifest whose program leaves a trace.
+/// Returns a manifest with a program that leaves a trace.
 fn evil(trace: &Path) -> String {
     let command = format!("/bin/sh -c 'touch {}'", trace.display());
     manifest(&command)
@@ -58,7 +59,7 @@ fn manifest(command: &str) -> String {
     .to_string()
 }
 
-/// An inbox into which everybody may write, and what a command there says.
+/// An inbox that other users may write to, and the commands that run in it.
 struct Inbox {
     dir: tempfile::TempDir,
 }
@@ -86,7 +87,7 @@ impl Inbox {
         self.dir.path().join("trace")
     }
 
-    /// What the neighbour puts there.
+    /// Writes a file that belongs to the hostile user.
     fn plant(&self, name: &str, content: &str) -> PathBuf {
         let path = self.path().join(name);
         for parent in Path::new(name)
@@ -107,7 +108,7 @@ impl Inbox {
         path
     }
 
-    /// `cd inbox && qcbus serve .`
+    /// Returns the command `cd inbox && qcbus serve .`.
     fn serve_command(&self, more: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
         command
@@ -123,7 +124,7 @@ impl Inbox {
         let log = self.dir.path().join("log");
         let mut broker = Broker::start(&mut self.serve_command(more), &log);
         let said = || std::fs::read_to_string(&log).unwrap();
-        // One that is not refused runs, and what it must not run leaves its trace.
+        // If the broker is not refused, it may run the hostile program, which leaves a trace.
         until_or(
             "the broker refuses to start",
             || {
@@ -264,7 +265,7 @@ fn what_is_planted_later_is_said_and_not_run() {
     };
     is_said("evil.json belongs to user 12345");
     std::fs::remove_file(&path).unwrap();
-    // A directory that everybody may write to from now on.
+    // From now on every user may write to this directory.
     mode(&farm.bundles_d(), 0o777);
     is_said("everybody may write to");
     let older = |it: &qcbus_messages::control::NoticeStatus| it.text.contains("user 12345");
@@ -309,7 +310,7 @@ fn a_program_that_others_may_write_to_is_not_started_again() {
 
 fn status_as(user: u32, runtime: &[(&str, &Path)]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
-    // A broker that another test runs as `default` would be named as another user's.
+    // A broker of another test may run as `default`. It would be reported as another user's.
     command
         .args(["status", "--instance", "nobody-serves-this"])
         .env_remove("XDG_RUNTIME_DIR")
@@ -348,7 +349,7 @@ fn a_runtime_directory_that_a_neighbour_has_planted_is_left_as_it_is() {
             "what the link leads to was changed"
         );
         assert_eq!(std::fs::read_dir(&target).unwrap().count(), 0);
-        // As somebody keeps XDG_RUNTIME_DIR who becomes another user with `su`.
+        // After `su`, XDG_RUNTIME_DIR may still be the directory of the previous user.
         let theirs = dir.path().join(format!("theirs-{user}"));
         std::fs::create_dir(&theirs).unwrap();
         give(&theirs, NEIGHBOUR);
@@ -373,7 +374,7 @@ fn a_user_without_rights_has_a_runtime_directory() {
     assert_eq!(mode_of(&dir.path().join("qcbus-65534")), 0o700);
 }
 
-/// Many have a directory of results for a whole group. What that costs is said and not left to be found out.
+/// Many sites share a results directory in a group. The broker must report the consequences.
 #[test]
 fn results_that_others_may_write_to_are_said() {
     let farm = Farm::new();

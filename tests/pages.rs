@@ -1,5 +1,5 @@
-//! Pages of HTML: what is on them, and whether it is at its place. What a browser makes of them is
-//! tried in `reporters/html/browser`.
+//! Tests the content of HTML pages and its places. `reporters/html/browser` tests the pages in a
+//! browser.
 
 #![expect(
     clippy::unwrap_used,
@@ -21,7 +21,7 @@ use qcbus_opendrive::{OwnedMap, RoadMap};
 use serde_json::Value;
 use support::cli::{Cli, sample_farm};
 
-/// A block of a page, unpacked.
+/// Returns a block of a page, unpacked.
 fn block(page: &str, id: &str) -> Option<Vec<u8>> {
     let opening = format!("<script type=\"application/octet-stream\" id=\"{id}\">");
     let (_, rest) = page.split_once(&opening)?;
@@ -64,7 +64,7 @@ fn map_of(path: &Path) -> OwnedMap {
     OwnedMap::of(Image::new(prepared.build())).unwrap()
 }
 
-/// The first place of the finding of a rule.
+/// Returns the first place of the finding of a rule.
 fn place<'d>(data: &'d Value, rule: &str) -> &'d Value {
     let rules = data["rules"].as_array().unwrap();
     let is_it = |it: &Value| it["uid"].as_str().unwrap().ends_with(rule);
@@ -75,7 +75,7 @@ fn place<'d>(data: &'d Value, rule: &str) -> &'d Value {
     &found["places"][0]
 }
 
-/// The point of a road at s and t, and the index of the road.
+/// Returns the index of a road and the point on it at s and t.
 fn on_road(map: &RoadMap<'_>, id: &str, s: f64, t: f64) -> (usize, [f64; 2]) {
     let index = map.roads().iter().position(|road| road.id() == id);
     let index = index.unwrap_or_else(|| panic!("no road {id}"));
@@ -95,7 +95,7 @@ fn every_kind_of_fault_has_its_mark_at_the_right_metre() {
             ("contact_point_no_horizontal_gaps", "gap", 50.0, 0.0),
             ("refline_no_kinks", "kink", 40.0, 0.0),
             ("ids.only_ref_defined_ids", "dangling", 70.0, 0.0),
-            // It stands where there is no road; its mark is at the end that it missed.
+            // The signal is beyond the road. Its mark is at the end of the road that it exceeds.
             ("road.records_within_extent", "signal", 60.0, -4.5),
         ] {
             let place = place(&data, rule);
@@ -110,7 +110,7 @@ fn every_kind_of_fault_has_its_mark_at_the_right_metre() {
             let names = on.iter().any(|it| it["road"] == index || it["signal"] == 0);
             assert!(names, "{rule}: highlights {on:?}");
         }
-        // An overlap covers ground: its mark lies on both roads.
+        // An overlap covers an area, so its mark lies on both roads.
         let place = place(&data, "road.no_overlap_outside_junction");
         let at: [f64; 2] = serde_json::from_value(place["at"].clone()).unwrap();
         let (_, corner) = on_road(map, "east", 60.0, 0.0);

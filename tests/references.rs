@@ -1,5 +1,4 @@
-//! What a file refers to counts: a scenario whose map, or a catalog of which it needs something, cannot be had is
-//! not accepted.
+//! Tests references. A scenario is not accepted if its map, or a catalog that it needs, is missing.
 
 #![expect(
     clippy::unwrap_used,
@@ -19,11 +18,11 @@ use support::cli::{Cli, Said, issues, places, sample_farm};
 const MAP: &str = "../maps/quay_straight.xodr";
 const CATALOGS: &str = "../catalogs";
 
-/// Where the reference to the map stands, and that to the catalogs: row and column.
+/// Row and column of the references to the map and to the catalogs.
 const AT_MAP: (u64, u64) = (11, 16);
 const AT_CATALOGS: (u64, u64) = (7, 18);
 
-/// A scenario, its verdict, and what is said of its reference.
+/// A scenario, its verdict, and the expected finding for its reference.
 struct Case {
     name: &'static str,
     text: String,
@@ -35,7 +34,7 @@ fn scenario() -> String {
     std::fs::read_to_string(sample_farm().join("scenarios/van_follows.xosc")).unwrap()
 }
 
-/// The sample scenario with another path to its map.
+/// Returns the sample scenario with another path to its map.
 fn map(
     name: &'static str,
     path: &str,
@@ -50,7 +49,7 @@ fn map(
     }
 }
 
-/// The sample scenario with another path to its catalogs.
+/// Returns the sample scenario with another path to its catalogs.
 fn catalogs(name: &'static str, path: &str, verdict: &'static str, said: &'static str) -> Case {
     Case {
         name,
@@ -60,7 +59,7 @@ fn catalogs(name: &'static str, path: &str, verdict: &'static str, said: &'stati
     }
 }
 
-/// A file that varies the parameters of another scenario.
+/// Returns a file that varies the parameters of another scenario.
 fn distribution(
     name: &'static str,
     path: &str,
@@ -150,14 +149,14 @@ fn cases() -> Vec<Case> {
             "rejected",
             NOT_THERE,
         ),
-        // By its words alone it would be the map.
+        // Without links, this path would lead to the map.
         map(
             "out_of_a_link",
             "../maps/far/../quay_straight.xodr",
             "rejected",
             NOT_THERE,
         ),
-        // Only as the system follows it.
+        // The path leads to the map only if the link is followed as the system does it.
         map(
             "through_a_link",
             "../maps/far/../maps/quay_straight.xodr",
@@ -244,7 +243,7 @@ fn cases() -> Vec<Case> {
     ]
 }
 
-/// Everything that the cases refer to.
+/// Creates all files that the cases refer to.
 fn cli() -> Cli {
     let cli = Cli::new();
     let farm = |name: &str| std::fs::read(sample_farm().join(name)).unwrap();
@@ -267,13 +266,13 @@ fn cli() -> Cli {
     symlink("loop.xodr", at("loop.xodr")).unwrap();
     let made = Command::new("mkfifo").arg(at("pipe.xodr")).status();
     assert!(made.unwrap().success());
-    // Sparse: nothing of it is read.
+    // The file is sparse, because its content is never read.
     let large = File::create(at("large.xodr")).unwrap();
     large.set_len((1 << 30) + 1).unwrap();
     cli
 }
 
-/// Descriptions of what qcbus itself says of references, with their places.
+/// Returns the descriptions of qcbus's own findings about references, with their places.
 fn remarks(results: &Results) -> Vec<(String, (u64, u64))> {
     let own = results.bundles.iter().filter(|it| it.name == "qcbus");
     let checkers = own.flat_map(|bundle| &bundle.checkers);
@@ -329,7 +328,8 @@ fn code_of(verdict: &str) -> Option<i32> {
 #[test]
 fn a_bundle_without_a_broker_says_the_same() {
     let cli = cli();
-    // A broker keeps few documents at a time on the bus; a bundle by itself has them in memory.
+    // A broker holds few documents at a time on the bus. A bundle without a broker holds all in
+    // memory.
     for case in cases().iter().filter(|case| case.name != "many_catalogs") {
         let name = format!("scenarios/{}.xosc", case.name);
         cli.write("scenarios/whole.xosc", scenario());
@@ -377,13 +377,13 @@ fn a_map_that_may_not_be_read_is_no_acceptance() {
     assert_eq!(said.code, Some(3), "{}", said.whole(&cli));
 }
 
-/// A map that can be read and is rejected: it has an attribute that nobody knows.
+/// Returns a readable map that is rejected because of an unknown attribute.
 fn rejected_map() -> String {
     let farm = std::fs::read_to_string(sample_farm().join("maps/quay_straight.xodr")).unwrap();
     farm.replacen("<geometry ", "<geometry paved=\"yes\" ", 1)
 }
 
-/// A run over a scenario before its map, the map, and a scenario behind it.
+/// Checks a scenario before its map, the map, and a scenario after it.
 fn checked(cli: &Cli, out: &str, more: &[&str]) -> Said {
     let files = ["a/on_it.xosc", "maps/quay_straight.xodr", "z/on_it.xosc"];
     let mut arguments = vec!["check", "-v", "--out", out];
@@ -411,7 +411,7 @@ fn scenario_on_a_rejected_map_is_rejected_until_the_map_is_fixed() {
         );
         assert_eq!(place, [AT_MAP]);
     }
-    // Each by itself: the map is rejected, and the scenarios only say so.
+    // With own verdicts, the map is rejected, and the scenarios only mention it.
     let said = checked(&cli, "own", &["--own-verdict"]);
     assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
     for name in ["a", "z"] {
@@ -419,7 +419,7 @@ fn scenario_on_a_rejected_map_is_rejected_until_the_map_is_fixed() {
         assert!(said.stdout.contains(&line), "{line}\n{}", said.whole(&cli));
         one_about_the_map(&cli.result(&format!("own/{name}/on_it.xosc.xqar")));
     }
-    // Its map counts also when it is checked alone.
+    // The map also counts when the scenario is checked alone.
     let said = cli.qcbus(&["check", "a/on_it.xosc", "--out", "alone"]);
     assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
     cli.write("maps/quay_straight.xodr", good);
@@ -427,7 +427,7 @@ fn scenario_on_a_rejected_map_is_rejected_until_the_map_is_fixed() {
     assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
 }
 
-/// The text and the places of the one issue about a file that the checked one rests on.
+/// Returns the text and the places of the one issue about a file that the checked one rests on.
 fn one_about_the_map(results: &Results) -> (String, Vec<(u64, u64)>) {
     let all = issues(results).filter(|(checker, _)| &*checker.id == "qcbus_rests_on");
     let all: Vec<_> = all.collect();
@@ -443,7 +443,7 @@ fn only_catalogs_that_entries_are_taken_from_count() {
     let catalog = std::fs::read_to_string(cli.path().join("catalogs/vehicles.xosc")).unwrap();
     let broken = catalog.replacen("<Vehicle ", "<Vehicle paved=\"yes\" ", 1);
     cli.write("scenarios/on_it.xosc", scenario());
-    // A scenario and another catalog in the catalog directory, both rejected, are nobody's business.
+    // A rejected scenario and another rejected catalog in the catalog directory must not count.
     let scenario_with_fault = scenario().replacen("<Vehicle ", "<Vehicle paved=\"yes\" ", 1);
     cli.write("catalogs/beside.xosc", scenario_with_fault);
     cli.write(

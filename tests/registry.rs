@@ -1,4 +1,4 @@
-//! Who must judge stays who must judge: nothing is accepted because a bundle is not there.
+//! Tests that required bundles stay required: a file is not accepted because a bundle is missing.
 
 #![expect(
     clippy::unwrap_used,
@@ -20,14 +20,14 @@ use support::farm::{Farm, copy_program, zoo};
 use support::processes::signal_pid;
 use support::watchdog::until_or;
 
-/// A road network that only the bundle of one's own has something against.
+/// Returns a road network that only the custom bundle rejects.
 fn forbidden() -> Vec<u8> {
     let text = String::from_utf8(Content::Good(7).bytes()).unwrap();
     text.replace("name=\"n7\"", "name=\"forbidden\"")
         .into_bytes()
 }
 
-/// A farm whose broker does not wait long for those who are not there.
+/// Returns a farm with a short time limit for missing bundles.
 fn farm() -> Farm {
     let mut farm = Farm::with(&["--absence-limit", "1s"]);
     let gate = farm.base().join("gate");
@@ -53,7 +53,7 @@ fn manifest(directory: &Path, command: &str) {
     std::fs::rename(unfinished, directory.join("mine.json")).unwrap();
 }
 
-/// A copy of the zoo's program that can be deleted.
+/// Copies the zoo program, so that it can be deleted.
 fn own_program(directory: &Path) -> PathBuf {
     let own = directory.join("mine");
     copy_program(&zoo(), &own);
@@ -70,7 +70,7 @@ fn is_ready(farm: &Farm, name: &str) {
     until_or("the bundle is ready", ready, || farm.log());
 }
 
-/// A bundle that somebody starts by hand; killed when it is dropped.
+/// A bundle that a user starts manually. It is killed on drop.
 struct StartedManually(Child);
 
 impl StartedManually {
@@ -96,7 +96,7 @@ impl Drop for StartedManually {
     }
 }
 
-/// Neither the file that was rejected nor a new one is accepted while `mine` is not there.
+/// Checks that neither the rejected file nor a new one is accepted while `mine` is missing.
 fn nothing_is_accepted_without_mine(farm: &Farm) {
     let before = farm.verdict("forbidden.xodr");
     assert_ne!(before.verdict, Verdict::Accepted, "{before:?}");
@@ -161,7 +161,7 @@ fn nothing_is_accepted_after_the_program_of_a_bundle_has_gone() {
     }
     let _broker = farm.serve_ready();
     nothing_is_accepted_without_mine(&farm);
-    // Only when its manifest has gone, too, it need not judge any more.
+    // The bundle is no longer required only after its manifest is removed, too.
     std::fs::remove_file(farm.bundles_d().join("mine.json")).unwrap();
     let accepted = || (farm.verdict("new.xodr").verdict == Verdict::Accepted).then_some(());
     until_or("it is accepted without", accepted, || farm.log());
@@ -216,7 +216,7 @@ fn a_bundle_that_leaves_of_its_own_will_need_not_judge_any_more() {
             .iter()
             .any(|it| it.name == "mine")
     );
-    // A bundle that is told to stop says good-bye.
+    // A bundle that is told to stop unregisters.
     mine.signal(Signal::TERM);
     assert!(mine.0.wait().unwrap().success());
     let without = || {

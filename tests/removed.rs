@@ -1,4 +1,4 @@
-//! Results and published files that somebody removes or changes while the broker runs.
+//! Tests results and published files that are removed or changed while the broker runs.
 
 #![expect(
     clippy::unwrap_used,
@@ -15,7 +15,7 @@ use support::content::Content;
 use support::farm::Farm;
 use support::watchdog::until_or;
 
-/// A farm with a gate, and the state beside the results.
+/// Returns a farm with a gate, and with the state beside the results.
 fn farm() -> Farm {
     let mut farm = Farm::new();
     let (gate, state) = (farm.gate(), farm.base().join("state"));
@@ -37,7 +37,7 @@ fn serve(farm: &Farm) -> Broker {
     broker
 }
 
-/// Everything that the broker writes for the two files.
+/// Returns all outputs of the broker for the two files.
 fn outputs(farm: &Farm) -> Vec<PathBuf> {
     let results = ["good.xodr", "sub/bad.xodr"].into_iter().flat_map(|name| {
         [".xqar", ".verdict.json"].map(|suffix| farm.out().join(format!("{name}{suffix}")))
@@ -50,14 +50,14 @@ fn there(farm: &Farm, outputs: &[PathBuf]) {
     until_or("all outputs are there", all, || farm.log());
 }
 
-/// Removes a directory in one step: the broker begins to write to it again at once.
+/// Removes a directory in one step, because the broker writes to it again immediately.
 fn remove_whole(directory: &Path) {
     let aside = directory.with_extension("aside");
     std::fs::rename(directory, &aside).unwrap();
     std::fs::remove_dir_all(&aside).unwrap();
 }
 
-/// Waits until the status tells of a trouble in these words.
+/// Waits until the status reports a failure with these words.
 fn until_failing(farm: &Farm, words: &str) {
     let told = || {
         let troubles = farm.status()?.troubles;
@@ -97,7 +97,7 @@ fn wait_answers_with_a_result_that_is_there() {
         };
         std::fs::remove_file(&output).unwrap();
         assert_eq!(wait(&farm, name), Some(code), "{}", farm.log());
-        // A copy behind the gate may come a moment after the answer, as after every verdict.
+        // A published copy may appear shortly after the answer, as after every verdict.
         let is_copy = output.starts_with(farm.gate());
         assert!(
             is_copy || output.exists(),
@@ -148,7 +148,7 @@ fn replaced_directories_of_results_and_gate_are_filled_again() {
         remove_whole(&directory);
         there(&farm, &outputs(&farm));
     }
-    // They are this broker's again.
+    // The directories belong to this broker again.
     let mut other = Farm::new();
     other.arguments = farm.arguments.clone();
     let gate = farm.gate().to_string_lossy().into_owned();
@@ -166,7 +166,7 @@ fn directory_that_another_broker_has_taken_is_left_to_it() {
     other.arguments.extend(["--gate".to_owned(), gate]);
     let farm = farm();
     let _broker = serve(&farm);
-    // The other one has the directory that comes to lie where the first had published.
+    // The other broker owns the directory that replaces the gate of the first one.
     while std::os::unix::fs::symlink(other.gate(), farm.gate()).is_err() {
         remove_whole(&farm.gate());
     }
@@ -188,7 +188,7 @@ fn state_directory_that_goes_is_told() {
     until_failing(&farm, "was removed or replaced");
     let health = farm.qcbus(&["status", "--health"]);
     assert_eq!(health.status.code(), Some(1), "{health:?}");
-    // What is judged is answered all the same.
+    // The broker must still check files and answer.
     farm.write("late.xodr", &Content::Good(3).bytes());
     assert_eq!(wait(&farm, "late.xodr"), Some(0));
 }
@@ -199,10 +199,11 @@ fn removed_outputs_of_a_file_that_is_touched_are_written_again() {
     let _broker = serve(&farm);
     for _ in 0..5 {
         for output in outputs(&farm) {
-            // A copy is not behind the gate while its file is judged again.
+            // While a file is checked again, its copy is not behind the gate, so an error is
+            // ignored.
             let _ = std::fs::remove_file(&output);
         }
-        // Its bytes are the same, so that they alone are no reason to judge it again.
+        // The bytes are unchanged, so they alone cause no new check.
         let file = std::fs::File::options()
             .write(true)
             .open(farm.root().join("good.xodr"))

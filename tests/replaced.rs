@@ -1,4 +1,4 @@
-//! The program is replaced on the disk while a broker runs, as an upgrade of a package does it.
+//! Tests a program that is replaced on disk while a broker runs, as in a package upgrade.
 
 #![expect(
     clippy::unwrap_used,
@@ -35,7 +35,7 @@ fn install(path: &Path, script: &str) {
     std::fs::set_permissions(path, Permissions::from_mode(0o755)).unwrap();
 }
 
-/// A farm, the program from which its broker runs, and another program to replace it.
+/// Returns a farm, the program of its broker, and another program to replace it.
 fn farm() -> (Farm, PathBuf, PathBuf, Broker) {
     let farm = Farm::with(&["--report", "json"]);
     let base = farm.base();
@@ -58,7 +58,7 @@ fn farm() -> (Farm, PathBuf, PathBuf, Broker) {
     (farm, program, newer, broker)
 }
 
-/// The processes of all peers that are ready, once they are none of these.
+/// Returns the processes of all peers, once all are ready and none of them is in `before`.
 fn ready_peers(farm: &Farm, before: &BTreeMap<String, u32>) -> BTreeMap<String, u32> {
     let look = || {
         let peers = farm.status()?.peers.into_iter();
@@ -76,7 +76,8 @@ fn program_of(pid: u32) -> (u64, u64) {
     (data.dev(), data.ino())
 }
 
-/// All children die after the program was replaced, and judge again as the program that the broker is.
+/// Kills all children after the program was replaced. They must then run the program of the broker
+/// again.
 fn children_stay_what_the_broker_is(replace: impl FnOnce(&Path, &Path)) {
     let (farm, program, newer, broker) = farm();
     let before = ready_peers(&farm, &BTreeMap::new());
@@ -91,7 +92,7 @@ fn children_stay_what_the_broker_is(replace: impl FnOnce(&Path, &Path)) {
         let words = std::fs::read(format!("/proc/{pid}/cmdline")).unwrap();
         let called = words.split(|it| *it == 0).next().unwrap();
         assert_eq!(called, program.as_os_str().as_encoded_bytes(), "{name}");
-        // It may outlive the broker, so it speaks to the log itself.
+        // A child may outlive the broker, so it writes to the log directly.
         let speaks_to = std::fs::read_link(format!("/proc/{pid}/fd/2")).unwrap();
         assert_eq!(speaks_to, farm.log_path(), "{name}");
         let listed = std::fs::read_to_string(format!("/proc/{pid}/comm")).unwrap();

@@ -1,4 +1,4 @@
-//! Reports that are waited for, and reports that cannot be written for a while.
+//! Tests waiting for reports, and reports that cannot be written for a while.
 
 #![expect(
     clippy::unwrap_used,
@@ -15,12 +15,12 @@ use support::content::Content;
 use support::farm::{Farm, tail};
 use support::watchdog::until_or;
 
-/// Where the text report on a file lies.
+/// Returns the path of the text report on a file.
 fn report(farm: &Farm, name: &str) -> PathBuf {
     farm.out().join(format!("{name}.txt"))
 }
 
-/// Something lies where the report is to go: it cannot be written, whoever tries.
+/// Blocks the path of a report by a directory, so that no user can write it.
 fn obstruct(farm: &Farm, name: &str) -> PathBuf {
     let obstacle = report(farm, name).join("obstacle");
     std::fs::create_dir_all(&obstacle).unwrap();

@@ -1,5 +1,5 @@
-//! Who checks a scenario alone is told as well what is wrong with the files that it rests on: accepted means that
-//! it can be run.
+//! Tests that a check of a single scenario also reports faults of the files that it rests on.
+//! Accepted means that the scenario can be run.
 
 #![expect(
     clippy::unwrap_used,
@@ -23,7 +23,7 @@ use support::watchdog::until_or;
 const SCENARIO: &str = "scenarios/a.xosc";
 const MAP: &str = "maps/m.xodr";
 
-/// A scenario in one directory, and its map in another.
+/// Writes a scenario in one directory, and its map in another.
 fn place(map: &Content) -> Cli {
     let cli = Cli::new();
     let scenario = Content::Scenario(1, format!("../{MAP}"));
@@ -40,7 +40,7 @@ fn check(cli: &Cli, more: &[&str]) -> Said {
     cli.qcbus(&[&["check", SCENARIO][..], more].concat())
 }
 
-/// Whether a checker whose name ends so has found something in a file.
+/// Checks whether a checker with this name suffix has found an issue in a file.
 fn is_found(cli: &Cli, file: &str, checker: &str) -> bool {
     let results = cli.result(&format!("qcbus-out/{file}.xqar"));
     issues(&results).any(|(it, _)| it.id.ends_with(checker))
@@ -72,7 +72,7 @@ fn a_scenario_alone_is_rejected_for_its_map_until_that_is_mended() {
     assert!(said.stdout.contains(whole), "{}", said.whole(&cli));
 }
 
-/// Who watches scenarios alone is told what nobody judges.
+/// A broker that watches only scenarios must report unchecked files.
 #[test]
 fn a_broker_says_which_map_it_does_not_watch() {
     let farm = Farm::new();
@@ -96,7 +96,7 @@ fn a_broker_says_which_map_it_does_not_watch() {
     broker.wait();
 }
 
-/// A broker that gets no help from looks in intervals, with a scenario, its map and its catalog.
+/// Starts a broker that is not helped by rescans, with a scenario, its map and its catalog.
 fn served() -> (Farm, Broker) {
     let farm = Farm::with(&["--rescan", "1h"]);
     for directory in ["catalogs", "maps"] {
@@ -130,7 +130,7 @@ fn map_in_a_directory_that_becomes_a_link_is_named_as_not_watched() {
     );
 }
 
-/// The same words lead to another map, and the verdict on that one counts.
+/// The same path now leads to another map, and the verdict on that map counts.
 #[test]
 fn map_behind_a_link_that_leads_elsewhere_by_now_is_another_one() {
     let (farm, _broker) = served();
@@ -153,7 +153,7 @@ fn map_behind_a_link_that_leads_elsewhere_by_now_is_another_one() {
     assert!(said.any(|(_, it)| it.description.contains("second/m.xodr")));
 }
 
-/// No event tells of what is written to a file under a name that nobody watches.
+/// A write to a file under an unwatched name causes no event.
 #[test]
 fn map_changed_under_another_name_is_judged_for_who_waits_for_its_scenario() {
     let (farm, _broker) = served();
@@ -241,7 +241,7 @@ fn the_one_result_of_a_configuration_is_that_of_its_file() {
     );
 }
 
-/// Broker and bundles keep few documents at a time, and one scenario may need all of them.
+/// The broker and the bundles hold few documents at a time, and one scenario may need all of them.
 #[test]
 fn scenario_with_many_catalogs_does_not_hold_up_what_it_waits_for() {
     let cli = place(&Content::Good(1));

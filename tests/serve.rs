@@ -1,4 +1,5 @@
-//! `qcbus serve`: whatever comes into a watched directory gets its verdict, and keeps it right.
+//! Tests `qcbus serve`: each file in a watched directory gets its verdict, and the verdict stays
+//! correct.
 
 #![expect(
     clippy::unwrap_used,
@@ -26,7 +27,7 @@ use support::farm::{Farm, tail};
 use support::inside::skip;
 use support::watchdog::{until_or, until_so};
 
-/// Files to copy: where they come from and where they go.
+/// Files to copy: source and destination.
 type Load = Vec<(PathBuf, PathBuf)>;
 
 fn load(from: &Path, wanted: impl Fn(&Path) -> bool) -> Load {
@@ -38,7 +39,8 @@ fn is_checkable(file: &Path) -> bool {
     FileKind::of_path(file).is_some()
 }
 
-/// Serves an empty directory, copies everything in, and holds the results against those of `check`.
+/// Serves an empty directory, copies all files into it, and compares the results with those of
+/// `check`.
 fn copied_in_and_compared(load: &Load) {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
@@ -56,8 +58,8 @@ fn copied_in_and_compared(load: &Load) {
     let cli = Cli::new();
     cli.check_in(&farm.root(), &["."], "out");
     let same = || differences(&farm.out(), &cli.path().join("out"));
-    // A file may have been judged before another that it refers to was there; then it is judged
-    // again when that one comes.
+    // A file may have been checked before a file that it refers to arrived. It is then checked
+    // again.
     until_or(
         "the results are those of `check`",
         || same().is_empty().then_some(()),
@@ -82,7 +84,7 @@ fn results_below(out: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Results that are not the same bytes in both directories.
+/// Returns the results whose bytes differ between both directories.
 fn differences(one: &Path, two: &Path) -> Vec<PathBuf> {
     let all: BTreeSet<PathBuf> = results_below(one)
         .into_iter()
@@ -94,7 +96,7 @@ fn differences(one: &Path, two: &Path) -> Vec<PathBuf> {
         .collect()
 }
 
-/// Ids that `qcbus rule` lists as switched on, by bundle.
+/// Returns the ids that `qcbus rule` lists as enabled, by bundle.
 fn demanded() -> BTreeMap<String, BTreeSet<String>> {
     let cli = Cli::new();
     let said = cli.qcbus(&["rule", "--format", "json"]);
@@ -174,7 +176,7 @@ fn two_hundred_real_files_are_copied_in() {
             "../shared/cases/real is not here",
         );
     }
-    // Hidden directories are passed over.
+    // Hidden directories are skipped.
     let is_visible = |file: &Path| !file.to_string_lossy().contains("/.");
     let mut load = load(real, |file| is_checkable(file) && is_visible(file));
     load.truncate(200);
@@ -197,14 +199,14 @@ fn a_file_that_is_renamed_in_is_judged() {
     std::fs::write(&outside, Content::Good(1).bytes()).unwrap();
     std::fs::rename(&outside, farm.root().join("in.xodr")).unwrap();
     assert_eq!(farm.verdict("in.xodr").verdict, Verdict::Accepted);
-    // A whole directory at once.
+    // A whole directory is moved in at once.
     let outside = farm.base().join("outside");
     std::fs::create_dir_all(outside.join("deep")).unwrap();
     std::fs::write(outside.join("deep/a.xodr"), Content::NoHeader(2).bytes()).unwrap();
     std::fs::rename(&outside, farm.root().join("batch")).unwrap();
     farm.settle(2);
     assert_eq!(farm.verdict("batch/deep/a.xodr").verdict, Verdict::Rejected);
-    // From one name to another: the result goes along.
+    // The result follows a file that gets another name.
     std::fs::rename(farm.root().join("in.xodr"), farm.root().join("out.xodr")).unwrap();
     until_so("the old name's result is withdrawn", || {
         !farm.out().join("in.xodr.xqar").exists()
@@ -223,7 +225,7 @@ fn the_newest_bytes_win() {
             Content::NoHeader(round)
         };
         farm.write("a.xodr", &content.bytes());
-        // In some rounds nobody waits: the next bytes come while these are checked.
+        // In the other rounds the test does not wait, so the next bytes arrive during the check.
         if round % 3 == 0 {
             let verdict = farm.verdict("a.xodr");
             assert_eq!(verdict.digest, sha256(&content.bytes()), "round {round}");
@@ -256,13 +258,14 @@ fn a_deleted_file_takes_its_result_along() {
     std::fs::remove_file(farm.root().join("a.xodr")).unwrap();
     until_so("result and reports are withdrawn", || of_a().is_empty());
     farm.settle(1);
-    // It may come back, but does not in time.
+    // The file could come back, but it does not within the time limit.
     farm.wait_in_vain(&farm.root().join("a.xodr"), &[], "there is no such file");
     assert!(farm.out().join("stays.xodr.xqar").exists());
 }
 
-/// After a restart of the machine the runtime directory is empty and generations begin at one again; the
-/// journal is as it was. A report that the last broker wrote is none of this one's job of the same number.
+/// After a reboot the runtime directory is empty and generations start at one again. The journal is
+/// unchanged. A report of the last broker must not be taken for this broker's job of the same
+/// number.
 #[test]
 fn a_new_verdict_reaches_reporters_whatever_became_of_the_runtime_directory() {
     let mut farm = Farm::with(&["--report", "text", "--absence-limit", "1s"]);
@@ -353,7 +356,7 @@ fn what_is_ignored_gets_no_verdict() {
     for name in ignored {
         assert!(is_unwatched(&farm, name), "{name}");
     }
-    // What is no longer ignored is there at once, and the other way round.
+    // A file that is no longer ignored appears immediately, and a newly ignored one vanishes.
     farm.write(".qcignore", b"*_wip.xodr\n");
     until_so("drafts are judged", || {
         farm.out().join("drafts/a.xodr.xqar").exists()
@@ -389,7 +392,7 @@ fn scenario(map: &str) -> String {
     )
 }
 
-/// The hash of the map that a verdict rests on; `None` when there was none.
+/// Returns the hash of the map that a verdict rests on, or `None` if the map was missing.
 fn map_of(farm: &Farm, name: &str, map: &Path) -> Option<String> {
     let told = farm.verdict_file(name);
     let all = told["depends_on"].as_array().unwrap();
@@ -397,7 +400,7 @@ fn map_of(farm: &Farm, name: &str, map: &Path) -> Option<String> {
     found?["sha256"].as_str().map(str::to_owned)
 }
 
-/// A scenario's map appears, changes and goes: each time the scenario is judged again.
+/// Creates, changes and removes a scenario's map. The scenario must be checked again each time.
 fn follows_its_map(farm: &Farm, reference: &str, map: &Path) {
     let is_watched = map.starts_with(farm.root());
     farm.write("s.xosc", scenario(reference).as_bytes());
@@ -496,14 +499,14 @@ fn a_map_is_judged_again_when_an_included_file_appears_or_changes() {
     becomes(1);
 }
 
-/// Issues about what can be read at all.
+/// Counts the issues about well-formedness.
 fn faults_of_form(results: &Results) -> usize {
     issues(results)
         .filter(|(checker, _)| checker.id.ends_with("xml_valid_xml_document"))
         .count()
 }
 
-/// `qcbus serve` of any directories, with the farm's output and gate.
+/// Returns `qcbus serve` for any directories, with the farm's output and gate.
 fn serve_of(farm: &Farm, instance: &str, directories: &[&Path]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
     command.arg("serve").args(directories);
@@ -519,7 +522,8 @@ fn serve_of(farm: &Farm, instance: &str, directories: &[&Path]) -> Command {
     command
 }
 
-/// Serves these directories until everything about some files is there, and ends.
+/// Serves these directories until all outputs of `there` exist and those of `gone` are removed, and
+/// ends.
 fn served(farm: &Farm, directories: &[&Path], there: &[&str], gone: &[&str]) {
     let mut broker = Broker::start(
         &mut serve_of(farm, "instance", directories),
@@ -579,7 +583,7 @@ fn what_has_gone_takes_no_other_files_result_with_it() {
     }
     std::fs::write(other.join("a.xodr"), Content::Good(2).bytes()).unwrap();
     served(&farm, &[&one], &["sub/a.xodr", "a.xodr"], &[]);
-    // What nobody watches now has no result.
+    // A file that is no longer watched has no result.
     served(&farm, &[&other], &["a.xodr"], &["sub/a.xodr"]);
     let of_other = std::fs::read_to_string(farm.out().join("a.xodr.xqar")).unwrap();
     assert!(of_other.contains(&*other.to_string_lossy()));
@@ -611,11 +615,11 @@ fn a_second_broker_on_the_same_results_is_refused() {
     }
     assert!(farm.out().join("a.xodr.xqar").exists());
     assert!(farm.base().join("gate/a.xodr").exists());
-    // Looking does no harm and is allowed.
+    // Reading is harmless and therefore allowed.
     let doctor = farm.qcbus(&["doctor", "--state", &state.to_string_lossy()]);
     let found = String::from_utf8_lossy(&doctor.stdout).into_owned();
     assert!(found.contains("ok   journal"), "{found}");
-    // Whoever is killed holds nothing.
+    // A killed broker holds no locks.
     first.kill();
     let mut second = Broker::start(&mut second, &farm.log_path());
     let instance = Instance::at(farm.base().join("second"));

@@ -1,4 +1,5 @@
-//! Shadows on a broker that runs: they look at every file, say what they would change, and change nothing.
+//! Tests shadows on a running broker: they check every file and report what they would change, but
+//! change nothing.
 
 #![expect(
     clippy::unwrap_used,
@@ -28,7 +29,7 @@ fn bundle(farm: &Farm, words: &[&str]) -> (Option<i32>, String) {
     told(&farm.qcbus(&[&["bundle"], words].concat()))
 }
 
-/// Adds the animal that rejects a word, as a shadow.
+/// Adds the zoo bundle that rejects a word, as a shadow.
 fn add_strict(farm: &Farm) {
     let zoo = zoo();
     let zoo = zoo.to_str().unwrap();
@@ -40,7 +41,7 @@ fn add_strict(farm: &Farm) {
     );
 }
 
-/// What is told of the trials, once so many files are tried and none waits.
+/// Returns the report on the trials, once `tried` files are tried and none is waiting.
 fn trials(farm: &Farm, name: &str, tried: u64) -> (Option<i32>, serde_json::Value) {
     until_or(
         "everything is tried",
@@ -92,7 +93,7 @@ fn what_it_would_change_is_told_and_nothing_is_changed_until_it_judges() {
     );
     for trial in told["trials"].as_array().unwrap().iter().take(2) {
         assert_eq!(trial["would"], "rejected", "{told}");
-        // What it found is there as a result of its own.
+        // The findings of the shadow are stored as a separate result.
         let path = trial["result"].as_str().unwrap();
         let results = xqar::read(&std::fs::read(path).unwrap()).unwrap();
         assert!(names(&results).contains(&STRICT.to_owned()), "{path}");
@@ -169,7 +170,7 @@ fn the_worst_of_them_hold_up_nobody_and_are_told_to_have_failed() {
         );
     }
     assert_eq!(farm.verdict("wrong.xodr").verdict, Verdict::Rejected);
-    // One that dies with a file is known to have.
+    // The death of a shadow during a job must be recorded.
     until_or(
         "it has died with a file twice",
         || {
@@ -198,7 +199,7 @@ fn a_configuration_that_names_a_shadow_does_not_miss_it() {
     assert_eq!(trials(&farm, STRICT, 1).1["counts"]["would_reject"], 1);
     let (_, text) = told_status(&farm);
     assert!(text.contains("which is a shadow"), "that is said: {text}");
-    // Taken away it is one that is demanded and not there.
+    // After the removal it is a required bundle that is missing.
     farm.send_away(STRICT);
     until_or(
         "it is missed",

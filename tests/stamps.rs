@@ -1,5 +1,5 @@
-//! Times of files prove little: old ones, ones that were put back, ones from before 1970. What
-//! counts is the bytes, of a file and of everything that its verdict depends on.
+//! Tests that file times prove little: old times, restored times, times before 1970. The bytes
+//! count, of a file and of everything that its verdict depends on.
 
 #![expect(
     clippy::unwrap_used,
@@ -26,10 +26,10 @@ use support::watchdog::{until_or, until_so};
 
 const HOUR: Duration = Duration::from_secs(3600);
 
-/// For so long a file counts as young, and whatever was read of it is looked at once more anyway.
+/// Age up to which a file counts as young. Young files are always read once more.
 const YOUNG: Duration = Duration::from_secs(3);
 
-/// A farm with a gate.
+/// Returns a farm with a gate.
 fn farm_with_gate() -> Farm {
     let mut farm = Farm::new();
     let gate = gate(&farm).to_string_lossy().into_owned();
@@ -46,7 +46,7 @@ fn set_modified(path: &Path, time: SystemTime) {
     file.set_modified(time).unwrap();
 }
 
-/// Puts a file there at once that was last written to an hour ago.
+/// Moves a file into the farm in one step. Its last modification was an hour ago.
 fn put_old(farm: &Farm, name: &str, bytes: &[u8]) {
     let outside = farm.base().join("outside");
     std::fs::write(&outside, bytes).unwrap();
@@ -54,7 +54,7 @@ fn put_old(farm: &Farm, name: &str, bytes: &[u8]) {
     std::fs::rename(&outside, farm.root().join(name)).unwrap();
 }
 
-/// Waits until nothing in the farm counts as young.
+/// Waits until no file in the farm counts as young.
 fn rest(farm: &Farm) {
     let youngest = || {
         let files = std::fs::read_dir(farm.root()).unwrap().flatten();
@@ -80,7 +80,8 @@ fn verdict_becomes(farm: &Farm, name: &str, verdict: Verdict) {
     });
 }
 
-/// A farm whose broker has judged an old map with an old include; and the bytes of the latter.
+/// Returns a farm with a broker that has checked an old map with an old include, and the bytes of
+/// the include.
 fn old_map_that_was_judged() -> (Farm, Broker, String) {
     let farm = farm_with_gate();
     let (outer, view) = Content::road_in_two_parts();
@@ -99,7 +100,7 @@ fn an_old_map_is_judged_again_when_its_include_changes_goes_and_comes_back() {
     put_old(&farm, "view.xml", b"<road><planView></road>");
     verdict_becomes(&farm, "a.xodr", Verdict::Rejected);
 
-    // Once more, and now somebody asks at once; before, all is read again at rest.
+    // This round asks immediately after the change. Before it, all files are read again at rest.
     rest(&farm);
     assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Rejected);
     put_old(&farm, "view.xml", view.as_bytes());
@@ -122,7 +123,8 @@ fn sha256(bytes: &[u8]) -> String {
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The hash of a file that a verdict rests on; `None` when it rests on there being none.
+/// Returns the hash of a file that a verdict rests on, or `None` if the verdict rests on its
+/// absence.
 fn rests_on(farm: &Farm, name: &str, other: &Path) -> Option<String> {
     let told = farm.verdict_file(name);
     let all = told["depends_on"].as_array().unwrap();
@@ -168,7 +170,7 @@ fn an_old_scenario_is_judged_again_when_its_map_or_catalogs_appear_or_change() {
         rest(&farm);
         farm.verdict("s.xosc");
     }
-    // Asked at once, the answer rests on the map that is there.
+    // An immediate question must be answered for the current map.
     let bytes = Content::NoHeader(3).bytes();
     put_old(&farm, "map.xodr", &bytes);
     farm.verdict("s.xosc");
@@ -184,8 +186,8 @@ fn an_old_scenario_is_judged_again_when_its_map_or_catalogs_appear_or_change() {
     rests_on_becomes(&farm, "s.xosc", &catalog, Some(CATALOG.as_bytes()));
 }
 
-/// Writes over the bytes of a file that is there and gives it its time back, as `rsync --inplace
-/// --times` does.
+/// Overwrites the bytes of an existing file and restores its modification time, as
+/// `rsync --inplace --times` does.
 fn write_over(farm: &Farm, name: &str, bytes: &[u8]) {
     let path = farm.root().join(name);
     let before = std::fs::metadata(&path).unwrap();
@@ -198,7 +200,7 @@ fn write_over(farm: &Farm, name: &str, bytes: &[u8]) {
     assert_eq!(key(&after), key(&before));
 }
 
-/// A good file, and a bad one of the same size.
+/// Returns a good file, and a bad one of the same size.
 fn good_and_bad() -> (Vec<u8>, Vec<u8>) {
     let good = Content::Good(1).bytes();
     let bad = String::from_utf8(good.clone())
@@ -250,7 +252,7 @@ fn files_from_before_1970_are_judged() {
         farm.write(name, bytes.as_bytes());
         set_modified(&farm.root().join(name), UNIX_EPOCH - HOUR);
     }
-    // A single run comes to its end.
+    // A single run must end.
     let cli = Cli::new();
     let map = farm.root().join("a.xodr").to_string_lossy().into_owned();
     let said = cli.qcbus(&["check", &map, "--out", "out"]);
@@ -291,12 +293,12 @@ fn what_is_there_and_cannot_be_read_does_not_keep_a_file_from_its_verdict() {
     farm.settle(3);
 }
 
-/// The result of a file and its report, and of a file that nobody touches its copy behind the gate:
-/// the very files.
+/// Returns the inodes of a file's result and report. For the untouched file, it also returns the
+/// inode of its published copy.
 fn inodes(farm: &Farm, name: &str) -> Vec<u64> {
     let out = |suffix: &str| farm.out().join(format!("{name}.{suffix}"));
     let mut files = vec![out("xqar"), out("txt")];
-    // What is written to goes from behind the gate until all was read again.
+    // A changed file is withdrawn from the gate until everything is read again.
     files.extend((name == "tomorrow.xodr").then(|| gate(farm).join(name)));
     let inode = |file: PathBuf| std::fs::metadata(file).unwrap().ino();
     files.into_iter().map(inode).collect()
@@ -324,7 +326,7 @@ fn a_file_of_tomorrow_keeps_its_verdict_over_a_restart() {
     for restart in 0..3 {
         farm.qcbus(&["down"]);
         broker.wait();
-        // Written to in passing: its time of change is of this moment.
+        // Changing the permissions sets the change time (ctime) to the current time.
         let rights = std::fs::Permissions::from_mode(0o640 + restart);
         std::fs::set_permissions(farm.root().join("now.xodr"), rights).unwrap();
         broker = farm.serve_ready();
@@ -341,7 +343,7 @@ fn a_file_of_tomorrow_keeps_its_verdict_over_a_restart() {
     assert_eq!(once.into_values().collect::<Vec<_>>(), [1, 1]);
 }
 
-/// How often a file was read, as the broker's log of stages tells.
+/// Returns how often a file was read, according to the broker's log of stages.
 fn times_read(farm: &Farm, name: &str) -> usize {
     let log = farm.log();
     let read = log.lines().filter(|it| it.contains("stage=\"taken\""));
@@ -359,7 +361,8 @@ fn a_file_of_tomorrow_comes_to_rest() {
     let _broker = Broker::start(&mut command, &farm.log_path());
     farm.settle(1);
     rest(&farm);
-    // Read once more, because it was young when it was read first; and then never again.
+    // The file is read once more, because it was young at the first read. After that it is never
+    // read again.
     farm.verdict("tomorrow.xodr");
     let read = times_read(&farm, "tomorrow.xodr");
     assert!(read > 0, "{}", tail(&farm.log()));

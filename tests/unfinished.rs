@@ -1,5 +1,5 @@
-//! Files that are written slowly are judged once, when they are finished. The writers here pause for as long as the
-//! test wants: they keep the file open until something has been seen.
+//! Tests that a slowly written file is judged once, when it is finished. The writers here pause as
+//! long as the test wants: they keep the file open until something has been seen.
 
 #![expect(
     clippy::unwrap_used,
@@ -20,7 +20,7 @@ use support::content::{CATALOG, Content, Mark};
 use support::farm::{Farm, tail};
 use support::watchdog::{until, until_or, until_so};
 
-/// A farm with a gate.
+/// Creates a farm with a gate.
 fn farm(arguments: &[&str]) -> Farm {
     let mut farm = Farm::with(arguments);
     let gate = farm.gate().to_string_lossy().into_owned();
@@ -28,7 +28,7 @@ fn farm(arguments: &[&str]) -> Farm {
     farm
 }
 
-/// Opens a file as a server for uploads does, and writes the first part of a good map.
+/// Opens a file as an upload server does, and writes the first part of a good map.
 fn begin(farm: &Farm, name: &str) -> (File, Vec<u8>) {
     let bytes = Content::Good(1).bytes();
     let (first, rest) = bytes.split_at(bytes.len() / 2);
@@ -37,7 +37,7 @@ fn begin(farm: &Farm, name: &str) -> (File, Vec<u8>) {
     (file, rest.to_vec())
 }
 
-/// Why the status says that a file is not judged yet.
+/// Returns the reason in the status why a file is not judged yet.
 fn unfinished(farm: &Farm, name: &str) -> String {
     let path = farm.root().join(name);
     let look = || {
@@ -48,7 +48,7 @@ fn unfinished(farm: &Farm, name: &str) -> String {
     until_or("the status says why a file is not judged", look, explain)
 }
 
-/// How often a verdict on a file was told.
+/// Returns how often a verdict on a file was logged.
 fn verdicts(farm: &Farm, name: &str) -> usize {
     let log = farm.log();
     log.matches(&format!("{name} verdict=")).count()
@@ -58,12 +58,12 @@ fn is_published(farm: &Farm, names: &[&str]) -> bool {
     names.iter().all(|name| farm.gate().join(name).exists())
 }
 
-/// A client that gives up soon is told why there is no verdict.
+/// Checks that a client with a short timeout learns why there is no verdict.
 fn is_not_told(farm: &Farm, name: &str, why: &str) {
     farm.wait_in_vain(&farm.root().join(name), &[], why);
 }
 
-/// A client that waits for a verdict.
+/// Starts a client that waits for a verdict.
 fn client(farm: &Farm, name: &str) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
     let command = command.arg("wait").arg(farm.root().join(name));
@@ -103,14 +103,14 @@ fn upload_that_has_not_begun_to_arrive_is_not_judged_empty() {
     let _broker = farm.serve_ready();
     let file = File::create(farm.root().join("slow.xodr")).unwrap();
     unfinished(&farm, "slow.xodr");
-    // Another name for a finished file is judged though nobody closes it.
+    // Another name for a finished file is judged although the file is not closed again.
     let (aside, place) = (farm.base().join("aside"), farm.root().join("linked.xodr"));
     std::fs::write(&aside, Content::Good(2).bytes()).unwrap();
     std::fs::hard_link(&aside, place).unwrap();
     let linked = || verdicts(&farm, "linked.xodr") == 1;
     until_so("the other file is judged", linked);
     assert_eq!(verdicts(&farm, "slow.xodr"), 0);
-    // It goes before it was finished.
+    // The file is removed before it is finished.
     std::fs::remove_file(farm.root().join("slow.xodr")).unwrap();
     until_so("nothing is unfinished", || {
         farm.status().is_some_and(|it| it.unfinished.is_empty())

@@ -1,5 +1,5 @@
-//! The warm check: `qcbus check` asks a broker that runs. Whatever that broker is, and whatever becomes of it
-//! meanwhile, the check says what it says without one, and leaves nothing there.
+//! Tests of the on-demand check: `qcbus check` asks a running broker. Whatever happens to that
+//! broker, the check has the same outcome as without a broker and leaves nothing behind.
 
 #![expect(
     clippy::unwrap_used,

@@ -1,4 +1,4 @@
-//! A large map is on the bus once, and every bundle reads it where it lies.
+//! Tests that a large map is on the bus only once, and that every bundle reads it in place.
 
 #![expect(
     clippy::unwrap_used,
@@ -24,10 +24,10 @@ const MIB: u64 = 1 << 20;
 /// Size of the map.
 const MAP: u64 = 100 * MIB;
 
-/// Private memory that a bundle may take for itself: its program, its stacks, its findings.
+/// Maximum private memory of a bundle: its program, its stacks and its findings.
 const PRIVATE: u64 = 24 * MIB;
 
-/// A bundle that was started by hand; killed with the test.
+/// A bundle that was started manually. It is killed with the test.
 struct StartedManually(Child);
 
 impl StartedManually {
@@ -52,7 +52,7 @@ impl Drop for StartedManually {
     }
 }
 
-/// Ready bundles and their processes, once all of these are there.
+/// Returns the ready bundles and their process ids, once all of these are ready.
 fn bundles(farm: &Farm, names: &[&str]) -> BTreeMap<String, u32> {
     until_or(
         "all bundles are ready",
@@ -69,15 +69,15 @@ fn bundles(farm: &Farm, names: &[&str]) -> BTreeMap<String, u32> {
 /// Memory of a process, in bytes.
 #[derive(Debug, Default, Clone, Copy)]
 struct Memory {
-    /// Its own: private pages of all that is not shared memory.
+    /// Private pages outside shared memory.
     private: u64,
-    /// Shared memory that it maps.
+    /// Mapped shared memory.
     mapped: u64,
-    /// Shared memory that it has touched.
+    /// Shared memory that the process has touched.
     touched: u64,
 }
 
-/// What `smaps` says of a process; `None` when it has gone.
+/// Returns the memory of a process according to `smaps`, or `None` if the process has ended.
 fn memory(pid: u32) -> Option<Memory> {
     let smaps = std::fs::read_to_string(format!("/proc/{pid}/smaps")).ok()?;
     let (mut memory, mut shared) = (Memory::default(), false);
@@ -111,7 +111,7 @@ impl Memory {
     }
 }
 
-/// A valid map of this size: one road, and much that a program wrote for itself.
+/// Returns a valid map of this size: one road with a lot of user data.
 fn large_map(bytes: u64) -> Vec<u8> {
     let text = String::from_utf8(Content::Good(1).bytes()).unwrap();
     let (head, end) = text.split_at(text.find("</road>").unwrap());
@@ -193,7 +193,7 @@ fn who_writes_to_the_image_dies_alone() {
     farm.write("bad.xodr", &Content::NoHeader(1).bytes());
     let end = until("the offender ends", || offender.0.try_wait().unwrap());
     assert_eq!(end.signal(), Some(Signal::SEGV.as_raw()), "{end:?}");
-    // What the others found in the same image is as if nothing had happened.
+    // The findings of the other bundles in the same image are not affected.
     assert_eq!(farm.verdict("bad.xodr").verdict, Verdict::Rejected);
     let results = farm.result("bad.xodr");
     for bundle in &results.bundles {

@@ -1,4 +1,4 @@
-//! One animal at a time beside the standard bundles: it harms nobody but itself.
+//! Tests that one misbehaving bundle or reporter beside the standard bundles harms only itself.
 
 #![allow(
     clippy::unwrap_used,
@@ -18,7 +18,7 @@ use support::judge::{Files, judge};
 use support::processes::{peak_private_kib, private_kib};
 use support::watchdog::{until_or, until_so};
 
-/// Limits that bring misbehaviour to light soon, yet leave a busy machine time to be busy.
+/// Limits that reveal misbehaviour soon, but leave a busy machine enough time.
 const IMPATIENT: &[&str] = &[
     "--silence-limit",
     "4s",
@@ -30,14 +30,15 @@ const IMPATIENT: &[&str] = &[
     "1024",
 ];
 
-/// For animals that are known by what they say: 90 MiB for each job, which take their time on a busy
-/// machine. The deadlines are those of the product.
+/// Limits for bundles that are detected by their messages: 90 MiB for each job, which take time on
+/// a busy machine. The deadlines are the defaults of the product.
 const PATIENT: &[&str] = &["--max-restarts", "2", "--memory-limit", "1024"];
 
-/// Most private memory of the broker: far above what it needs, far below what a flood would take.
+/// Maximum private memory of the broker in KiB: far above its need, far below the size of a flood.
 const BROKER_KIB: u64 = 1 << 20;
 
-/// Most private memory of the broker beside a bundle that reports 16 MiB about every file.
+/// Maximum private memory of the broker in KiB beside a bundle that reports 16 MiB about every
+/// file.
 const FLOODED_KIB: u64 = 512 << 10;
 
 fn some_files(farm: &Farm) -> Files {
@@ -59,12 +60,13 @@ fn some_files(farm: &Farm) -> Files {
     files
 }
 
-/// Serves a farm with an animal in it, and demands what must hold beside any animal.
+/// Serves a farm with a misbehaving bundle or reporter, and checks the conditions that must hold
+/// beside all of them.
 fn beside(animal: &str, reason: &str) -> (Farm, support::broker::Broker) {
     beside_within(IMPATIENT, animal, reason)
 }
 
-/// The same within these limits.
+/// Does the same with these limits.
 fn beside_within(limits: &[&str], animal: &str, reason: &str) -> (Farm, support::broker::Broker) {
     let farm = Farm::with(limits);
     let broker = farm.serve_ready();
@@ -76,7 +78,7 @@ fn beside_within(limits: &[&str], animal: &str, reason: &str) -> (Farm, support:
     );
     let mut files = some_files(&farm);
     farm.settle(files.len());
-    // A fresh file passes while the animal is still there.
+    // A new file is judged while the misbehaving bundle is still there.
     let fresh = Content::Good(99);
     farm.write("fresh.xodr", &fresh.bytes());
     files.insert("fresh.xodr".to_owned(), fresh);
@@ -108,7 +110,7 @@ fn is_known(farm: &Farm, animal: &str) -> Option<()> {
     (status.peers.iter().any(named) || status.notices.iter().any(told)).then_some(())
 }
 
-/// Why the animal's checkers failed on a file.
+/// Returns the reasons why checkers of the misbehaving bundle failed on a file.
 fn reasons_of(farm: &Farm, name: &str, animal: &str) -> Vec<String> {
     let results = farm.result(name);
     let bundles = results
@@ -158,7 +160,8 @@ fn floods_issues() {
         reasons.iter().any(|it| it.contains("were cut off")),
         "{reasons:#?}"
     );
-    // Many floods at once fill the broker no more than a few do: what waits, waits in the queue.
+    // Many floods at once use no more memory of the broker than a few, because waiting jobs stay in
+    // the queue.
     for at in 0..40 {
         farm.write(&format!("many{at}.xodr"), &Content::Good(at).bytes());
     }
@@ -167,7 +170,8 @@ fn floods_issues() {
     assert!(peak < FLOODED_KIB, "the broker held {peak} KiB");
 }
 
-/// Most of a result's bytes beside a bundle that says far too much: none of it is kept.
+/// Maximum size of a result in bytes beside a bundle that reports far too much. None of its data is
+/// kept.
 const RESULT_BYTES: u64 = 1 << 20;
 
 fn results_are_small(farm: &Farm) {
@@ -207,8 +211,8 @@ fn never_the_same() {
     let status = farm.status().unwrap();
     let restless = status.notices.iter().filter(|it| it.kind == "flapping");
     assert!(restless.count() > 0, "{:#?}", status.notices);
-    // An epoch began with each change that was believed: of hundreds, those that were forgiven and a
-    // few later ones.
+    // Each accepted change starts an epoch. Of hundreds of changes, only the forgiven ones and a
+    // few later ones are accepted.
     let epochs = status.epoch & 0xffff_ffff;
     assert!(epochs < 40, "{epochs} epochs");
 }
@@ -221,7 +225,8 @@ fn dies_on_every_job() {
 
 #[test]
 fn lies_about_job_id() {
-    // A lie may by chance name a job that it has: then it is "done" without a word on anything.
+    // A false job id may by chance be one of its own jobs. That job is then "done" without any
+    // result.
     let (farm, _broker) = beside("lies_about_job_id", "");
     assert!(!reasons_of(&farm, "0.xodr", "lies_about_job_id").is_empty());
     until_so("it is said", || {
@@ -313,8 +318,8 @@ fn only_the_poisonous_file_is_condemned() {
         "{reasons:#?}"
     );
     assert_eq!(farm.verdict("0.xodr").verdict, Verdict::Accepted);
-    // It is not tried again until something changes. Before that the process that comes after the
-    // last death must be up: it is a restart of its own.
+    // The file is not tried again until something changes. The process after the last death must be
+    // up first, because it is a restart of its own.
     let peer = |farm: &Farm| {
         let peers = farm.status()?.peers;
         peers.into_iter().find(|it| it.name == "dies_on_some_files")

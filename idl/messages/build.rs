@@ -1,16 +1,16 @@
-//! Finds the day that results name as that of the build, without anybody's hand and the same for
-//! everybody who builds the same source: `SOURCE_DATE_EPOCH` where a packager sets it, else the day
-//! of the commit, else, where there is no git, `released` in the workspace's `Cargo.toml`.
+//! Finds the build day for results, automatically and with the same value for everybody who builds
+//! the same source. `SOURCE_DATE_EPOCH` comes first, if a packager sets it, then the day of the
+//! commit. Without git, `released` in the workspace's `Cargo.toml` is used.
 //!
-//! A new commit alone does not run this again: everything rests on this crate, and all of it would
-//! be built anew for one line. So a working copy may name the day of an earlier commit; what is
-//! built from a fresh clone, as releases are, never does.
+//! A new commit alone does not run this script again. Everything depends on this crate, so one
+//! changed line would rebuild all crates. A working copy may therefore show the day of an earlier
+//! commit. A build from a fresh clone, such as a release, always shows the correct day.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 fn main() {
-    // Asked now, not when this was compiled: a target directory may move with its source.
+    // Read at run time, because a target directory may move together with its source.
     let here = std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default();
     let root = Path::new(&here).join("../..");
     let manifest = root.join("Cargo.toml");
@@ -31,7 +31,7 @@ fn main() {
     }
 }
 
-/// Seconds since 1970; `None` when this is no clone, or lies in a clone of something else.
+/// Returns the last commit's time in seconds since 1970; `None` outside of a clone of qcbus.
 fn time_of_commit(root: &Path) -> Option<String> {
     let git = |arguments: &[&str]| {
         let output = Command::new("git")
@@ -54,7 +54,7 @@ fn released(manifest: &Path) -> Option<String> {
     value.split_once('"').map(|(date, _)| date.to_owned())
 }
 
-/// The day in UTC, `YYYY-MM-DD`, by counting years from the first of March: the leap day is last.
+/// Returns the UTC day, `YYYY-MM-DD`. Years start in March, so that the leap day is last.
 pub(crate) fn day_of(seconds: i64) -> String {
     let days = seconds.div_euclid(86_400) + 719_468;
     let (era, of_era) = (days.div_euclid(146_097), days.rem_euclid(146_097));

@@ -1,4 +1,4 @@
-//! The driver: it knows what is in every file, and what it has done to whom.
+//! The driver knows the content of every file, and records what it did to each process.
 
 use std::collections::BTreeMap;
 use std::process::Command;
@@ -21,49 +21,49 @@ use crate::support::judge::Files;
 use crate::support::processes::{Process, ProcessKind, all_with, signal_pid};
 use crate::support::watchdog::{pause, until_or};
 
-/// Longest pause between two deeds, in milliseconds.
+/// Longest pause between two actions, in milliseconds.
 const PAUSE: u64 = 90;
-/// What the filler leaves of the shared memory, in bytes.
+/// Shared memory that the filler leaves free, in bytes.
 const LEFT: u64 = 2 << 20;
-/// So long after the shared memory was full, a broker may still have ended by it: its end is seen
-/// between two deeds.
+/// Time after a full shared memory in which a broker may still end because of it. Its end is
+/// noticed between two actions.
 const LATE: Duration = Duration::from_secs(2);
-/// Where the filler lies.
+/// Path of the filler.
 const FILLER: &str = "/dev/shm/filler-of-the-chaos-test";
 
-/// The driver.
+/// Executes the actions of the storm.
 pub struct Driver {
     pub farm: Farm,
     pub broker: Option<Broker>,
     pub files: Files,
-    /// What files depend on and is no file to check itself.
+    /// Files that others depend on and that are not checked themselves.
     pub parts: Files,
     pub ledger: Ledger,
     pub dice: Dice,
     pub tally: Tally,
     pub peak_kib: u64,
-    /// Standard bundles killed or stopped, by name.
+    /// Number of times that standard bundles were killed or stopped, by name.
     pub harmed: BTreeMap<String, u64>,
-    /// When a standard bundle stood still, or the shared memory was full.
+    /// Times in which a standard bundle was stopped, or the shared memory was full.
     pub(super) stops: Vec<Stop>,
-    /// When the broker is started again.
+    /// Time of the next start of the broker.
     start_at: Option<Instant>,
     stopped: Vec<(i32, Instant)>,
     pub(super) animals: Vec<&'static str>,
     full_until: Option<Instant>,
-    /// When the shared memory was last full.
+    /// Last time at which the shared memory was full.
     full_at: Option<Instant>,
     pub(super) config: &'static str,
     pub(super) next_file: u64,
-    /// Of the bundle of one's own.
+    /// Version of the custom bundle.
     pub(super) version: u64,
-    /// When its program comes back.
+    /// Time at which its program comes back.
     pub(super) gone_until: Option<Instant>,
-    /// When its manifest comes back.
+    /// Time at which its manifest comes back.
     pub(super) removed_until: Option<Instant>,
-    /// When its manifest was away: from when to when.
+    /// Periods without its manifest: start and end.
     pub(super) removals: Vec<(Duration, Duration)>,
-    /// The program that brokers are started from was replaced.
+    /// Whether the program that brokers are started from was replaced.
     pub(super) is_replaced: bool,
     /// Files that are being written to.
     pub(super) writers: Vec<Writer>,
@@ -93,14 +93,14 @@ impl Driver {
             gone_until: None,
             removed_until: None,
             removals: Vec::new(),
-            // There is none yet.
+            // The program is not installed yet.
             is_replaced: true,
             writers: Vec::new(),
         }
     }
 
     pub fn start_broker(&mut self) {
-        // With a configuration that cannot be used no broker starts: somebody has mended it.
+        // A broker does not start with an invalid configuration, so the driver fixes it.
         if self.config == failures::BROKEN {
             self.write_config(failures::CALM);
         }
@@ -111,7 +111,7 @@ impl Driver {
         self.start_at = None;
     }
 
-    /// One deed.
+    /// Executes one action.
     pub fn step(&mut self) {
         let wait = self.dice.millis(PAUSE);
         pause(wait);
@@ -146,7 +146,7 @@ impl Driver {
         }
     }
 
-    /// What has lasted long enough ends.
+    /// Ends the failures that have lasted long enough.
     fn mend(&mut self) {
         let now = Instant::now();
         if self.start_at.is_some_and(|at| at <= now) {
@@ -173,8 +173,8 @@ impl Driver {
         self.end_writers(|writer| writer.until <= now);
     }
 
-    /// It did not end by our hand. A shared memory that somebody else fills may take it down (a
-    /// page that cannot be had is a bus error); nothing else may.
+    /// Handles a broker that the driver did not end. It may end by a full shared memory, because a
+    /// missing page is a bus error. No other reason is allowed.
     fn ended_by_itself(&mut self, how: std::process::ExitStatus) {
         use std::os::unix::process::ExitStatusExt;
         if how.signal() == Some(Signal::BUS.as_raw()) && self.is_full() {
@@ -192,11 +192,11 @@ impl Driver {
         self.start_broker();
     }
 
-    /// Whether it refused to start for a good reason: a configuration that was broken or half
-    /// written when it first looked, or no room in the shared memory.
+    /// Checks whether the broker refused to start for a valid reason. The configuration was broken
+    /// or half written when it was first read, or the shared memory was full.
     fn is_refusal(&self, how: std::process::ExitStatus) -> bool {
         let log = self.farm.log();
-        // Its children, who share the log, may have said something since.
+        // Its children share the log and may have written to it since.
         let said = |words: &str| log.lines().rev().take(20).any(|line| line.contains(words));
         match how.code() {
             Some(2) => said("config.xml:"),
@@ -213,7 +213,7 @@ impl Driver {
         self.full_until.is_some() || self.full_at.is_some_and(lately)
     }
 
-    /// Everything goes on as it should, and the farm comes to rest.
+    /// Ends all failures and waits until the farm is at rest.
     pub fn calm_down(&mut self) {
         for (pid, _) in std::mem::take(&mut self.stopped) {
             signal_pid(pid, Signal::CONT);
@@ -234,8 +234,8 @@ impl Driver {
             || self.farm.status(),
             || self.farm.log(),
         );
-        // A new version is started at once, also where the one before keeps failing. While no broker
-        // runs an upgrade would go unseen, if a process of the version before is about.
+        // A new version is started immediately, even if the previous one keeps failing. Without a
+        // broker, an upgrade would be missed if a process of the previous version still runs.
         self.want_again();
         self.upgrade();
         self.tally.note("calm", "");
@@ -260,13 +260,13 @@ impl Driver {
         let calm = there.clone().all(|it| !animal(&it.name))
             && there.clone().any(judge)
             && there.filter(|it| it.name.ends_with("Bundle")).count() >= 2;
-        // Asking to reload answers when the present files of the configuration are in force.
+        // The answer to a reload arrives when the present configuration files are in force.
         let answer = self.farm.ask(&Request::Reload)?;
         let reloaded = matches!(answer, Response::Reloaded { .. });
         (calm && reloaded).then_some(())
     }
 
-    /// What was done, what the broker said, and, last, how it is.
+    /// Returns the last actions, the log of the broker and its current state.
     fn what_is(&self) -> String {
         let status = self.farm.status();
         let peers = status.iter().flat_map(|it| &it.peers);
@@ -288,7 +288,8 @@ impl Driver {
             .retain(|(stopped, _)| u32::try_from(*stopped) != Ok(pid));
         self.tally.note("kill broker", &pid.to_string());
         self.handle_state();
-        // Mostly at once, sometimes so late that the others have given up.
+        // The restart is usually immediate, but sometimes so late that the other processes have
+        // given up.
         let late = if self.dice.below(12) == 0 {
             11_000
         } else {
@@ -309,7 +310,7 @@ impl Driver {
         );
     }
 
-    /// Counts what was done to a standard bundle. Its name, if it is one.
+    /// Counts an action against a standard bundle. Returns its name if it is one.
     fn harm(&mut self, process: &Process) -> Option<&'static str> {
         let names = [("xodr", "xodrBundle"), ("xosc", "xoscBundle")];
         let whose = |word: &str| process.words.iter().any(|it| it == word);
@@ -319,7 +320,7 @@ impl Driver {
     }
 
     pub(super) fn any_process(&mut self, wanted: impl Fn(&Process) -> bool) -> Option<Process> {
-        // What modules have started has not been told of the instance.
+        // Processes that modules have started do not know the instance.
         let guests = all_with(&self.guests().to_string_lossy());
         let all = self.farm.processes().into_iter().chain(guests);
         let all: Vec<Process> = all.filter(wanted).collect();
@@ -345,7 +346,7 @@ impl Driver {
     }
 
     fn fill(&mut self) {
-        // Only a shared memory of its own may be filled.
+        // Only a private shared memory may be filled.
         if !is_inside() || self.full_until.is_some() {
             return;
         }

@@ -1,13 +1,13 @@
-//! Which troubles there are, and how often each comes.
+//! Defines the failures and their frequency.
 
 use crate::support::dice::Dice;
 
-/// The configuration under which everything is judged in the end.
+/// Configuration under which all files are judged at the end.
 pub const CALM: &str = "<Config>\n  <CheckerBundle application=\"xodrBundle\"/>\n  \
     <CheckerBundle application=\"xoscBundle\"/>\n  \
     <CheckerBundle application=\"judges_strictly\"/>\n</Config>\n";
 
-/// A configuration that demands animals, too, whether they are there or not.
+/// Configuration that also requires misbehaving bundles, whether they are registered or not.
 pub const WILD: &str = "<Config>\n  <CheckerBundle application=\"xodrBundle\"/>\n  \
     <CheckerBundle application=\"xoscBundle\"/>\n  \
     <CheckerBundle application=\"judges_strictly\"/>\n  \
@@ -18,10 +18,10 @@ pub const WILD: &str = "<Config>\n  <CheckerBundle application=\"xodrBundle\"/>\
     <CheckerBundle application=\"qc_polite\"/>\n  \
     <CheckerBundle application=\"floods_issues\"/>\n</Config>\n";
 
-/// What cannot be used and must change nothing.
+/// Invalid configuration, which must change nothing.
 pub const BROKEN: &str = "<Config>\n  <CheckerBundle application=\"xodrBundle\">\n";
 
-/// Animals that come and go.
+/// Misbehaving bundles and reporters that come and go.
 pub const ANIMALS: &[&str] = &[
     "hangs_after_hello",
     "floods_issues",
@@ -37,8 +37,8 @@ pub const ANIMALS: &[&str] = &[
     "reporter_never_acknowledges",
 ];
 
-/// One-shot modules of ASAM's framework that come and go like animals: what each does after it has written a polite
-/// result. What they leave behind has their own name in its command line.
+/// ASAM modules that come and go like misbehaving bundles, with the action of each after it has
+/// written a correct result. Their descendants have the name of the module in their command line.
 pub const GUESTS: &[(&str, &str)] = &[
     ("qc_polite", ""),
     ("qc_crashes", "kill -SEGV $$"),
@@ -51,67 +51,67 @@ pub const GUESTS: &[(&str, &str)] = &[
     ),
 ];
 
-/// What modules that misbehave may take.
+/// Limits for misbehaving modules.
 pub const GUEST_LIMITS: (u64, u64, u64) = (2, 128, 4);
 
-/// Something to do.
+/// An action of the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Failure {
-    /// Kill the broker and start another.
+    /// Kills the broker and starts another.
     KillBroker,
-    /// Kill a standard bundle.
+    /// Kills a standard bundle.
     KillBundle,
-    /// Kill a reporter.
+    /// Kills a reporter.
     KillReporter,
-    /// Kill an animal.
+    /// Kills a misbehaving bundle.
     KillAnimal,
-    /// Stop any process for a while.
+    /// Stops any process for a while.
     Stop,
-    /// An animal comes or goes.
+    /// Adds or removes a misbehaving bundle.
     Animal,
-    /// The configuration changes.
+    /// Changes the configuration.
     Configure,
-    /// A file is written at once.
+    /// Writes a file at once.
     Write,
-    /// A file is written in two halves with a pause between.
+    /// Writes a file in two halves with a pause between.
     WriteTorn,
-    /// A file is written under another name and renamed into place.
+    /// Writes a file under another name and renames it into place.
     Rename,
-    /// A file gets another name.
+    /// Renames a file.
     Move,
-    /// A file is cut off.
+    /// Truncates a file.
     Truncate,
-    /// A file is deleted.
+    /// Deletes a file.
     Delete,
-    /// A file is written again and again while it is checked.
+    /// Writes a file again and again while it is checked.
     Rewrite,
-    /// Shared memory runs full for a while.
+    /// Fills the shared memory for a while.
     Fill,
-    /// Something that others depend on is written.
+    /// Writes a file that others depend on.
     Share,
-    /// Something that others depend on goes; it comes back when it is written again.
+    /// Removes a file that others depend on. It comes back with the next write.
     Unshare,
-    /// A link to a file elsewhere takes the place of a file.
+    /// Replaces a file by a link to a file elsewhere.
     Link,
-    /// The configuration and the manifests are read again.
+    /// Reloads the configuration and the manifests.
     Reload,
-    /// The bundle of one's own gets another version.
+    /// Gives the custom bundle another version.
     Upgrade,
-    /// The program of the bundle of one's own goes from the disk for a while.
+    /// Removes the program of the custom bundle from the disk for a while.
     Vanish,
-    /// The manifest of the bundle of one's own goes for a while.
+    /// Removes the manifest of the custom bundle for a while.
     Remove,
-    /// A result, a verdict file or a published file is removed.
+    /// Removes a result, a verdict file or a published file.
     LoseOutput,
-    /// A copy tool writes in a hidden directory, and may move the file from there into place.
+    /// Writes in the hidden directory of a copy tool, and may move the file from there into place.
     Hide,
-    /// A file is open for writing for seconds, half-written.
+    /// Keeps a half-written file open for writing for seconds.
     WriteSlowly,
-    /// The program on the disk is replaced by another one.
+    /// Replaces the program on disk by another one.
     Replace,
 }
 
-/// Every trouble with its share.
+/// Relative frequency of every failure.
 const SHARES: &[(u64, Failure)] = &[
     (6, Failure::KillBroker),
     (26, Failure::KillBundle),
@@ -141,7 +141,7 @@ const SHARES: &[(u64, Failure)] = &[
     (2, Failure::Replace),
 ];
 
-/// What comes next.
+/// Chooses the next failure.
 pub fn any(dice: &mut Dice) -> Failure {
     let total: u64 = SHARES.iter().map(|(share, _)| share).sum();
     let mut at = dice.below(total);

@@ -1,4 +1,4 @@
-//! What the driver does to files.
+//! Actions of the driver on files.
 
 use std::fs::File;
 use std::io::Write;
@@ -10,26 +10,26 @@ use crate::support::content::{CATALOG, CATALOGS, Content, Mark};
 use crate::support::dice::Dice;
 use crate::support::watchdog::pause;
 
-/// Files that there are about.
+/// Maximum number of files at the same time.
 const FILES: usize = 80;
-/// Before and after 1970: times that some files say they are from.
+/// Offset before and after 1970 of the modification times of some files.
 const LONG_AGO: Duration = Duration::from_secs(1_000_000);
 /// Maps that scenarios share.
 const SHARED_MAPS: &[&str] = &["shared-0.xodr", "shared-1.xodr", "shared-2.xodr"];
-/// What maps include. No files to check.
+/// Parts that maps include. They are not checked themselves.
 const SHARED_PARTS: &[&str] = &["part-0.xml", "part-1.xml"];
 
-/// Where a copy tool keeps what it has not finished.
+/// Directory in which a copy tool keeps unfinished files.
 pub const HIDDEN: &str = ".~tmp~";
 
-/// Somebody who has a file open and has written half of it.
+/// A writer that has a file open and has written half of it.
 #[derive(Debug)]
 pub struct Writer {
     file: File,
     name: String,
     content: Content,
     begun: Duration,
-    /// When the rest comes.
+    /// Time at which the rest is written.
     pub until: Instant,
 }
 
@@ -41,7 +41,7 @@ fn mark(dice: &mut Dice) -> Mark {
 }
 
 impl Driver {
-    /// Everything that files share.
+    /// Writes all shared files.
     pub fn write_shared(&mut self) {
         std::fs::create_dir_all(self.path(CATALOGS)).unwrap();
         for name in SHARED_PARTS.iter().chain(SHARED_MAPS).chain(&[CATALOG]) {
@@ -65,7 +65,7 @@ impl Driver {
         self.put(name, content, "share");
     }
 
-    /// Something that others depend on becomes another.
+    /// Changes a file that others depend on.
     pub fn share(&mut self) {
         let all = [SHARED_PARTS, SHARED_MAPS, &[CATALOG]].concat();
         if let Some(name) = self.dice.pick(&all).copied() {
@@ -73,8 +73,8 @@ impl Driver {
         }
     }
 
-    /// Something that others depend on goes. Not the catalog: a scenario names the directory, which
-    /// may be empty.
+    /// Removes a file that others depend on. The catalog stays, because a scenario refers to the
+    /// directory, which may be empty.
     pub fn unshare(&mut self) {
         let all = [SHARED_PARTS, SHARED_MAPS].concat();
         let Some(name) = self.dice.pick(&all).copied() else {
@@ -89,7 +89,7 @@ impl Driver {
         }
     }
 
-    /// Whatever others depend on is there again.
+    /// Restores all missing files that others depend on.
     pub fn share_what_has_gone(&mut self) {
         for name in SHARED_PARTS.iter().chain(SHARED_MAPS) {
             if !self.path(name).exists() {
@@ -98,8 +98,8 @@ impl Driver {
         }
     }
 
-    /// A link to a file in a directory that nobody watches takes the place of a file, or of a link.
-    /// What is written to that place from then on goes through the link.
+    /// Replaces a file or a link by a link to a file in an unwatched directory. Later writes to
+    /// that path go through the link.
     pub fn link(&mut self) {
         let name = match self.any_file() {
             Some(name) if self.dice.below(2) == 0 => name,
@@ -141,7 +141,7 @@ impl Driver {
         self.put(&name, content, "write");
     }
 
-    /// Something that a file of this name may contain.
+    /// Returns a possible content for a file of this name.
     fn content_for(&mut self, name: &str) -> Content {
         let number = self.dice.roll() >> 8;
         if name.ends_with(".xosc") {
@@ -171,7 +171,7 @@ impl Driver {
         self.now_holds(name, begun, content);
     }
 
-    /// A change of a file is over.
+    /// Records a finished change of a file.
     fn now_holds(&mut self, name: &str, begun: Duration, content: Content) {
         self.ledger.note(name, begun, Some(&content));
         let files = match content {
@@ -181,8 +181,8 @@ impl Driver {
         files.insert(name.to_owned(), content);
     }
 
-    /// One file in three says that it was last written to long ago, as a copy may; all these say the
-    /// same, some that it was before 1970.
+    /// Sets an old modification time on one file in three, as a copy may do. There are only two
+    /// such times, and one is before 1970.
     fn age(&mut self, path: &Path) {
         let time = match self.dice.below(6) {
             0 => UNIX_EPOCH - LONG_AGO,
@@ -193,7 +193,7 @@ impl Driver {
         file.set_modified(time).unwrap();
     }
 
-    /// One file in four is a scenario.
+    /// Returns a new file name. One file in four is a scenario.
     fn new_name(&mut self) -> String {
         self.next_file += 1;
         let suffix = match self.dice.below(4) {
@@ -203,7 +203,7 @@ impl Driver {
         format!("{}.{suffix}", self.next_file)
     }
 
-    /// A file that no other depends on.
+    /// Returns a file that no other file depends on.
     fn any_file(&mut self) -> Option<String> {
         let alone = |name: &&String| name.starts_with(|c: char| c.is_ascii_digit());
         let names: Vec<String> = self.files.keys().filter(alone).cloned().collect();
@@ -229,7 +229,7 @@ impl Driver {
         self.now_holds(&name, begun, content);
     }
 
-    /// Somebody writes half of a file, and the rest seconds later.
+    /// Writes half of a file. The rest follows seconds later.
     pub fn write_slowly(&mut self) {
         let name = self.new_name();
         let content = self.content_for(&name);
@@ -247,7 +247,8 @@ impl Driver {
         });
     }
 
-    /// Some of them write the rest. Half of a file is never judged, also by a broker that began meanwhile.
+    /// Writes the rest for some writers. A half-written file is never checked, also by a broker
+    /// that started in between.
     pub(super) fn end_writers(&mut self, is_over: impl Fn(&Writer) -> bool) {
         let (over, rest) = std::mem::take(&mut self.writers)
             .into_iter()
@@ -270,7 +271,7 @@ impl Driver {
         }
     }
 
-    /// A copy tool writes in a directory of its own, and may move the file from there into place.
+    /// Writes a file in the hidden directory of a copy tool, and may move it from there into place.
     pub fn hide(&mut self) {
         let name = self.new_name();
         let content = self.content_for(&name);

@@ -1,5 +1,5 @@
-//! The history of a storm: what could be seen from outside, and when. It is written down while the
-//! storm rages, and judged afterwards: a wrong acceptance that healed counts as well.
+//! The history of a storm: all observations from outside, with their times. It is recorded during
+//! the storm and judged afterwards. A wrong acceptance counts even if it was corrected later.
 
 use std::collections::BTreeMap;
 use std::os::unix::fs::MetadataExt;
@@ -22,22 +22,22 @@ use crate::support::farm::Farm;
 use crate::support::reports::torn;
 use crate::support::watchdog::pause;
 
-/// Something that was seen.
+/// An observation.
 #[derive(Debug, Clone)]
 pub struct Seen {
-    /// Since when it may have been so: the last look before, or when it was asked for.
+    /// Earliest possible time: the last look before it, or the time of the request.
     pub from: Duration,
-    /// When it was seen.
+    /// Time of the observation.
     pub at: Duration,
     pub what: What,
 }
 
-/// What was seen.
+/// Kind of observation.
 #[derive(Debug, Clone)]
 pub enum What {
     /// A verdict file.
     Told(Box<Told>),
-    /// A report that was not whole.
+    /// An incomplete report.
     TornReport(String),
     /// A file behind the gate.
     Published { name: String, digest: String },
@@ -47,11 +47,11 @@ pub enum What {
         verdict: Verdict,
         digest: String,
     },
-    /// The bundle of one's own is among those who must judge.
+    /// The custom bundle is among the required bundles.
     Demanded,
-    /// The broker has ended a session and killed its process, and says why.
+    /// The broker has ended a session and killed its process, for this reason.
     Killed { name: String, why: String },
-    /// A little work of the watchers' own, and how long it took: how slow the machine is.
+    /// A small work of the watchers, and the time that it took. It shows how slow the machine is.
     Worked { took: Duration },
 }
 
@@ -61,15 +61,15 @@ pub struct Told {
     pub name: String,
     pub verdict: String,
     pub digest: String,
-    /// Path and digest; none of what was not there.
+    /// Path and digest. The digest is `None` for a missing file.
     pub depends_on: Vec<(String, Option<String>)>,
     /// Bundles that took part.
     pub bundles: Vec<String>,
     /// Bundles with a checker that failed.
     pub failed: Vec<String>,
-    /// Bundles that had to judge; absent where brokers do not say so.
+    /// Required bundles. `None` if the broker does not report them.
     pub demanded: Option<Vec<String>>,
-    /// In which this was so.
+    /// Epoch of the verdict.
     pub epoch: Option<u64>,
 }
 
@@ -82,7 +82,7 @@ impl Told {
             list.filter_map(|it| text(&it[field])).collect()
         };
         let depends_on = json["depends_on"].as_array().into_iter().flatten();
-        // A list of names, or of objects that say more of each.
+        // The list has names, or objects with a name and further data.
         let demanded = |it: &serde_json::Value| text(it).or_else(|| text(&it["name"]));
         Some(Told {
             name: name.to_owned(),
@@ -101,7 +101,7 @@ impl Told {
     }
 }
 
-/// Those who look while it storms.
+/// Threads that observe the farm during the storm.
 #[derive(Debug)]
 pub struct Watchers {
     shared: Arc<Shared>,
@@ -135,7 +135,7 @@ impl Shared {
 }
 
 impl Watchers {
-    /// Begins to look; `start` is the beginning of all times.
+    /// Starts the observation. All times are relative to `start`.
     pub fn start(farm: &Farm, start: Instant, seed: u64) -> Watchers {
         let shared = Arc::new(Shared {
             start,
@@ -157,7 +157,7 @@ impl Watchers {
         Watchers { shared, threads }
     }
 
-    /// Ends the looking. What was seen, in order.
+    /// Ends the observation and returns all observations in order.
     pub fn end(mut self) -> Vec<Seen> {
         self.stop();
         std::mem::take(&mut self.shared.seen())
@@ -177,25 +177,25 @@ impl Drop for Watchers {
     }
 }
 
-/// How often the results and the gate are looked through.
+/// Interval between two looks at the results and the gate.
 const LOOK: Duration = Duration::from_millis(10);
-/// Every so many looks at the reports there are.
+/// Number of looks between two looks at the reports.
 const LOOK_AT_REPORTS: u32 = 50;
-/// Every so many looks the broker is asked what it has to say.
+/// Number of looks between two status requests to the broker.
 const ASK_STATUS: u32 = 10;
 
-/// How the names of verdict files end. Their inodes do not count: the storm moves the state as a copy, and a
-/// copied verdict is not a new one.
+/// Suffix of verdict files. Their inodes are ignored, because the storm replaces the state by a
+/// copy, and a copied verdict is not a new one.
 const VERDICTS: &str = ".verdict.json";
 
-/// Files seen before, by what would be different had they changed.
+/// Files seen before, with the metadata that would show a change.
 type Marks = BTreeMap<PathBuf, (u64, i64, i64, u64)>;
 
 fn look(shared: &Shared) {
     let (mut results, mut gate) = (Marks::new(), Marks::new());
     let (mut from, mut round) = (Duration::ZERO, 0);
     let mut told: Vec<(String, String)> = Vec::new();
-    // Those that are documents, of which half can be told from the whole.
+    // In these formats, an incomplete report can be distinguished from a complete one.
     let documents = [".sarif", ".junit.xml", ".html"];
     let mut reports = documents.map(|suffix| (suffix, Marks::new()));
     while !shared.is_over() {
@@ -239,14 +239,14 @@ fn look(shared: &Shared) {
     }
 }
 
-/// Whom a broker has killed, and why.
+/// Returns the peers that a broker has killed, and the reasons.
 fn killed(status: &Status) -> Vec<(String, String)> {
     let killed = status.notices.iter().filter(|it| it.kind == "killed");
     let named = killed.filter_map(|it| Some((it.about.clone()?, it.text.clone())));
     named.collect()
 }
 
-/// Files that are not as they were at the last look, without their suffix, with their bytes.
+/// Returns the files that changed since the last look: name without suffix, and bytes.
 fn changed(directory: &Path, marks: &mut Marks, suffix: &str) -> Vec<(String, Vec<u8>)> {
     let mut found = Vec::new();
     let mut now = Marks::new();
@@ -266,7 +266,7 @@ fn changed(directory: &Path, marks: &mut Marks, suffix: &str) -> Vec<(String, Ve
         let inode = if suffix == VERDICTS { 0 } else { is.ino() };
         let mark = (inode, is.mtime(), is.mtime_nsec(), is.size());
         let known = marks.get(&path) == Some(&mark);
-        // What went while it was looked at is looked for again.
+        // A file that vanished during the look is looked for again.
         if let Ok(bytes) = (!known).then(|| std::fs::read(&whole)).transpose() {
             found.extend(bytes.map(|bytes| (name, bytes)));
             now.insert(path, mark);
@@ -305,7 +305,7 @@ fn ask(shared: &Shared, mut dice: Dice) {
     }
 }
 
-/// Does a little work again and again, which tells how slow the machine is.
+/// Repeats a small work, which shows how slow the machine is.
 fn work(shared: &Shared) {
     while !shared.is_over() {
         pause(strain::PAUSE);

@@ -1,4 +1,4 @@
-//! The ledger: which bytes lay at which place from when to when.
+//! The ledger records the bytes at each path over time.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -7,29 +7,29 @@ use sha2::{Digest, Sha256};
 
 use crate::support::content::Content;
 
-/// What somebody may have read at a place.
+/// Content that a reader may have found at a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Offered<'l> {
     /// Bytes with this digest.
     Bytes(&'l str),
-    /// Something half-written.
+    /// Half-written content.
     Unfinished,
-    /// Nothing lay there.
+    /// No file.
     Nothing,
 }
 
-/// What was done to a file.
+/// A change of a file.
 #[derive(Debug, Clone)]
 struct Change {
-    /// When it began.
+    /// Start of the change.
     begun: Duration,
-    /// When it was over.
+    /// End of the change.
     done: Duration,
-    /// What has lain there since; `None`: nothing.
+    /// Digest of the new content, or `None` if the file was removed.
     digest: Option<String>,
 }
 
-/// What the driver has done to all files.
+/// All changes that the driver has made to files.
 #[derive(Debug)]
 pub struct Ledger {
     pub start: Instant,
@@ -46,12 +46,12 @@ impl Ledger {
         }
     }
 
-    /// How long it has been kept.
+    /// Returns the time since the start of the ledger.
     pub fn now(&self) -> Duration {
         self.start.elapsed()
     }
 
-    /// A change that began at `begun` is over.
+    /// Records a finished change that began at `begun`.
     pub fn note(&mut self, name: &str, begun: Duration, content: Option<&Content>) {
         let done = self.now();
         let digest = content.map(|content| {
@@ -67,12 +67,12 @@ impl Ledger {
         });
     }
 
-    /// What has this digest.
+    /// Returns the content with this digest.
     pub fn content(&self, digest: &str) -> Option<&Content> {
         self.known.get(digest)
     }
 
-    /// Everything that may have been read at a place in this time.
+    /// Returns everything that may have been read at a path in this period.
     pub fn seen(&self, name: &str, from: Duration, to: Duration) -> Vec<Offered<'_>> {
         let changes = self.changes.get(name).map_or(&[][..], Vec::as_slice);
         let mut seen = Vec::new();
@@ -89,14 +89,14 @@ impl Ledger {
         seen
     }
 
-    /// Whether these bytes lay at a place before this time.
+    /// Checks whether these bytes were at a path before this time.
     pub fn had_bytes(&self, name: &str, digest: &str, to: Duration) -> bool {
         let seen = self.seen(name, Duration::ZERO, to);
         seen.contains(&Offered::Bytes(digest))
     }
 }
 
-/// SHA-256 in hexadecimal.
+/// Returns the SHA-256 in hexadecimal.
 pub fn digest(bytes: &[u8]) -> String {
     let digest = Sha256::digest(bytes);
     digest.iter().map(|byte| format!("{byte:02x}")).collect()

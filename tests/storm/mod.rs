@@ -1,5 +1,5 @@
-//! The storm: a driver that does everything to a farm that can happen to one, and what must be so
-//! when it is over.
+//! The storm: a driver causes every possible failure in a farm, and the conditions are checked at
+//! the end.
 
 mod driver;
 mod failures;
@@ -30,16 +30,16 @@ use crate::support::reports::{REPORTS, reported};
 use crate::support::watchdog::until_or;
 use crate::{end, report};
 
-/// Length of the storm.
+/// Returns the length of the storm in seconds.
 pub fn seconds() -> u64 {
     crate::number_from("QCBUS_CHAOS_SECONDS", 20)
 }
 
-/// More private memory than this, at its peak, and the broker's memory is not bounded.
+/// Limit for the broker's peak private memory. A higher peak means that its memory is not bounded.
 const PEAK_KIB: u64 = 500 << 10;
 
-/// Lets two storms rage, one after another: with a configuration, and without one, where whoever is on
-/// the roster must judge and nobody else says so. Waits until it is calm, and judges.
+/// Runs two storms, one after another. In the first, a configuration names the required bundles. In
+/// the second, only the registry does. Waits until the farm is at rest, and judges.
 pub fn rage(seed: u64, seconds: u64) {
     report(&format!(
         "chaos: QCBUS_CHAOS_SEED={seed} QCBUS_CHAOS_SECONDS={seconds}"
@@ -49,7 +49,7 @@ pub fn rage(seed: u64, seconds: u64) {
     rage_under(Demands::Registry, seed.wrapping_add(1), half);
 }
 
-/// What says who must judge.
+/// Source of the required bundles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Demands {
     Configuration,
@@ -80,7 +80,7 @@ fn rage_under(demands: Demands, seed: u64, length: Duration) {
     driver.calm_down();
     let end_kib = driver.memory_kib();
     let history = watchers.end();
-    // What a configuration demands is demanded also while its manifest is away.
+    // A bundle required by the configuration stays required while its manifest is missing.
     let removals = match demands {
         Demands::Configuration => Removals::default(),
         Demands::Registry => Removals::new(&driver.removals, &history),
@@ -112,7 +112,7 @@ fn arguments(farm: &Farm) -> Vec<String> {
         .collect()
 }
 
-/// What must be so of everything that was seen while it stormed.
+/// Checks the conditions that must hold for every observation of the storm.
 fn at_every_moment(driver: &mut Driver, history: &[Seen], removals: &Removals) {
     let mut all = verdicts::complaints(history, &driver.ledger, removals);
     let strain = Strain::new(history);
@@ -141,7 +141,8 @@ fn at_every_moment(driver: &mut Driver, history: &[Seen], removals: &Removals) {
     );
 }
 
-/// A pair is condemned for two deaths alone: no bundle has more of them than half its deaths.
+/// A pair of file and bundle is condemned only after two deaths. The count of a bundle is therefore
+/// at most half its deaths.
 fn condemned_are_few(driver: &Driver, condemned: &BTreeMap<String, u64>) {
     for (bundle, count) in condemned {
         let harmed = driver.harmed.get(bundle).copied().unwrap_or_default();
@@ -153,8 +154,8 @@ fn condemned_are_few(driver: &Driver, condemned: &BTreeMap<String, u64>) {
     }
 }
 
-/// What has its verdict keeps it over a restart: how many files are judged a second time though
-/// nothing has changed.
+/// Restarts the broker and returns how many unchanged files are checked a second time. A file with
+/// a verdict must keep it over a restart.
 fn judged_again_for_nothing(driver: &mut Driver) -> u64 {
     let jobs =
         |driver: &Driver| -> u64 { verdicts_in_journal(&driver.farm.journal()).values().sum() };
@@ -204,7 +205,7 @@ fn demand(mut driver: Driver, seen: usize, start_kib: u64, end_kib: u64, seconds
         until_or(
             "nothing is left in /dev/shm",
             || shm_segments("qc").is_empty().then_some(()),
-            // Its names, and what the last broker did, say who left it.
+            // The names and the last log of the broker show which process left them.
             || {
                 let files = files_below(std::path::Path::new("/dev/shm"));
                 let (roots, log) = (shm_segments("qc"), tail(&log_of_the_end));
@@ -229,7 +230,7 @@ fn demand(mut driver: Driver, seen: usize, start_kib: u64, end_kib: u64, seconds
     ));
 }
 
-/// What copy tools keep for themselves has no result and is not published.
+/// Checks that hidden files of copy tools have no result and are not published.
 fn nothing_hidden_is_judged(driver: &Driver) {
     for directory in [driver.farm.out(), driver.farm.gate()] {
         let mut files = files_below(&directory).into_iter();
@@ -238,7 +239,7 @@ fn nothing_hidden_is_judged(driver: &Driver) {
     }
 }
 
-/// The reporters have everything, too, and nothing about files that have gone.
+/// Checks that the reporters have all files, and no reports about removed files.
 fn reports_are_there(driver: &Driver) {
     let with_suffixes = |name: &String| REPORTS.map(|(_, suffix)| format!("{name}{suffix}"));
     for name in driver.files.keys().flat_map(with_suffixes) {
@@ -264,13 +265,13 @@ fn reports_are_there(driver: &Driver) {
 }
 
 impl Driver {
-    /// Private memory of the broker that runs.
+    /// Returns the private memory of the running broker.
     fn memory_kib(&self) -> u64 {
         let pid = self.broker.as_ref().unwrap().pid();
         private_kib(pid).unwrap()
     }
 
-    /// Remembers how much memory brokers take at most.
+    /// Records the maximum memory of the brokers.
     pub fn sample(&mut self) {
         let Some(broker) = &self.broker else { return };
         let now = private_kib(broker.pid()).unwrap_or_default();

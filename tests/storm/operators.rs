@@ -1,4 +1,4 @@
-//! What operators do to a farm besides writing files: they copy and move states, and remove results.
+//! Actions of operators other than writing files: they copy and move states, and remove results.
 
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use crate::support::cli::files_below;
 use crate::support::farm::{Farm, copy_program};
 
 impl Driver {
-    /// Somebody removes a result, a verdict file or a published file.
+    /// Removes a result, a verdict file or a published file.
     pub fn lose_output(&mut self) {
         let is_output = |name: &str| name.ends_with(".xqar") || name.ends_with(".verdict.json");
         let (out, gate) = (self.farm.out(), self.farm.gate());
@@ -27,14 +27,14 @@ impl Driver {
         let Some(output) = self.dice.pick(&all) else {
             return;
         };
-        // The broker may have removed it a moment ago.
+        // The broker may already have removed it.
         if std::fs::remove_file(output).is_ok() {
             let name = output.file_name().unwrap_or_default();
             self.tally.note("lose output", &name.to_string_lossy());
         }
     }
 
-    /// The program that brokers are started from, as it was installed.
+    /// Returns the program that brokers are started from, as it was installed.
     pub(super) fn installed(&mut self) -> PathBuf {
         let program = self.farm.base().join("qcbus");
         if std::mem::take(&mut self.is_replaced) {
@@ -45,8 +45,8 @@ impl Driver {
         program
     }
 
-    /// Another program takes the place of the one that runs, and one that does nothing useful: what a broker starts is
-    /// what it is itself.
+    /// Replaces the program on disk by a useless one. A broker must still start its children from
+    /// its own program.
     pub fn replace_program(&mut self) {
         if self.broker.is_none() {
             return;
@@ -59,7 +59,7 @@ impl Driver {
         self.tally.note("replace the program", "");
     }
 
-    /// While no broker runs, somebody copies or moves its results with their state.
+    /// Copies or moves the results with their state while no broker runs.
     pub(super) fn handle_state(&mut self) {
         match self.dice.below(6) {
             0 if !self.is_full() => self.serve_copy(),
@@ -68,8 +68,8 @@ impl Driver {
         }
     }
 
-    /// A broker starts on a copy, as in staging. It must take nothing from the original, which the judge looks for in
-    /// the end.
+    /// Starts a broker on a copy, as in a staging environment. It must remove nothing from the
+    /// original, because the judge looks for it at the end.
     fn serve_copy(&mut self) {
         let copy = Farm::new();
         copy_tree(&self.farm.out(), &copy.out());
@@ -77,7 +77,7 @@ impl Driver {
         let mut broker = copy.serve_ready();
         assert_eq!(copy.qcbus(&["down"]).status.code(), Some(0));
         assert!(broker.wait().success());
-        // Bundles and reporters of the broker that was killed may still be writing.
+        // Bundles and reporters of the killed broker may still be writing.
         let after = files_below(&self.farm.out());
         let is_output = |name: &&Path| {
             let name = name.to_string_lossy();
@@ -89,12 +89,13 @@ impl Driver {
         self.tally.note("serve a copy", "");
     }
 
-    /// Results and state get another inode, as after a backup was played back.
+    /// Gives the results and the state new inodes, as after restoring a backup.
     fn move_state(&mut self) {
         let (out, base) = (self.farm.out(), self.farm.base());
         let copy = base.join("copy");
         copy_tree(&out, &copy);
-        // One step: the watchers never find a moment without results, after which all of them would be new.
+        // The exchange is one step. Otherwise the watchers could find no results, and later take
+        // all of them for new ones.
         renameat_with(CWD, &copy, CWD, &out, RenameFlags::EXCHANGE).unwrap();
         std::fs::remove_dir_all(&copy).unwrap();
         self.tally.note("move the state", "");
@@ -105,7 +106,8 @@ fn copy_tree(from: &Path, to: &Path) {
     if to.exists() {
         std::fs::remove_dir_all(to).unwrap();
     }
-    // What was left half-written is removed meanwhile by whoever outlives the broker; the rest is copied.
+    // Processes that outlive the broker may remove half-written files during the copy. The rest is
+    // copied.
     let copied = Command::new("cp").arg("-a").arg(from).arg(to).output();
     let copied = copied.unwrap();
     let said = String::from_utf8_lossy(&copied.stderr).into_owned();

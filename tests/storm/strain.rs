@@ -1,30 +1,31 @@
-//! How slow the machine is while it storms. A broker ends bundles that say nothing for four seconds, or
-//! need six for a job. Where many times more is to be done than the processors can do, that happens
-//! to bundles that do nothing wrong, so the judge must know how slow it was.
+//! Measures how slow the machine is during the storm. A broker ends bundles that are silent for
+//! four seconds or need six for a job. On an overloaded machine this also happens to correct
+//! bundles. The judge must therefore know the slowness.
 
 use std::time::{Duration, Instant};
 
 use super::history::{Seen, What};
 
-/// What is measured is how long a thread waits to get so much of a processor: longer than the
-/// slice that the kernel gives it at once, so that it has to wait its turn.
+/// Processor time of one measurement. The test measures how long a thread waits to get it. It is
+/// longer than the kernel's time slice, so the thread must wait for others.
 const WORK: Duration = Duration::from_millis(5);
 
-/// Between two measurements: they take one part in fifty of a processor.
+/// Pause between two measurements. They take one fiftieth of a processor.
 pub const PAUSE: Duration = Duration::from_millis(250);
 
-/// Work takes this many times longer than on a processor of its own: in a storm that has two processors
-/// for itself it takes about four times as long.
+/// Slowdown from which the machine counts as slow, relative to a processor of its own. In a storm
+/// with two processors of its own, work takes about four times as long.
 const SLOW: f64 = 8.0;
 
-/// Over so long a time before something: the longest limit of a storm's broker, and the time until the
-/// watchers see what came of it.
+/// Period before an event over which the slowdown is averaged. It covers the longest limit of a
+/// storm's broker, and the time until the watchers see the effect.
 const BEFORE: Duration = Duration::from_secs(10);
 
-/// Whoever looks at the clock again and again and finds that more time has passed was off the processor.
+/// Maximum time between two consecutive clock reads. If more time passes, the thread was off the
+/// processor.
 const GLANCE: Duration = Duration::from_micros(50);
 
-/// Works for [`WORK`], and returns how long that took.
+/// Works for [`WORK`], and returns the elapsed time.
 pub fn measure() -> Duration {
     let begin = Instant::now();
     let (mut last, mut worked) = (begin, Duration::ZERO);
@@ -36,12 +37,12 @@ pub fn measure() -> Duration {
     last - begin
 }
 
-/// What the watchers' work took while it stormed.
+/// Times that the watchers' work took during the storm.
 #[derive(Debug)]
 pub struct Strain(Vec<(Duration, Duration)>);
 
 impl Strain {
-    /// As it was seen.
+    /// Collects the measurements from the history.
     pub fn new(history: &[Seen]) -> Strain {
         let worked = history.iter().filter_map(|seen| match seen.what {
             What::Worked { took } => Some((seen.at, took)),
@@ -50,19 +51,19 @@ impl Strain {
         Strain(worked.collect())
     }
 
-    /// Whether the machine was too slow for the broker's limits to say anything about a bundle that
-    /// was seen to be ended at this time.
+    /// Checks whether the machine was too slow at this time. If so, a broker's limits prove nothing
+    /// about a bundle that was ended then.
     pub fn was_slow(&self, at: Duration) -> bool {
         self.slowness(at).is_none_or(|times| times >= SLOW)
     }
 
-    /// How many times longer work took in the slowest ten seconds than on a processor of its own.
+    /// Returns the slowdown in the slowest ten seconds, relative to a processor of its own.
     pub fn slowest(&self) -> f64 {
         let times = self.0.iter().filter_map(|(at, _)| self.slowness(*at));
         times.fold(0.0, f64::max)
     }
 
-    /// On average before this time; `None` when nothing came to its end.
+    /// Returns the average slowdown before this time, or `None` if no measurement ended.
     fn slowness(&self, at: Duration) -> Option<f64> {
         let near = self
             .0
@@ -90,6 +91,6 @@ fn death_is_excused_by_a_slow_machine_and_by_no_other() {
     }
     assert!(!only_before.was_slow(at));
     assert!(only_before.was_slow(Duration::from_secs(15)));
-    // Nothing came to its end for ten seconds.
+    // No measurement ended for ten seconds.
     assert!(strain(3).was_slow(Duration::from_secs(100)));
 }

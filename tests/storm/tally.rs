@@ -1,10 +1,10 @@
-//! What the driver did, counted and told.
+//! Counts and prints the actions of the driver.
 
 use std::collections::BTreeMap;
 use std::fmt;
 use std::time::Instant;
 
-/// Deeds by kind, and the last of them in order.
+/// Actions by kind, and their log in order.
 #[derive(Debug, Clone)]
 pub struct Tally {
     counts: BTreeMap<&'static str, u64>,
@@ -12,11 +12,11 @@ pub struct Tally {
     start: Instant,
 }
 
-/// Deeds told when something goes wrong.
+/// Number of actions printed after a failure.
 const TOLD: usize = 120;
 
 impl Tally {
-    /// Nothing yet.
+    /// Creates an empty tally.
     pub fn new() -> Tally {
         Tally {
             counts: BTreeMap::new(),
@@ -25,7 +25,7 @@ impl Tally {
         }
     }
 
-    /// Counts a deed, and logs it with its time.
+    /// Counts an action, and logs it with its time.
     pub fn note(&mut self, kind: &'static str, what: &str) {
         *self.counts.entry(kind).or_default() += 1;
         let line = format!("{:9.3} {kind} {what}", self.start.elapsed().as_secs_f64());
@@ -35,7 +35,7 @@ impl Tally {
         self.lines.push(line);
     }
 
-    /// How many processes were killed.
+    /// Returns the number of killed processes.
     pub fn kills(&self) -> u64 {
         let kills = self
             .counts
@@ -44,7 +44,7 @@ impl Tally {
         kills.map(|(_, count)| count).sum()
     }
 
-    /// The last deeds.
+    /// Returns the last actions.
     pub fn last_lines(&self) -> String {
         self.lines[self.lines.len().saturating_sub(TOLD)..].join("\n")
     }

@@ -1,4 +1,4 @@
-//! What must be so of everything that was seen in a storm, at every moment.
+//! Conditions that every observation of a storm must meet.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -9,18 +9,19 @@ use super::history::{Seen, Told, What};
 use super::ledger::{Ledger, Offered};
 use crate::support::content::{Content, STRICT};
 
-/// The bundle of one's own that must judge everything, whatever happens to it.
+/// Name of the custom bundle. It is always required, whatever happens to it.
 pub const JUDGE: &str = "judges_strictly";
 
-/// A writer that had begun when the bundle of one's own was demanded again may end so much later.
+/// Grace period for a writer thread that started before the custom bundle was required again.
 const WRITES: Duration = Duration::from_secs(2);
 
-/// When the bundle of one's own need not judge.
+/// Periods in which the custom bundle is not required.
 #[derive(Debug, Default)]
 pub struct Removals(Vec<(Duration, Duration)>);
 
 impl Removals {
-    /// From when its manifest went until a broker demands it again: that was seen.
+    /// Collects the periods. Each lasts from the removal of the manifest until a broker was seen to
+    /// require the bundle again.
     pub fn new(manifests: &[(Duration, Duration)], history: &[Seen]) -> Removals {
         let demanded = |back: Duration| {
             let after = |seen: &&Seen| seen.from >= back && matches!(seen.what, What::Demanded);
@@ -39,7 +40,7 @@ impl Removals {
     }
 }
 
-/// What was seen and may not be.
+/// Returns the observations that violate a condition.
 pub fn complaints(history: &[Seen], ledger: &Ledger, removals: &Removals) -> Vec<String> {
     let mut complaints = Vec::new();
     let mut epochs: BTreeMap<&str, u64> = BTreeMap::new();
@@ -74,28 +75,29 @@ pub fn complaints(history: &[Seen], ledger: &Ledger, removals: &Removals) -> Vec
     complaints
 }
 
-/// Judges one thing that was seen.
+/// Judges one observation.
 struct Judge<'a> {
     ledger: &'a Ledger,
     seen: &'a Seen,
-    /// Whether the bundle of one's own had to judge.
+    /// Whether the custom bundle was required.
     strict: bool,
 }
 
 impl Judge<'_> {
-    /// Whether nobody who had to judge would have found a fault in what refers to this.
+    /// Checks whether no required bundle would find a fault in a file because it refers to this
+    /// part.
     fn leaves_whole(&self, part: &Content) -> bool {
         let checker = part.spoils();
         checker.is_none_or(|it| it == STRICT && !self.strict)
     }
 
-    /// Whether nobody who had to judge would have found a fault in this by itself.
+    /// Checks whether no required bundle would find a fault in this content itself.
     fn passes(&self, content: &Content) -> bool {
         let checker = content.checker();
         checker.is_none_or(|it| it == STRICT && !self.strict)
     }
 
-    /// What is wrong with these bytes of a file being accepted.
+    /// Returns the error in accepting these bytes of a file, or `None`.
     fn wrong_acceptance(&self, name: &str, digest: &str) -> Option<&'static str> {
         match self.ledger.content(digest) {
             None => Some("nobody has written these bytes, and they are accepted"),
@@ -134,17 +136,17 @@ impl Judge<'_> {
         wrong.or_else(|| under.iter().find_map(|it| self.wrong_under(told, it)))
     }
 
-    /// What is wrong with an acceptance that rests on this file.
+    /// Returns the error in an acceptance that rests on this file, or `None`.
     fn wrong_under(&self, told: &Told, name: &str) -> Option<&'static str> {
         let below = format!("/{name}");
         let mut read = told.depends_on.iter();
         let (_, digest) = read.find(|(path, _)| path.ends_with(&below))?;
-        // Half-written bytes are nobody's.
+        // Half-written bytes are not in the ledger.
         let content = self.ledger.content(digest.as_ref()?)?;
         (!self.passes(content)).then_some("accepted, and a file that it rests on is rejected")
     }
 
-    /// What is wrong with an acceptance that depends on this part.
+    /// Returns the error in an acceptance that depends on this part, or `None`.
     fn wrong_part(&self, told: &Told, part: &str) -> Option<&'static str> {
         let below = format!("/{part}");
         let mut of_part = told
@@ -155,7 +157,7 @@ impl Judge<'_> {
             return Some("accepted without something that it refers to");
         };
         match self.ledger.content(digest) {
-            // Half-written.
+            // Half-written bytes are not in the ledger.
             None => None,
             Some(content) if !self.leaves_whole(content) => {
                 Some("accepted, and a part of it spoils it")
@@ -170,7 +172,8 @@ impl Judge<'_> {
         }
     }
 
-    /// An answer is about what lay there between the question and the answer.
+    /// Returns the error in an answer, or `None`. The answer must match the content between the
+    /// question and the answer.
     fn wrong_answer(&self, name: &str, verdict: Verdict, digest: &str) -> Option<&'static str> {
         let there = self.ledger.seen(name, self.seen.from, self.seen.at);
         if there
@@ -195,7 +198,7 @@ impl Judge<'_> {
         (!content.rests_on().iter().all(sound)).then_some(wrong)
     }
 
-    /// Whether a file had no fault of its own for a moment.
+    /// Checks whether a file was without own faults at some moment.
     fn may_be_accepted(&self, name: &str) -> bool {
         let there = self.ledger.seen(name, self.seen.from, self.seen.at);
         there.into_iter().any(|it| match it {
@@ -208,7 +211,7 @@ impl Judge<'_> {
         })
     }
 
-    /// Whether a part, with all that it depends on, was such for a moment that it spoils nothing.
+    /// Checks whether a part, with everything that it depends on, was harmless at some moment.
     fn may_pass(&self, part: &str) -> bool {
         let there = self.ledger.seen(part, self.seen.from, self.seen.at);
         there.into_iter().any(|it| match it {
@@ -221,7 +224,8 @@ impl Judge<'_> {
     }
 }
 
-/// Standard bundles that the broker killed and the driver had not stopped: when, name, why.
+/// Returns the standard bundles that the broker killed and the driver had not stopped: time, name,
+/// reason.
 pub fn innocent_dead<'h>(
     history: &'h [Seen],
     guilty: impl Fn(&str, Duration) -> bool + 'h,
@@ -234,13 +238,13 @@ pub fn innocent_dead<'h>(
     })
 }
 
-/// The judge is judged: what it must not let pass.
+/// Tests of the judge: errors that it must detect.
 mod tests {
     use super::super::ledger::digest;
     use super::*;
     use crate::support::content::{CATALOG, Mark};
 
-    /// A map was written, then what it includes got the word, and all that is told to the judge.
+    /// A map, then its include with or without the word, and the verdict file given to the judge.
     struct Case {
         ledger: Ledger,
         told: Told,
@@ -294,7 +298,7 @@ mod tests {
         }
     }
 
-    /// A scenario on a map that includes a part, and a catalog.
+    /// Returns a case with a scenario on a map that includes a part, and a catalog.
     fn accepted_scenario(part: &Content, catalog: &Content) -> Case {
         let mut case = accepted(part);
         let scenario = Content::Scenario(3, "a.xodr".to_owned());

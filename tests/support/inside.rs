@@ -1,16 +1,16 @@
-//! Running a test in a mount namespace of its own, with small file systems that may be filled.
+//! Runs a test in a mount namespace of its own, with small file systems that may be filled.
 
 use std::process::{Command, ExitStatus};
 
-/// Set in the environment of a test that runs inside.
+/// Environment variable that is set for a test inside the namespace.
 pub const INSIDE: &str = "QCBUS_TEST_INSIDE";
 
-/// Whether this process runs inside.
+/// Returns whether this process runs inside the namespace.
 pub fn is_inside() -> bool {
     std::env::var_os(INSIDE).is_some()
 }
 
-/// Why nothing can be mounted here; `None` when it can.
+/// Returns the reason why nothing can be mounted here, or `None` if mounting works.
 pub fn refused() -> Option<String> {
     let output = namespace("mount -t tmpfs -o size=1m tmpfs /dev/shm", &["true"]).output();
     match output {
@@ -25,8 +25,8 @@ pub fn refused() -> Option<String> {
     }
 }
 
-/// Runs one test of this executable again, inside, after `prepare` (shell). `None`: it cannot be
-/// done here, and why has been printed.
+/// Runs one test of this executable again inside a namespace, after the shell command `prepare`.
+/// Returns `None` if this is not possible; the reason is printed.
 pub fn run_inside(test: &str, prepare: &str) -> Option<ExitStatus> {
     if let Some(why) = refused() {
         skip(test, &why);
@@ -51,7 +51,7 @@ fn namespace(prepare: &str, arguments: &[&str]) -> Command {
     command
 }
 
-/// Says that a test does nothing here.
+/// Prints that a test is skipped here, with the reason.
 #[expect(clippy::print_stderr, reason = "a test that is skipped must say so")]
 pub fn skip(test: &str, why: &str) {
     eprintln!("skipped: {test}: {why}");

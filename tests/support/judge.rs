@@ -1,4 +1,4 @@
-//! The judge: what must be so once a farm has come to rest.
+//! The judge: checks the state of a farm that has come to rest.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -12,32 +12,33 @@ use super::content::{Content, STRICT};
 use super::farm::Farm;
 use super::reports::{reported, torn};
 
-/// The files that are there, by name.
+/// Existing files by name.
 pub type Files = BTreeMap<String, Content>;
 
-/// What the judge found.
+/// Findings of the judge.
 #[derive(Debug, Default)]
 pub struct Judgement {
-    /// What is not as it must be.
+    /// Descriptions of everything that is wrong.
     pub complaints: Vec<String>,
     /// Files that have a result.
     pub with_result: usize,
-    /// How many files are condemned for each bundle: it died twice with the file alone.
+    /// Number of files condemned for each bundle. A bundle died twice on such a file alone.
     pub condemned: BTreeMap<String, u64>,
 }
 
-/// What a broker puts into a directory that is its gate.
+/// Marker file that a broker puts into its gate directory.
 const GATE_MARK: &str = ".qcbus-gate";
 
-/// The words with which the broker condemns.
+/// Words that the broker uses when it condemns a file.
 const CONDEMNED: &str = "times on this file alone in a fresh process";
 
-/// Looks at everything. `strangers` are bundles whose checkers may be in error.
+/// Checks the whole farm. `strangers` are bundles with checkers that may be in error.
 pub fn judge(farm: &Farm, files: &Files, strangers: &[&str]) -> Judgement {
     judge_with(farm, files, &Files::new(), strangers)
 }
 
-/// As [`judge`], with what files depend on and is no file to check itself.
+/// Works like [`judge`], with additional `parts`: files that others depend on but that are not
+/// checked themselves.
 pub fn judge_with(farm: &Farm, files: &Files, parts: &Files, strangers: &[&str]) -> Judgement {
     let mut judgement = Judgement::default();
     for (name, content) in files {
@@ -55,16 +56,16 @@ pub fn judge_with(farm: &Farm, files: &Files, parts: &Files, strangers: &[&str])
     judgement
 }
 
-/// What the parts of a file make of it.
+/// Effect of the parts of a file on its verdict.
 struct Parts {
-    /// The checker that finds a fault in the file because of a part.
+    /// Checker that finds a fault in the file because of a part.
     spoilt: Option<&'static str>,
-    /// The files that it rests on and that have verdicts of their own.
+    /// Files that it rests on and that have verdicts of their own.
     under: Vec<String>,
 }
 
-/// All that a file depends on, by name, the parts of its parts as well: a scenario on a map that
-/// includes something. `None` for what is not there.
+/// Returns all dependencies of a file by name, including those of its parts. An example is a
+/// scenario on a map that includes something. A missing dependency is `None`.
 fn with_their_parts<'c>(
     content: &Content,
     get: impl Fn(&str) -> Option<&'c Content>,
@@ -143,7 +144,8 @@ impl Judgement {
         }
     }
 
-    /// Whether the standard bundles said all that they must, and whether a stranger failed.
+    /// Returns whether the standard bundles reported everything required, and whether a stranger
+    /// failed.
     fn is_complete(&mut self, farm: &Farm, name: &str, strangers: &[&str]) -> (bool, bool) {
         let results = farm.result(name);
         let (mut complete, mut foreign, mut seen) = (true, false, false);
@@ -155,7 +157,8 @@ impl Judgement {
                 if matches!(checker.status, Some(Status::Completed | Status::Skipped)) {
                     continue;
                 }
-                // That a verdict which it rests on is undetermined is looked at there.
+                // The checker `qcbus_rests_on` fails if a verdict below is undetermined. That file
+                // is judged separately.
                 if stranger || &*checker.id == "qcbus_rests_on" {
                     foreign = true;
                 } else if checker.summary.contains(CONDEMNED) {
@@ -176,8 +179,8 @@ impl Judgement {
         (complete, foreign)
     }
 
-    /// Behind the gate lies what was accepted, byte for byte, with all that it depends on, and nothing
-    /// else.
+    /// Checks that the gate contains exactly the accepted files and all their dependencies, byte
+    /// for byte.
     pub fn gate(&mut self, farm: &Farm, files: &Files, parts: &Files, gate: &Path) {
         let mut needed = BTreeSet::from([GATE_MARK.to_owned()]);
         for (name, content) in files {
@@ -214,7 +217,7 @@ impl Judgement {
         }
     }
 
-    /// No result without a file, nothing half-written.
+    /// Checks that no result exists without a file and that no report is incomplete.
     fn nothing_else(&mut self, farm: &Farm, files: &Files) {
         for path in files_below(&farm.out()) {
             if path.starts_with(".qcbus") {
@@ -226,7 +229,7 @@ impl Judgement {
             }
             let results = [".xqar", ".verdict.json"];
             let file = results.iter().find_map(|suffix| name.strip_suffix(suffix));
-            // Reports are withdrawn by their reporters, later than results.
+            // Reporters withdraw their reports later than the broker withdraws results.
             let report = file.is_none() && reported(&name).is_some();
             if report
                 && let Ok(bytes) = std::fs::read(farm.out().join(&path))
@@ -241,7 +244,8 @@ impl Judgement {
     }
 }
 
-/// Whether this is what a reporter that lives is writing: its name says whose it is.
+/// Returns whether a live reporter is writing this file. The file name contains the reporter's
+/// process id.
 fn is_being_written(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let writer = name
@@ -250,7 +254,7 @@ fn is_being_written(path: &Path) -> bool {
     writer.is_some_and(|(pid, _)| Path::new("/proc").join(pid).exists())
 }
 
-/// Whether the rule that the oracle expects has an issue.
+/// Returns whether the rule that the oracle expects has an issue.
 fn expected_rule_fired(farm: &Farm, name: &str, checker: Option<&str>) -> bool {
     let Some(expected) = checker else {
         return true;
@@ -260,7 +264,7 @@ fn expected_rule_fired(farm: &Farm, name: &str, checker: Option<&str>) -> bool {
     checkers.any(|checker| checker.id.ends_with(expected) && !checker.issues.is_empty())
 }
 
-/// Verdicts in the journal by what they are about: path, digest, configuration.
+/// Counts the verdicts in the journal by path, digest and configuration.
 pub fn verdicts_in_journal(journal: &Path) -> BTreeMap<(String, String, String), u64> {
     let connection = rusqlite::Connection::open(journal).unwrap();
     let mut query = connection

@@ -1,5 +1,5 @@
-//! What the process tests share: a farm of its own for every test, a broker to start and kill,
-//! files whose verdict is known, processes to look at, and a watchdog in place of sleeping.
+//! Shared code of the process tests: a separate farm for every test, a broker to start and kill,
+//! files with a known verdict, processes to inspect, and a watchdog instead of sleeping.
 
 #![allow(dead_code, reason = "every test target uses another part of this")]
 

@@ -1,17 +1,17 @@
-//! Processes, by what `/proc` says of them.
+//! Inspection of processes through `/proc`.
 
 use std::path::{Path, PathBuf};
 
 /// A process that belongs to an instance.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Process {
-    /// Its id.
+    /// Process id.
     pub pid: i32,
-    /// Its command line.
+    /// Command line.
     pub words: Vec<String>,
 }
 
-/// What a process is to the instance.
+/// Role of a process in the instance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ProcessKind {
     /// `qcbus serve`.
@@ -20,14 +20,15 @@ pub enum ProcessKind {
     Bundle,
     /// A standard reporter.
     Reporter,
-    /// An animal; or a one-shot module, its adapter, or what it has started.
+    /// A misbehaving bundle or reporter, or an ASAM module, its adapter or a process that it
+    /// started.
     Animal,
     /// A command such as `qcbus wait`.
     Other,
 }
 
 impl Process {
-    /// What it is.
+    /// Returns the role of the process.
     pub fn kind(&self) -> ProcessKind {
         let said = |word: &str| self.words.iter().skip(1).any(|it| it == word);
         let program = self.words.first().map_or("", String::as_str);
@@ -45,20 +46,21 @@ impl Process {
         }
     }
 
-    /// Sends a signal. A process that has gone meanwhile is no mistake.
+    /// Sends a signal. A process that has ended meanwhile is not an error.
     pub fn signal(&self, signal: rustix::process::Signal) {
         signal_pid(self.pid, signal);
     }
 }
 
-/// Sends a signal to a process that this test has started.
+/// Sends a signal to a process that this test started.
 pub fn signal_pid(pid: i32, signal: rustix::process::Signal) {
     if let Some(pid) = rustix::process::Pid::from_raw(pid) {
         let _ = rustix::process::kill_process(pid, signal);
     }
 }
 
-/// All processes that were told of this directory, zombies left out: they have no command line.
+/// Returns all processes with this directory in their command line. Zombies are left out because
+/// they have no command line.
 pub fn of_directory(directory: &Path) -> Vec<Process> {
     let wanted = directory.to_string_lossy();
     let mut found: Vec<Process> = all()
@@ -69,7 +71,7 @@ pub fn of_directory(directory: &Path) -> Vec<Process> {
     found
 }
 
-/// All processes in whose command line a text stands.
+/// Returns all processes with this text in their command line.
 pub fn all_with(text: &str) -> Vec<Process> {
     let own = std::process::id().cast_signed();
     let others = all().filter(|process| process.pid != own);
@@ -95,7 +97,7 @@ fn all() -> impl Iterator<Item = Process> {
         })
 }
 
-/// A line of `/proc/PID/status` that counts KiB.
+/// Returns the value of a field in `/proc/PID/status` that counts KiB.
 pub fn memory_kib(pid: u32, field: &str) -> Option<u64> {
     let path = PathBuf::from(format!("/proc/{pid}/status"));
     let text = std::fs::read_to_string(path).ok()?;
@@ -103,12 +105,13 @@ pub fn memory_kib(pid: u32, field: &str) -> Option<u64> {
     line.split_whitespace().nth(1)?.parse().ok()
 }
 
-/// Memory of a process that is its own: what it maps from /dev/shm is not counted.
+/// Returns the private memory of a process. Mappings from /dev/shm are not counted.
 pub fn private_kib(pid: u32) -> Option<u64> {
     memory_kib(pid, "RssAnon:")
 }
 
-/// The most private memory that a process has had: what it shares now is taken off the peak of all.
+/// Returns the peak private memory of a process: its total peak minus the memory that it shares
+/// now.
 pub fn peak_private_kib(pid: u32) -> Option<u64> {
     let shared = memory_kib(pid, "RssShmem:")?;
     Some(memory_kib(pid, "VmHWM:")?.saturating_sub(shared))

@@ -1,6 +1,6 @@
-//! What the standard reporters write, and whether it is whole.
+//! Reports of the standard reporters, and the check whether a report is complete.
 
-/// The standard reporters, and what each puts behind a file's name; longer ends first.
+/// Standard reporters and the suffix that each appends to a file name. Longer suffixes come first.
 pub const REPORTS: [(&str, &str); 8] = [
     ("gitlab", ".codequality.json"),
     ("concise", ".concise.txt"),
@@ -12,7 +12,7 @@ pub const REPORTS: [(&str, &str); 8] = [
     ("text", ".txt"),
 ];
 
-/// The file that a report is about, by its name; `None` for what is no report.
+/// Returns the file name to which a report belongs, or `None` if the name is not a report.
 pub fn reported(name: &str) -> Option<&str> {
     if name.ends_with(".verdict.json") {
         return None;
@@ -21,7 +21,7 @@ pub fn reported(name: &str) -> Option<&str> {
     ends.find_map(|suffix| name.strip_suffix(suffix))
 }
 
-/// What is wrong with a report of that name; `None` when it is whole.
+/// Returns the fault of a report with that name, or `None` if the report is complete.
 pub fn torn(name: &str, bytes: &[u8]) -> Option<String> {
     let text = match std::str::from_utf8(bytes) {
         Ok(text) => text,
@@ -36,7 +36,7 @@ pub fn torn(name: &str, bytes: &[u8]) -> Option<String> {
         }
         it if it.ends_with(".xml") => ends_with("</testsuites>\n"),
         it if it.ends_with(".html") => ends_with("</html>\n"),
-        // A file without findings has no lines.
+        // A report without findings has no lines.
         it if it.ends_with(".concise.txt") && text.is_empty() => None,
         _ => ends_with("\n"),
     }

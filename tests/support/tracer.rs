@@ -1,6 +1,6 @@
-//! A broker under a tracer. It sees every system call that changes something on the disk (a *deed*),
-//! and kills the broker before or after a certain one, as a crash at that very moment would. Or it gives
-//! the broker another answer than the system would, or none for as long as it likes.
+//! Runs a broker under a tracer, which sees every system call that changes the disk (a *deed*). The
+//! tracer kills the broker before or after a certain deed, like a crash at that moment. It can also
+//! replace the result of a system call, or delay the call as long as the test wants.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::os::unix::fs::FileExt;
@@ -17,60 +17,60 @@ use nix::sys::signal::Signal;
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::Pid;
 
-/// On which side of a deed the broker is killed.
+/// Whether the broker is killed before or after a deed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
     /// The system call has not been made.
     Before,
-    /// It has been made, and the broker knows nothing of it yet.
+    /// The system call has been made, but the broker has not seen its result.
     After,
 }
 
-/// A moment to be killed at: the deed's number, counted from 1 since it was aimed, and the side.
+/// Moment of the kill: the number of the deed, counted from 1 since the aim was set, and the side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Aim {
     /// Number of the deed.
     pub deed: usize,
-    /// Before or after it.
+    /// Before or after the deed.
     pub side: Side,
 }
 
-/// What a system call comes to instead.
+/// Replacement for the result of a system call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer {
-    /// This error, and nothing is done.
+    /// The call returns this error, and nothing is done.
     Error(Errno),
-    /// A read that gives one byte.
+    /// A read returns one byte.
     Short,
-    /// Nothing, until the trouble is over.
+    /// The call does not return until the failure is over.
     Never,
 }
 
-/// What a system call has to do with a file.
+/// Kind of access of a system call to a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// It looks at it or opens it.
+    /// The call looks up or opens the file.
     Look,
-    /// It reads from it.
+    /// The call reads from the file.
     Read,
-    /// It changes what lies on the disk.
+    /// The call changes the content of the disk.
     Deed,
 }
 
-/// What goes wrong.
+/// Injected failure.
 #[derive(Debug, Clone)]
 pub struct Failure {
-    /// With files below this path, or with this one.
+    /// Path of the affected files: this one and everything below it.
     pub below: PathBuf,
-    /// With these calls.
+    /// Affected kinds of calls.
     pub kinds: &'static [Kind],
-    /// What they come to.
+    /// Result of the affected calls.
     pub answer: Answer,
-    /// Of so many calls one.
+    /// One in this many calls is affected.
     pub one_in: usize,
 }
 
-/// Why no other answers can be given here; `None` when they can.
+/// Returns the reason why results cannot be replaced here, or `None` if they can.
 pub fn no_other_answers() -> Option<String> {
     let known = cfg!(target_arch = "x86_64");
     let why = "the registers of this processor are not known to the test";
@@ -87,7 +87,7 @@ pub struct Traced {
 #[derive(Debug, Default)]
 struct Shared {
     state: Mutex<State>,
-    /// Only deeds below these count.
+    /// Only deeds below these directories count.
     below: Vec<PathBuf>,
 }
 
@@ -99,7 +99,7 @@ struct State {
     hit: Option<String>,
     ended: Option<ExitStatus>,
     failure: Option<Failure>,
-    /// Calls that the trouble is about, and those of them that it was given to.
+    /// Number of calls that match the failure, and number of those that received it.
     troubled: (usize, usize),
 }
 
@@ -110,7 +110,7 @@ impl Shared {
 }
 
 impl Traced {
-    /// Starts a broker; its log is appended to `log`. Deeds below these directories count, from the
+    /// Starts a broker and appends its log to `log`. Deeds below these directories count from the
     /// very first one.
     pub fn start(mut command: Command, log: &Path, below: &[PathBuf], aim: Option<Aim>) -> Traced {
         let mut options = std::fs::OpenOptions::new();
@@ -133,36 +133,36 @@ impl Traced {
         }
     }
 
-    /// From now on deeds are counted anew, and this one is the last.
+    /// Restarts the count of deeds and sets the deed at which the broker is killed.
     pub fn aim(&self, aim: Option<Aim>) {
         let mut state = self.shared.state();
         state.aim = aim;
         state.deeds.clear();
     }
 
-    /// From now on this goes wrong, or nothing. Says how often the last trouble came to something.
+    /// Sets or clears the failure. Returns how often the previous failure took effect.
     pub fn failure(&self, failure: Option<Failure>) -> usize {
         let mut state = self.shared.state();
         state.failure = failure;
         std::mem::take(&mut state.troubled).1
     }
 
-    /// How often the trouble has come to something.
+    /// Returns how often the failure has taken effect.
     pub fn troubled(&self) -> usize {
         self.shared.state().troubled.1
     }
 
-    /// What it has done since it was aimed at.
+    /// Returns the deeds of the broker since the aim was set.
     pub fn deeds(&self) -> Vec<String> {
         self.shared.state().deeds.clone()
     }
 
-    /// How it ended, if it has.
+    /// Returns the exit status of the broker if it has ended.
     pub fn ended(&self) -> Option<ExitStatus> {
         self.shared.state().ended
     }
 
-    /// The deed at which it was killed.
+    /// Returns the deed at which the broker was killed.
     pub fn hit(&self) -> Option<String> {
         self.shared.state().hit.clone()
     }
@@ -182,7 +182,7 @@ impl Drop for Traced {
     }
 }
 
-/// Why nothing can be traced here; `None` when it can.
+/// Returns the reason why nothing can be traced here, or `None` if tracing works.
 pub fn refused() -> Option<String> {
     let mut command = Command::new("true");
     let traced = std::thread::spawn(move || {
@@ -195,14 +195,14 @@ pub fn refused() -> Option<String> {
     Some(format!("a process may not be traced: {refused}"))
 }
 
-/// Starts a program; it stands still before its first instruction and is traced by this thread.
+/// Starts a program that this thread traces. The program is stopped before its first instruction.
 fn spawn_stopped(command: &mut Command) -> std::io::Result<Pid> {
     let be_traced = || ptrace::traceme().map_err(Into::into);
     #[expect(
         unsafe_code,
         reason = "nothing but one system call happens between fork and exec"
     )]
-    // SAFETY: `ptrace` is a bare system call: no memory is taken, no lock is touched.
+    // SAFETY: `ptrace` is a bare system call: it allocates no memory and takes no lock.
     let child = unsafe { command.pre_exec(be_traced) }.spawn()?;
     let pid = Pid::from_raw(i32::try_from(child.id()).unwrap());
     waitpid(pid, Some(WaitPidFlag::__WALL))?;
@@ -223,7 +223,7 @@ fn trace(command: &mut Command, shared: &Shared) {
         answers: BTreeMap::new(),
         held: Vec::new(),
     };
-    // Any that has been killed meanwhile is waited for below.
+    // The call fails if the process was killed meanwhile. The loop below waits for its end.
     let _ = ptrace::syscall(pid, None);
     let flags = WaitPidFlag::__WALL | WaitPidFlag::__WNOTHREAD;
     while let Ok(status) = waitpid(None, Some(flags)) {
@@ -239,16 +239,18 @@ struct Tracer<'s> {
     shared: &'s Shared,
     /// Threads that have been seen.
     known: BTreeSet<Pid>,
-    /// Threads at whose return from a system call all is over, with what they do there.
+    /// Threads that kill the broker when they return from a system call, with the deed of that
+    /// call.
     dies_after: BTreeMap<Pid, String>,
-    /// What system calls that are not made are said to have come to.
+    /// Errors that suppressed system calls return, by thread.
     answers: BTreeMap<Pid, Errno>,
-    /// Threads that wait for the trouble to be over.
+    /// Threads that wait for the end of the failure.
     held: Vec<Pid>,
 }
 
 impl Tracer<'_> {
-    /// Lets a thread go on after a stop. The status, when the whole process has ended.
+    /// Handles a stop and lets the thread continue. Returns the status if the whole process has
+    /// ended.
     fn saw(&mut self, status: WaitStatus) -> Option<ExitStatus> {
         let (thread, signal) = match status {
             WaitStatus::Exited(pid, code) if pid == self.pid => {
@@ -265,7 +267,7 @@ impl Tracer<'_> {
                 }
                 (thread, None)
             }
-            // Every thread begins with a stop of the tracer's making.
+            // Every thread begins with a stop that the tracer causes.
             WaitStatus::Stopped(thread, Signal::SIGSTOP) if self.known.insert(thread) => {
                 (thread, None)
             }
@@ -273,22 +275,24 @@ impl Tracer<'_> {
             WaitStatus::PtraceEvent(thread, _, _) => (thread, None),
             _ => return None,
         };
-        // A thread that was killed meanwhile cannot go on, and is waited for.
+        // The call fails if the thread was killed meanwhile. The tracer then waits for its end.
         let _ = ptrace::syscall(thread, signal);
         None
     }
 
-    /// Lets those go on who waited for the end of the trouble. Somebody calls the system all the time.
+    /// Lets the waiting threads continue after the failure has ended. Some thread always makes
+    /// system calls, so this is called soon.
     fn let_go(&mut self) {
         if !self.held.is_empty() && self.shared.state().failure.is_none() {
             for thread in self.held.drain(..) {
-                // One that was killed meanwhile is waited for.
+                // The call fails if the thread was killed meanwhile. The tracer then waits for its
+                // end.
                 let _ = ptrace::syscall(thread, None);
             }
         }
     }
 
-    /// Whether the thread is to wait.
+    /// Handles a stop at a system call. Returns whether the thread must wait.
     fn system_call(&mut self, thread: Pid) -> bool {
         let Ok(info) = ptrace::syscall_info(thread) else {
             return false;
@@ -305,7 +309,8 @@ impl Tracer<'_> {
                 unsafe_code,
                 reason = "the kernel says which field of the union it filled"
             )]
-            // SAFETY: at an entry it is this one, and all bit patterns are numbers.
+            // SAFETY: at an entry stop the kernel fills this field, and all bit patterns are valid
+            // numbers.
             let call = unsafe { info.u.entry };
             if let Some(what) = deed(thread, call.nr, &call.args, &self.shared.below) {
                 self.count(thread, what);
@@ -315,7 +320,8 @@ impl Tracer<'_> {
         false
     }
 
-    /// Gives another answer, if there is trouble for this call. `true`: none for now.
+    /// Replaces the result of this call if the failure matches it. Returns `true` if the call must
+    /// wait.
     fn meddle(&mut self, thread: Pid, number: u64, args: &[u64; 6]) -> bool {
         let Some(answer) = self.failure_of(thread, number, args) else {
             return false;
@@ -365,7 +371,7 @@ impl Tracer<'_> {
     }
 }
 
-/// What a system call does to the disk below certain directories, in words.
+/// Describes the change that a system call makes to the disk below certain directories.
 fn deed(thread: Pid, number: u64, args: &[u64; 6], below: &[PathBuf]) -> Option<String> {
     let call = CALLS
         .iter()
@@ -379,7 +385,7 @@ fn deed(thread: Pid, number: u64, args: &[u64; 6], below: &[PathBuf]) -> Option<
     Some(format!("{} {}", call.name, shown.display()))
 }
 
-/// What a system call has to do with which file.
+/// Returns the kind of access of a system call and the path of its file.
 fn touched(thread: Pid, number: u64, args: &[u64; 6]) -> Option<(Kind, PathBuf)> {
     let of = |calls: &'static [Call]| {
         let mut calls = calls.iter();
@@ -404,14 +410,14 @@ fn path_of(thread: Pid, call: &Call, args: &[u64; 6]) -> Option<PathBuf> {
         Of::Path(at) => absolute(thread, None, args[at])?,
         Of::PathAt(at) => absolute(thread, Some(args[at]), args[at + 1])?,
     };
-    // What is opened a second time by its descriptor.
+    // A path below `/proc/self/fd` opens a file a second time by its descriptor.
     let Ok(descriptor) = path.strip_prefix("/proc/self/fd") else {
         return Some(path);
     };
     of_descriptor(thread, descriptor.to_str()?.parse().ok()?)
 }
 
-/// The call is none that the system knows, so that nothing is done.
+/// Replaces the call number with one that the kernel does not know, so that nothing is done.
 #[cfg(target_arch = "x86_64")]
 fn make_no_call(thread: Pid) {
     with_registers(thread, |registers| registers.orig_rax = u64::MAX);
@@ -423,7 +429,7 @@ fn say_it_came_to(thread: Pid, error: Errno) {
     with_registers(thread, |registers| registers.rax = answer.cast_unsigned());
 }
 
-/// The third argument of a read says how much.
+/// Limits a read to one byte. Its third argument is the length.
 #[cfg(target_arch = "x86_64")]
 fn read_one_byte(thread: Pid) {
     with_registers(thread, |registers| registers.rdx = registers.rdx.min(1));
@@ -431,7 +437,7 @@ fn read_one_byte(thread: Pid) {
 
 #[cfg(target_arch = "x86_64")]
 fn with_registers(thread: Pid, change: impl FnOnce(&mut libc::user_regs_struct)) {
-    // A thread that was killed meanwhile has none.
+    // A thread that was killed meanwhile has no registers.
     if let Ok(mut registers) = ptrace::getregs(thread) {
         change(&mut registers);
         let _ = ptrace::setregs(thread, registers);
@@ -447,14 +453,15 @@ fn say_it_came_to(_: Pid, _: Errno) {}
 #[cfg(not(target_arch = "x86_64"))]
 fn read_one_byte(_: Pid) {}
 
-/// What a system call is about.
+/// How a system call refers to its file.
 #[derive(Debug, Clone, Copy)]
 enum Of {
-    /// The file behind its first argument.
+    /// File behind the descriptor in the first argument.
     Descriptor,
-    /// The path in this argument.
+    /// Path in this argument.
     Path(usize),
-    /// The path in the argument behind this one, which is the directory that it begins at.
+    /// Path in the argument after this one. This argument is the directory to which the path is
+    /// relative.
     PathAt(usize),
 }
 
@@ -462,7 +469,7 @@ struct Call {
     number: libc::c_long,
     name: &'static str,
     of: Of,
-    /// Where the flags are that say whether a file is opened to be written.
+    /// Index of the argument with the flags that say whether a file is opened for writing.
     flags: Option<usize>,
 }
 
@@ -475,7 +482,7 @@ const fn call(number: libc::c_long, name: &'static str, of: Of) -> Call {
     }
 }
 
-/// All that looks at a file or opens it.
+/// System calls that look up or open a file.
 const LOOKS: &[Call] = &[
     call(libc::SYS_openat, "open", Of::PathAt(0)),
     call(libc::SYS_statx, "look", Of::PathAt(0)),
@@ -492,13 +499,14 @@ const LOOKS: &[Call] = &[
     call(libc::SYS_readlink, "look", Of::Path(0)),
 ];
 
-/// All that reads from a file, so much as the third argument says.
+/// System calls that read from a file. Their third argument is the length.
 const READS: &[Call] = &[
     call(libc::SYS_read, "read", Of::Descriptor),
     call(libc::SYS_pread64, "read", Of::Descriptor),
 ];
 
-/// All that changes what lies on the disk, by the path that is changed: a rename's is the new one.
+/// System calls that change the content of the disk, with the path that changes. For a rename it is
+/// the new path.
 const CALLS: &[Call] = &[
     call(libc::SYS_write, "write", Of::Descriptor),
     call(libc::SYS_pwrite64, "write", Of::Descriptor),
@@ -516,7 +524,7 @@ const CALLS: &[Call] = &[
         flags: Some(2),
         ..call(libc::SYS_openat, "open", Of::PathAt(0))
     },
-    // Younger processors have only those that begin at a directory.
+    // Newer architectures have only the variants that start at a directory.
     #[cfg(target_arch = "x86_64")]
     call(libc::SYS_unlink, "unlink", Of::Path(0)),
     #[cfg(target_arch = "x86_64")]
@@ -544,7 +552,7 @@ fn absolute(thread: Pid, directory: Option<u64>, address: u64) -> Option<PathBuf
     if path.is_absolute() {
         return Some(path);
     }
-    // A descriptor is an `int`: what is above 32 bits says nothing.
+    // A descriptor is an `int`, so the bits above 32 have no meaning.
     let here = |it: &u64| *it as u32 != libc::AT_FDCWD as u32;
     let base = match directory.filter(here) {
         Some(descriptor) => of_descriptor(thread, descriptor)?,
@@ -553,7 +561,7 @@ fn absolute(thread: Pid, directory: Option<u64>, address: u64) -> Option<PathBuf
     Some(base.join(path))
 }
 
-/// A path in the memory of a process.
+/// Reads a path from the memory of a process.
 fn text(thread: Pid, address: u64) -> Option<PathBuf> {
     use std::os::unix::ffi::OsStringExt;
     let memory = std::fs::File::open(format!("/proc/{thread}/mem")).ok()?;

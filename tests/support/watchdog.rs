@@ -1,11 +1,11 @@
-//! Waiting for something to be so. Nothing here measures speed: the limit is longer than anything
-//! takes on the slowest machine, and only a hang gets there.
+//! Waits for conditions. Nothing here measures speed: the limit is longer than any step takes on
+//! the slowest machine. Only a hang reaches it.
 
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-/// Longer than anything takes. Whoever writes a test may be less patient: `QCBUS_TEST_PATIENCE`
-/// is a number of seconds.
+/// Time limit of a wait, longer than any step takes. `QCBUS_TEST_PATIENCE` sets another number of
+/// seconds, for example a shorter limit while writing a test.
 pub static LONG: LazyLock<Duration> = LazyLock::new(|| {
     let seconds = std::env::var("QCBUS_TEST_PATIENCE")
         .ok()
@@ -13,13 +13,13 @@ pub static LONG: LazyLock<Duration> = LazyLock::new(|| {
     Duration::from_secs(seconds.unwrap_or(180))
 });
 
-/// How often the world is looked at.
+/// Interval between two checks of a condition.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// Waits until `look` gives something.
+/// Waits until `look` returns a value.
 ///
 /// # Panics
-/// When it never does, with what was waited for and what `explain` says.
+/// Panics if `look` never returns a value. The message contains `what` and the text of `explain`.
 pub fn until_or<T>(
     what: &str,
     mut look: impl FnMut() -> Option<T>,
@@ -39,17 +39,18 @@ pub fn until_or<T>(
     }
 }
 
-/// Waits until `look` gives something.
+/// Waits until `look` returns a value.
 pub fn until<T>(what: &str, look: impl FnMut() -> Option<T>) -> T {
     until_or(what, look, String::new)
 }
 
-/// Waits until something is so.
+/// Waits until a condition holds.
 pub fn until_so(what: &str, mut look: impl FnMut() -> bool) {
     until(what, || look().then_some(()));
 }
 
-/// Lets time pass: for whoever makes trouble at random, never for whoever waits for an outcome.
+/// Sleeps for some time. Only tests that cause random failures use it, never tests that wait for a
+/// result.
 pub fn pause(time: Duration) {
     std::thread::sleep(time);
 }

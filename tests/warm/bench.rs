@@ -1,4 +1,4 @@
-//! A desk beside a farm: checks are typed at the one and asked of the broker of the other.
+//! Test bench with a cli and a farm: checks run in the cli and ask the broker of the farm.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,38 +13,38 @@ use crate::support::farm::{Farm, tail};
 use crate::support::processes::signal_pid;
 use crate::support::watchdog::until_or;
 
-/// What is said under `-v` of a check that a broker made.
+/// Note under `-v` that a broker made the check.
 const WARM: &str = "note: checked by the broker that runs";
-/// What is said under `-v` of a check that a broker was to make and did not.
+/// Note under `-v` that a broker should have made the check but did not.
 const COLD: &str = "note: checked without the broker that runs";
-/// Where checks put their results, from the desk.
+/// Output directory of checks, relative to the cli.
 const OUT: &str = "out";
 
-/// Both.
+/// A cli and a farm.
 pub struct Bench {
     pub cli: Cli,
     pub farm: Farm,
 }
 
-/// How a check was made, as it says itself.
+/// How a check was made, according to its own output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Made {
     Warm,
     Cold,
 }
 
-/// All that a check leaves to a user.
+/// Everything that a check leaves to a user.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Outcome {
     code: Option<i32>,
     stdout: String,
     stderr: String,
-    /// Byte for byte, in letters.
+    /// Content of every written file, escaped as ASCII.
     written: BTreeMap<PathBuf, String>,
 }
 
 impl Bench {
-    /// With further arguments of `qcbus serve`.
+    /// Creates a bench with further arguments of `qcbus serve`.
     pub fn with(arguments: &[&str]) -> Bench {
         Bench {
             cli: Cli::new(),
@@ -56,12 +56,12 @@ impl Bench {
         Bench::with(&[])
     }
 
-    /// `qcbus check`, to be typed at the desk.
+    /// Returns a `qcbus check` command for the cli.
     pub fn command(&self, words: &[&str]) -> Command {
         self.command_into(OUT, words)
     }
 
-    /// The same, with another place for results.
+    /// Returns the same command with another output directory.
     pub fn command_into(&self, out: &str, words: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
         command.arg("check").args(words).args(["--out", out]);
@@ -69,13 +69,13 @@ impl Bench {
         command
     }
 
-    /// Whether the broker does not check a file that it is asked for now.
+    /// Returns whether the broker does not check this file now when asked.
     pub fn is_asked_in_vain(&self, file: &str) -> bool {
         let said = self.cli.run(&mut self.command_into("vain", &[file, "-v"]));
         !said.stderr.contains(WARM)
     }
 
-    /// Runs a check, where no other has left anything.
+    /// Runs a check after removing the results of other checks.
     pub fn outcome(&self, command: &mut Command) -> Outcome {
         let out = self.cli.path().join(OUT);
         let _ = std::fs::remove_dir_all(&out);
@@ -96,13 +96,14 @@ impl Bench {
         }
     }
 
-    /// What a check says without a broker.
+    /// Returns the outcome of a check without a broker.
     pub fn cold(&self, words: &[&str]) -> Outcome {
         let words = [words, &["--cold"]].concat();
         self.outcome(&mut self.command(&words))
     }
 
-    /// Holds a check that may ask against one that may not, and says how the former was made.
+    /// Compares a check that may ask the broker with one that may not. Returns how the former was
+    /// made.
     pub fn compared(&self, words: &[&str]) -> Made {
         let (cold, warm) = (self.cold(words), self.outcome(&mut self.command(words)));
         assert_eq!(cold, warm, "{words:?}\n{}", tail(&self.farm.log()));
@@ -113,18 +114,18 @@ impl Bench {
         made
     }
 
-    /// Runs a check that says how it was made, and takes that from what it said.
+    /// Runs a check that prints how it was made. Returns this, and the outcome without that note.
     pub fn told(&self, mut command: Command) -> (Made, Outcome) {
         let outcome = self.outcome(&mut command);
         told(outcome)
     }
 
-    /// A file that the broker does not watch.
+    /// Writes a file that the broker does not watch.
     pub fn beside(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
         text(&self.cli.write(name, bytes))
     }
 
-    /// A file that the broker watches.
+    /// Writes a file that the broker watches.
     pub fn watched(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
         let path = self.farm.root().join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -132,7 +133,7 @@ impl Bench {
         text(&path)
     }
 
-    /// A bundle of the broker, once `wanted` holds.
+    /// Returns the status of a bundle once `wanted` holds.
     pub fn peer(&self, name: &str, wanted: impl Fn(&PeerStatus) -> bool) -> PeerStatus {
         let found = || {
             let peers = self.farm.status()?.peers.into_iter();
@@ -142,14 +143,15 @@ impl Bench {
         until_or(&format!("{name} gets there"), found, explain)
     }
 
-    /// Stops the bundle that checks maps, so that whoever asks for one is in the middle of it. Says which it was.
+    /// Stops the bundle that checks maps, so that a check of a map stays in progress. Returns its
+    /// status.
     pub fn stop_maps(&self) -> PeerStatus {
         let bundle = self.peer("xodrBundle", |it| it.state == "ready");
         signal(&bundle, Signal::STOP);
         bundle
     }
 
-    /// Waits until nobody waits for anything.
+    /// Waits until no job is waiting or active.
     pub fn until_quiet(&self) {
         let is_quiet = || {
             let queue = self.farm.status()?.queue;
@@ -159,13 +161,13 @@ impl Bench {
         until_or("nothing is under way", is_quiet, explain);
     }
 
-    /// Waits until a check that was asked for is with a bundle.
+    /// Waits until a bundle has received a requested check.
     pub fn until_under_way(&self) {
         self.peer("xodrBundle", |it| it.active > 0);
     }
 }
 
-/// Says how a check was made, and takes that from what was said.
+/// Returns how a check was made, and removes that note from its output.
 pub fn told(mut outcome: Outcome) -> (Made, Outcome) {
     let made = match outcome.stderr.contains(WARM) {
         true => Made::Warm,
@@ -195,7 +197,7 @@ pub fn text(path: &Path) -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// A scenario with its map and its catalogs.
+/// Returns a scenario with its map and its catalogs.
 pub fn scenario() -> [(&'static str, Vec<u8>); 3] {
     let scenario = Content::Scenario(1, "map.xodr".to_owned());
     [

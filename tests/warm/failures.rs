@@ -1,4 +1,4 @@
-//! Whatever becomes of the broker and its bundles in the middle of a check, the check is right.
+//! Tests that a check is correct, whatever happens to the broker and its bundles during the check.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -11,8 +11,8 @@ use crate::support::content::Content;
 use crate::support::dice::{Dice, seed};
 use crate::support::watchdog::{pause, until_so};
 
-/// Does something to the broker, or to its bundles, while they check a file; says how the check was made, and holds
-/// what it said against what it says without a broker.
+/// Disturbs the broker or its bundles while they check a file. Compares the outcome with that of a
+/// check without a broker. Returns how the check was made.
 fn in_the_middle(bench: &Bench, content: &Content, trouble: impl FnOnce(&PeerStatus)) -> Made {
     let file = bench.beside("map.xodr", content.bytes());
     let words = [file.as_str(), "-v"];
@@ -48,7 +48,7 @@ fn a_broker_that_is_stopped_is_not_waited_for() {
         broker.signal(Signal::STOP);
     });
     assert_eq!(made, Made::Cold);
-    // Nor when it was so from the beginning.
+    // The check does not wait either if the broker is stopped from the start.
     let file = bench.beside("other.xodr", Content::Good(2).bytes());
     assert_eq!(bench.compared(&[&file]), Made::Cold);
     broker.signal(Signal::CONT);
@@ -64,7 +64,8 @@ fn a_broker_that_is_to_stop_does_what_it_has_or_says_that_it_does_not() {
     std::thread::scope(|scope| {
         let trouble = |bundle: &PeerStatus| {
             scope.spawn(|| assert!(bench.farm.qcbus(&["down"]).status.success()));
-            // The other bundles are not stopped: one of them would answer otherwise.
+            // The other bundles are not stopped. One of them would answer if the broker were not
+            // draining.
             let other = bench.beside("other.xosc", "<OpenSCENARIO/>");
             until_so("it drains", || bench.is_asked_in_vain(&other));
             signal(bundle, Signal::CONT);
@@ -74,7 +75,7 @@ fn a_broker_that_is_to_stop_does_what_it_has_or_says_that_it_does_not() {
     assert!(broker.wait().success());
 }
 
-/// Several files, right and wrong.
+/// Writes several files, good and bad.
 fn many(bench: &Bench) -> Vec<String> {
     let content = |number| match number % 3 {
         0 => Content::NoHeader(number),
@@ -107,7 +108,7 @@ fn a_broker_that_goes_at_any_moment_takes_nothing_along() {
     }
 }
 
-/// Runs checks while something is done again and again to the bundle that checks maps.
+/// Runs checks while the bundle that checks maps receives a signal again and again.
 fn besieged(bench: &Bench, sent: Signal) {
     let files = many(bench);
     let words: Vec<&str> = files.iter().map(String::as_str).take(6).collect();
@@ -155,12 +156,12 @@ fn a_file_on_which_a_bundle_died_is_not_given_to_it_again() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     let kill = |bundle: &PeerStatus| signal(bundle, Signal::KILL);
-    // What kills it three times would cost the farm its bundle in the end.
+    // A file that kills the bundle three times would finally cost the farm its bundle.
     let made = in_the_middle(&bench, &Content::NoHeader(1), kill);
     assert_eq!(made, Made::Cold);
 }
 
-/// A map on which a bundle is busy for a while.
+/// Returns a map that keeps a bundle busy for a while.
 fn large() -> Vec<u8> {
     let whole = String::from_utf8(Content::Good(1).bytes()).unwrap();
     let (begin, end) = (
@@ -188,7 +189,7 @@ fn a_file_on_which_a_bundle_was_killed_each_time_is_checked_by_another() {
             over.store(true, Ordering::Relaxed);
             asked
         });
-        // As soon as it has the file.
+        // The bundle is killed as soon as it has the file.
         while !over.load(Ordering::Relaxed) {
             let peers = bench.farm.status().map(|it| it.peers).unwrap_or_default();
             for peer in peers

@@ -1,4 +1,4 @@
-//! Nothing of a warm check stays with the broker.
+//! Tests that an on-demand check leaves nothing in the broker.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use crate::support::cli::files_below;
 use crate::support::content::Content;
 use crate::support::watchdog::{until_or, until_so};
 
-/// Everything below a directory but the journal, which is written in its own time.
+/// Returns all files below a directory except the journal, which is written at other times.
 fn tree(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let files = files_below(directory).into_iter();
     let files = files.filter(|file| !file.to_string_lossy().contains("journal"));
@@ -25,7 +25,7 @@ fn tree(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     files.map(read).collect()
 }
 
-/// How many lines the history has.
+/// Returns the number of lines in the history.
 fn history(bench: &Bench) -> i64 {
     let journal = Connection::open(bench.farm.journal()).unwrap();
     let count = journal.query_row("SELECT count(*) FROM jobs", [], |row| row.get(0));
@@ -59,7 +59,7 @@ fn nothing_is_known_of_it_and_nothing_is_published() {
     let status = bench.farm.settle(2);
     assert_eq!(status.files, before);
     assert_eq!((trees(), history(&bench)), (kept, lines));
-    // And what was checked for somebody is judged when it comes into the farm.
+    // A file that was checked on demand is still judged when it appears in the farm.
     std::fs::copy(&beside, bench.farm.root().join("came.xodr")).unwrap();
     assert_eq!(bench.farm.verdict("came.xodr").verdict, Verdict::Accepted);
 }
@@ -75,7 +75,7 @@ fn nothing_of_it_is_left_where_runs_have_their_directories() {
         let names = entries.map(|it| it.file_name());
         names.collect::<std::collections::BTreeSet<_>>()
     };
-    // One without a broker takes away what others have left.
+    // A check without a broker removes the leftovers of other checks.
     bench.cold(&[&file]);
     let before = directories();
     let (made, _) = bench.told(bench.command(&[&file, "-v"]));
@@ -98,7 +98,7 @@ fn a_watched_file_that_is_asked_for_keeps_its_own_verdict() {
         let words = [file.as_str(), "-v"];
         let asked = std::thread::scope(|scope| {
             let asked = scope.spawn(|| bench.told(bench.command(&words)));
-            // Both are with the bundle.
+            // The bundle now has both jobs: the watched file and the on-demand check.
             bench.peer("xodrBundle", |it| it.active > 1);
             signal(&bundle, Signal::CONT);
             asked.join().unwrap()
@@ -111,7 +111,7 @@ fn a_watched_file_that_is_asked_for_keeps_its_own_verdict() {
     bench.farm.settle(0);
 }
 
-/// Checks that are typed and not waited for.
+/// Checks that were started but are not waited for.
 struct Asked(Vec<Child>);
 
 impl Asked {
@@ -166,7 +166,7 @@ fn whoever_asks_and_vanishes_leaves_nothing() {
             || format!("{:#?}", bench.farm.status()),
         );
         asked.vanish();
-        // The bundle stands still, and yet nobody waits for it any more.
+        // The bundle is still stopped, but no request waits for it any more.
         bench.until_quiet();
         signal(&bundle, Signal::CONT);
         assert_eq!(bench.compared(&[&file]), Made::Warm);

@@ -1,4 +1,5 @@
-//! A broker that works otherwise than a check would by itself gives no answer of its own.
+//! Tests with a broker that works differently from the check itself. Its own answer must not be
+//! used.
 
 use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
@@ -14,7 +15,7 @@ use crate::support::watchdog::until;
 
 const CONFIG: &str = "<Config><CheckerBundle application=\"xodrBundle\"><Checker \
     checkerId=\"check_asam_xodr_xml_valid_xml_document\" minLevel=\"3\" maxLevel=\"1\"/></CheckerBundle></Config>";
-/// A schema that knows a header and something else.
+/// A schema that knows a header and one other element.
 const SCHEMA: &str = r#"<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema">
 <xs:element name="OpenDRIVE"><xs:complexType><xs:sequence>
 <xs:element name="header" type="xs:anyType"/>
@@ -22,7 +23,8 @@ const SCHEMA: &str = r#"<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema">
 </xs:sequence></xs:complexType></xs:element>
 </xs:schema>"#;
 
-/// A file that is right and one that is wrong, asked of a broker with these arguments.
+/// Checks a good and a bad file with a broker that has these arguments. Returns how the checks were
+/// made.
 fn asked_of(serve: &[&str], check: &[&str]) -> Made {
     let bench = Bench::with(serve);
     let _broker = bench.farm.serve_ready();
@@ -51,7 +53,7 @@ fn other_limits_and_forms_are_checked_cold_and_the_same_warm() {
         assert_eq!(asked_of(&[], words), Made::Cold, "the check has {words:?}");
         assert_eq!(asked_of(words, words), Made::Warm, "both have {words:?}");
     }
-    // They find the same in whatever time.
+    // The number of threads changes only the time, not the findings.
     assert_eq!(
         asked_of(&["--threads", "1"], &["--threads", "2"]),
         Made::Warm
@@ -161,7 +163,7 @@ fn who_sees_other_files_is_not_answered() {
     }
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
-    // Under the same name another file lies there than here.
+    // In the other mount namespace the same path is another file.
     let file = bench.beside("d/map.xodr", Content::Good(1).bytes());
     bench.beside("other/map.xodr", Content::NoHeader(2).bytes());
     let check = bench.command(&[&file, "-v"]);
@@ -176,7 +178,7 @@ fn who_sees_other_files_is_not_answered() {
     assert_eq!((made, found.code()), (Made::Cold, Some(1)), "{found:?}");
 }
 
-/// Root without the rights of root.
+/// Command that runs root without its capabilities.
 const WITH_LESS: [&str; 5] = ["setpriv", "--bounding-set", "-all", "--inh-caps", "-all"];
 
 fn with_less(command: &Command) -> Command {
@@ -190,7 +192,7 @@ fn with_less(command: &Command) -> Command {
     less
 }
 
-/// A file that nobody may read who has no rights beyond his own, and one that includes such a file.
+/// Writes a file that cannot be read without additional rights, and one that includes such a file.
 fn hidden(bench: &Bench) -> [String; 2] {
     let hidden = bench.beside("map.xodr", Content::Good(1).bytes());
     let part = bench.beside("part.xml", Content::Part(1, Mark::Clean).bytes());
@@ -214,7 +216,7 @@ fn who_has_other_rights_is_not_answered() {
     let files = hidden(&bench);
     let all = |words: &[&str]| bench.command(words);
     let less = |words: &[&str]| with_less(&bench.command(words));
-    // First the broker has more rights than who asks, then fewer.
+    // First the broker has more rights than the caller, then fewer.
     let ask = |command: &dyn Fn(&[&str]) -> Command| {
         for file in &files {
             let cold = bench.told(command(&[file, "-v", "--cold"]));

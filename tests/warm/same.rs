@@ -1,4 +1,4 @@
-//! A warm check says what a cold one says.
+//! Tests that an on-demand check has the same outcome as a check without the broker.
 
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
@@ -10,7 +10,7 @@ use crate::bench::{Bench, Made, scenario, text};
 use crate::support::cli::{files_below, sample_farm};
 use crate::support::content::{CATALOG, Content, Mark};
 
-/// Files of every kind of verdict, by name.
+/// Returns files of every kind of verdict, by name.
 fn files() -> Vec<(&'static str, Vec<u8>)> {
     let torn = Content::Good(5).bytes();
     let mut files = vec![
@@ -64,7 +64,8 @@ fn every_verdict_is_the_same_beside_the_farm_and_in_it() {
         for at in [bench.cli.path(), &bench.farm.root()] {
             let file = text(&at.join(name));
             let made = bench.compared(&[&file]);
-            // What cannot be read is left to whoever asks: perhaps he can.
+            // The broker leaves an unreadable file to the caller, because the caller may be able to
+            // read it.
             let may_be_cold = name.contains("no_archive");
             assert!(made == Made::Warm || may_be_cold, "{file} was checked cold");
         }
@@ -105,7 +106,7 @@ fn several_files_are_judged_the_same() {
     }
     let maps: Vec<&str> = maps.iter().map(String::as_str).collect();
     assert_eq!(bench.compared(&maps), Made::Warm);
-    // The same one twice, and by another name.
+    // The same file is given twice, and under another path.
     let again = [maps[0], maps[0], "d/../d/0.xodr"];
     assert_eq!(bench.compared(&again), Made::Warm);
     let files: Vec<String> = scenario()
@@ -113,19 +114,19 @@ fn several_files_are_judged_the_same() {
         .map(|(name, bytes)| bench.beside(name, bytes))
         .collect();
     let both: Vec<&str> = files.iter().map(String::as_str).collect();
-    // A map and a scenario on it, whether the map is right or not.
+    // A map and a scenario on it are checked together, with a good and a bad map.
     bench.compared(&both);
     bench.beside("map.xodr", Content::NoHeader(3).bytes());
     bench.compared(&both);
     bench.compared(&[both[2]]);
-    // More than are asked for.
+    // These are more files than a check asks the broker for.
     let many: Vec<String> = (0..65)
         .map(|number| bench.beside(&format!("m/{number}.xodr"), Content::Good(number).bytes()))
         .collect();
     let many: Vec<&str> = many.iter().map(String::as_str).collect();
     assert_eq!(bench.compared(&many), Made::Cold);
     assert_eq!(bench.compared(&many[1..]), Made::Warm);
-    // A directory is looked through by whoever is told of it.
+    // The check itself scans a directory, without the broker.
     assert_eq!(bench.compared(&["d"]), Made::Cold);
 }
 
@@ -165,7 +166,7 @@ fn every_way_of_printing_is_the_same() {
     );
 }
 
-/// The broker sees its whole directory, and a check of a file what lies beside that.
+/// The broker sees its whole directory. A check of a file sees only what lies beside the file.
 #[test]
 fn includes_are_followed_as_far_as_without_the_broker() {
     let bench = Bench::new();
@@ -175,23 +176,24 @@ fn includes_are_followed_as_far_as_without_the_broker() {
     bench.watched("part.xml", &part);
     let file = bench.watched("below/map.xodr", &including);
     assert_eq!(bench.compared(&[&file]), Made::Warm);
-    // Neither has the one changed what the other sees, in whichever order.
+    // The broker and the check do not change what the other sees, in either order.
     let served = |name: &str| bench.farm.verdict(name).verdict;
     assert_eq!(served("below/map.xodr"), Verdict::Accepted);
     assert_eq!(bench.compared(&[&file]), Made::Warm);
-    // A map on which a scenario lies is read for several.
+    // A map that a scenario uses is read for several files.
     let scenario = Content::Scenario(3, "map.xodr".to_owned()).bytes();
     bench.watched(
         "below/catalogs/vehicles.xosc",
         Content::Catalog(4, Mark::Clean).bytes(),
     );
     let scenario = bench.watched("below/scenario.xosc", scenario);
-    // Its map is rejected where the include is not followed, and that is counted in without the broker.
+    // The map is rejected if the include is not followed. A check without the broker counts this
+    // verdict.
     assert_eq!(bench.compared(&[&scenario]), Made::Cold);
     assert_eq!(served("below/scenario.xosc"), Verdict::Accepted);
     assert_eq!(bench.compared(&[&scenario]), Made::Cold);
     assert_eq!(bench.compared(&[&scenario, "--own-verdict"]), Made::Warm);
-    // And what lies beside is included by both.
+    // A file beside the map is included by both.
     let (whole, view) = Content::road_in_two_parts();
     bench.watched("two/view.xml", view);
     let file = bench.watched("two/map.xodr", whole);
@@ -260,14 +262,15 @@ fn results_that_cannot_be_written_are_refused_alike() {
         command.arg("--instance-dir").arg(bench.farm.instance());
         bench.outcome(&mut command)
     };
-    // Where the broker itself has its results, below them, and where there can be none.
+    // The outputs are the broker's own directory, one below it, and a path that cannot be a
+    // directory.
     let served = text(&bench.farm.out());
     for out in [served.as_str(), &format!("{served}/below"), &file] {
         let cold = refused(out, &["--cold"]);
         assert_eq!(cold, refused(out, &[]), "{out}");
         assert_eq!(cold.code(), Some(2), "{cold:?}");
     }
-    // A result that is a directory already.
+    // A directory already exists at the path of the result.
     let taken = bench.cli.path().join("taken/map.xodr.xqar/x");
     std::fs::create_dir_all(taken).unwrap();
     assert_eq!(refused("taken", &["--cold"]), refused("taken", &[]));

@@ -1,4 +1,5 @@
-//! A hosted module as a bundle of the SDK: each of its checkers is a rule, and all of them have one run.
+//! Bundle of a hosted module: each checker of the module is a rule of the SDK. All rules share one
+//! run.
 
 use std::any::{Any, TypeId};
 
@@ -16,23 +17,23 @@ use crate::messages::Request;
 use crate::results::{Report, Told, read};
 use crate::runners::Runners;
 
-/// The checker that stands for the module as a whole.
+/// Checker that represents the module as a whole.
 pub(crate) const MODULE_CHECKER: &str = "check_qcbus_asam_module_is_known";
 const MODULE_UID: &str = "qcbus.dev:qcbus:1.0.0:asam.module_is_known";
 const MODULE_PAGE: &str = "# module is known\n\nThe module says nothing of checkers that it did not have when it was started.\n";
 
-/// What all rules of a bundle share.
+/// State shared by all rules of a bundle.
 struct Host {
     hosted: Hosted,
     learned: Learned,
     runners: Runners,
 }
 
-/// What a rule stands for.
+/// Subject of a rule.
 enum SendSide {
     /// A checker of the module.
     Checker(&'static Known),
-    /// Whatever no rule stands for.
+    /// All checkers without a rule of their own.
     Rest,
 }
 
@@ -42,13 +43,13 @@ struct HostedRule {
     host: &'static Host,
 }
 
-/// The run of a module over one job, which all of its checkers look at.
+/// Run of a module over one job. All of its checkers read it.
 struct Run<'d> {
     report: Report,
     subject: &'d Subject<'d>,
 }
 
-/// Keeps a value as long as the process: the SDK's bundles are constants of their programs.
+/// Leaks a value for the process lifetime, because the SDK expects constant bundles.
 fn leak<T>(value: T) -> &'static T {
     Box::leak(Box::new(value))
 }
@@ -57,7 +58,7 @@ fn leak_text(text: impl Into<String>) -> &'static str {
     Box::leak(text.into().into_boxed_str())
 }
 
-/// The bundle of a module.
+/// Builds the bundle of a module.
 pub(crate) fn bundle(hosted: Hosted, learned: Learned, runners: Runners) -> &'static Bundle {
     let host = leak(Host {
         hosted,
@@ -144,7 +145,8 @@ impl Host {
         let answered = match self.runners.ask(&request, &pieces) {
             Ok(answered) => answered,
             Err(error) => {
-                // Behind the fence no other one can be started: whoever started this process starts a new one.
+                // A process in the sandbox cannot start another runner. Its parent starts a new
+                // process.
                 tracing::error!(module = name, %error, "nothing more can be run");
                 std::process::exit(i32::from(Exit::Internal.code()));
             }
@@ -169,7 +171,7 @@ impl Run<'_> {
         found.end(told.ending.clone());
     }
 
-    /// How a checker has ended of which the result says nothing.
+    /// Returns how a checker ended that the result does not mention.
     fn without_a_word(&self, known: &Known) -> Ending {
         let kind = self.subject.kind();
         match known.kinds.contains(&kind) {
@@ -182,7 +184,7 @@ impl Run<'_> {
         }
     }
 
-    /// What nobody asked for is not lost: it is found here, and the checker fails.
+    /// Reports issues of unknown checkers, so that they are not lost. The checker then fails.
     fn told_besides(&self, host: &Host, found: &mut Sink<'_>) {
         let checkers = self.report.checkers.iter();
         let unknown: Vec<&Told> = checkers.filter(|it| !host.is_known(&it.id)).collect();

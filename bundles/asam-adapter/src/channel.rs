@@ -1,8 +1,9 @@
-//! What the bus process and an office say to each other: packets on a pair of sockets.
+//! Message channel between the bus process and a runner: packets on a socket pair.
 //!
-//! A message is a number, a head in JSON and a body of bytes, cut into packets that arrive whole or not at all. A
-//! bus process that is killed in the middle of a message is followed by another one on the same sockets: whoever
-//! reads drops what was begun when a packet of another message comes.
+//! A message has a number, a JSON head and a body of bytes. It is cut into packets that arrive
+//! completely or are lost completely. If a bus process is killed in the middle of a message,
+//! another one continues on the same sockets. The receiver drops an incomplete message as soon as a
+//! packet of another message arrives.
 
 use std::io::{self, ErrorKind};
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
@@ -11,32 +12,32 @@ use rustix::net::{AddressFamily, SocketFlags, SocketType, socketpair};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Bytes of a packet, its own head of [`HEAD`] bytes included.
+/// Size of a packet in bytes, including its own head of [`HEAD`] bytes.
 const PACKET: usize = 64 << 10;
-/// Number of the message, bytes of its head, bytes of its body, bytes that came before.
+/// Size of the packet head: message number, head size, body size, and bytes sent before.
 const HEAD: usize = 32;
 
-/// One end.
+/// One end of a channel.
 #[derive(Debug)]
 pub(crate) struct Channel {
     socket: OwnedFd,
 }
 
-/// A whole message.
+/// A complete message.
 #[derive(Debug)]
 pub(crate) struct Message {
-    /// Which one, for the answer to name.
+    /// Number of the message. The answer repeats it.
     pub number: u64,
     head: Vec<u8>,
-    /// What goes along with the head.
+    /// Bytes that follow the head.
     pub body: Vec<u8>,
 }
 
 impl Message {
-    /// The head.
+    /// Parses the head.
     ///
     /// # Errors
-    /// When it is not what was expected.
+    /// If the head does not have the expected type.
     pub fn head<T: DeserializeOwned>(&self) -> io::Result<T> {
         serde_json::from_slice(&self.head)
             .map_err(|error| io::Error::new(ErrorKind::InvalidData, error))
@@ -44,10 +45,10 @@ impl Message {
 }
 
 impl Channel {
-    /// Both ends. They do not outlive a process that becomes another program.
+    /// Creates both ends of a channel. They are closed when the process executes another program.
     ///
     /// # Errors
-    /// The system's.
+    /// System errors.
     pub fn pair() -> io::Result<(Channel, Channel)> {
         let (one, other) = socketpair(
             AddressFamily::UNIX,
@@ -58,20 +59,20 @@ impl Channel {
         Ok((Channel { socket: one }, Channel { socket: other }))
     }
 
-    /// An end that somebody has handed over.
+    /// Creates an end from a socket that another process passed on.
     pub fn from_socket(socket: OwnedFd) -> Channel {
         Channel { socket }
     }
 
-    /// The socket, to hand it over.
+    /// Returns the socket to pass it on.
     pub fn into_socket(self) -> OwnedFd {
         self.socket
     }
 
-    /// Sends a message, whose body is these pieces in a row.
+    /// Sends a message. Its body is the concatenation of the given pieces.
     ///
     /// # Errors
-    /// The system's; [`ErrorKind::BrokenPipe`] when nobody is at the other end.
+    /// System errors; [`ErrorKind::BrokenPipe`] if the other end is closed.
     pub fn send(&self, number: u64, head: &impl Serialize, body: &[&[u8]]) -> io::Result<()> {
         let head = serde_json::to_vec(head)?;
         let length: usize = body.iter().map(|it| it.len()).sum();
@@ -106,7 +107,7 @@ impl Channel {
     }
 
     fn write(&self, packet: &[u8]) -> io::Result<()> {
-        // Not by `send`: a signal for a closed pipe is ignored in Rust's programs.
+        // `send` is not needed: Rust programs ignore the signal for a closed pipe.
         loop {
             match rustix::io::write(&self.socket, packet) {
                 Ok(_) => return Ok(()),
@@ -116,10 +117,10 @@ impl Channel {
         }
     }
 
-    /// Waits for a message. `None`: nobody is at the other end any more.
+    /// Waits for a message. Returns `None` if the other end is closed.
     ///
     /// # Errors
-    /// The system's, and [`ErrorKind::InvalidData`] for what is no packet, or longer than `most`.
+    /// System errors; [`ErrorKind::InvalidData`] for an invalid packet or more than `most` bytes.
     pub fn receive(&self, most: u64) -> io::Result<Option<Message>> {
         let mut packet = vec![0; PACKET];
         let mut begun: Option<(Message, u64, usize)> = None;
@@ -154,7 +155,7 @@ impl Channel {
                 };
                 begun = Some((message, 0, head as usize));
             }
-            // The rest of a message whose begin went to somebody else means nothing.
+            // Another process received the first packet of this message, so the rest is useless.
             let Some((message, there, head)) = begun.as_mut() else {
                 continue;
             };

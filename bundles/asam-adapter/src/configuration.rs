@@ -1,32 +1,32 @@
-//! The configuration that a module reads: that in force, with its own files in it.
+//! Configuration file for a module: the configuration in force with the file names of the run.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
 use qcbus_formats::config::{BundleConfig, Config, ConfigParam, INPUT_PARAMS};
 
-/// The bundle's parameters that name its result, the framework's first.
+/// Parameters of a bundle that name its result file. The framework's name comes first.
 const RESULT_PARAMS: [&str; 2] = ["resultFile", "strResultFile"];
 
-/// A report module's parameters that name the result.
+/// Parameters of a report module that name the result file.
 const RESULT_INPUTS: [&str; 2] = ["InputFile", "strInputFile"];
-/// Those that say where it writes.
+/// Parameters of a report module that name its output file.
 const OUTPUT_PARAMS: [&str; 2] = ["OutputFile", "strReportFile"];
 
-/// Everything that goes into it.
+/// Input for the configuration text.
 pub(crate) struct Configuration<'c> {
-    /// The name under which the module is hosted.
+    /// Name under which the module is hosted.
     pub name: &'c str,
-    /// The file to check.
+    /// File to check.
     pub input: &'c str,
-    /// The configuration in force.
+    /// Configuration in force.
     pub config: Option<&'c Config>,
-    /// The names by which the module may look for its section, each with the file for its result.
+    /// Names under which the module may look for its section, each with its result file.
     pub sections: &'c [(String, String)],
 }
 
 impl Configuration<'_> {
-    /// Its text.
+    /// Returns the configuration text.
     pub fn text(&self) -> String {
         let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Config>\n");
         param(&mut text, 1, INPUT_PARAMS[0], self.input);
@@ -47,8 +47,8 @@ impl Configuration<'_> {
     }
 }
 
-/// The configuration of a report module: the result, where to write, and its own parameters. ASAM's modules and others
-/// call the two differently.
+/// Returns the configuration of a report module: the result file, the output file and its own
+/// parameters. ASAM's modules name the two files differently from others.
 pub(crate) fn of_report(applications: &[String], result: &str, own: &[(String, String)]) -> String {
     let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Config>\n");
     param(&mut text, 1, INPUT_PARAMS[0], result);
@@ -56,7 +56,7 @@ pub(crate) fn of_report(applications: &[String], result: &str, own: &[(String, S
         .iter()
         .rev()
         .find(|(name, _)| OUTPUT_PARAMS.contains(&name.as_str()));
-    // It writes to its own directory, whatever the path was.
+    // A module writes to its own directory, so only the file name of the path is used.
     let named = named.and_then(|(_, value)| Path::new(value).file_name()?.to_str());
     let report = named
         .filter(|it| !it.starts_with("__"))
@@ -83,7 +83,7 @@ pub(crate) fn of_report(applications: &[String], result: &str, own: &[(String, S
 fn section(text: &mut String, own: &BundleConfig) {
     params(text, 2, &own.params);
     for checker in &own.checkers {
-        // As ASAM writes it: the larger number is the milder level.
+        // ASAM writes the larger number for the milder level.
         let (mildest, worst) = (checker.levels.mildest() as u8, checker.levels.worst() as u8);
         let id = escaped(&checker.id);
         let _ = writeln!(
@@ -95,7 +95,7 @@ fn section(text: &mut String, own: &BundleConfig) {
     }
 }
 
-/// Parameters, without those that name files of the run: these are ours to say.
+/// Writes parameters, except those that name files of the run. The adapter sets these itself.
 fn params(text: &mut String, depth: usize, all: &[ConfigParam]) {
     let is_ours = |name: &str| INPUT_PARAMS.contains(&name) || RESULT_PARAMS.contains(&name);
     for it in all.iter().filter(|it| !is_ours(&it.name)) {
@@ -108,7 +108,8 @@ fn param(text: &mut String, depth: usize, name: &str, value: &str) {
     let _ = writeln!(text, "{indent}<Param name=\"{name}\" value=\"{value}\"/>");
 }
 
-/// A text as the value of an attribute. What XML cannot say is left out, and is in no configuration either.
+/// Escapes a text as an attribute value. Characters that XML cannot represent are left out. No
+/// configuration contains them.
 fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {

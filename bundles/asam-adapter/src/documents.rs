@@ -1,4 +1,4 @@
-//! The files of a job, byte by byte as they are on disk.
+//! The files of a job with exactly the bytes on disk.
 
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
@@ -11,14 +11,15 @@ use sha2::{Digest as _, Sha256};
 
 use crate::messages::{Bytes, Document};
 
-/// What is handed to an office: the files, and pieces of images that are the bytes of those that are here.
+/// Input for a runner: the files, and slices of the images with the bytes of those files that are
+/// in the message.
 pub(crate) type Files<'d> = (Vec<Document>, Vec<&'d [u8]>);
 
-/// The documents of a job: the one that is checked first, then those that it refers to, each once. Members of
-/// archives are none: no module of ASAM's knows archives.
+/// Returns the documents of a job without duplicates: first the checked file, then the files that
+/// it refers to. Members of archives are left out, because no ASAM module reads archives.
 ///
 /// # Errors
-/// When a file's bytes cannot be had, for a person.
+/// If the bytes of a file are not available, as text for the user.
 pub(crate) fn of<'d>(subject: &Subject<'d>) -> Result<Files<'d>, String> {
     let is_file = |role: DocumentRole| {
         matches!(
@@ -72,8 +73,8 @@ pub(crate) fn of<'d>(subject: &Subject<'d>) -> Result<Files<'d>, String> {
     Ok((files, pieces))
 }
 
-/// Where a packed file would lie if it were not packed. No module of ASAM's can read those, and would say of a good one
-/// that it is no XML.
+/// Returns the path that a packed file would have if it were unpacked. ASAM's modules cannot read
+/// packed files. They would report that a valid packed file is not XML.
 fn unpacked(path: &Path) -> Option<PathBuf> {
     let is_packed = Suffix::of_path(path).is_some_and(|it| it.packed);
     let name = path.file_name()?.to_str().filter(|_| is_packed)?;
@@ -81,7 +82,7 @@ fn unpacked(path: &Path) -> Option<PathBuf> {
     let by_letter = stem.filter(|(_, end)| end.eq_ignore_ascii_case(".xodrz"));
     let name = match by_letter {
         Some((stem, _)) => format!("{stem}.xodr"),
-        // `.xodr.gz`
+        // The name ends with `.xodr.gz`.
         None => name.rsplit_once('.')?.0.to_owned(),
     };
     Some(path.with_file_name(name))
@@ -107,7 +108,7 @@ fn bytes_of(
     }
 }
 
-/// The same path without `.` and `..`.
+/// Returns the path without `.` and `..`.
 fn plain(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
     for component in path.components() {

@@ -1,7 +1,8 @@
-//! Everything that a process has started, in whatever group or session it has placed itself.
+//! All descendants of a process, regardless of their process group or session.
 //!
-//! An office is the next of kin of what it runs (`PR_SET_CHILD_SUBREAPER`): who loses its parent becomes a child of
-//! the office. So all of a run is below the office at any time, and nothing else is but the warm servers.
+//! A runner is the subreaper of its runs (`PR_SET_CHILD_SUBREAPER`): a process whose parent ends
+//! becomes a child of the runner. Therefore all processes of a run are descendants of the runner.
+//! Its only other descendants are the fork servers.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -9,20 +10,21 @@ use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, WaitOptions, kill_process, waitpid};
 
-/// How long those who were killed may take to be gone. One that waits for a disk in vain cannot go.
+/// Time limit for killed processes to end. A process that waits for a disk without an answer cannot
+/// end.
 const GONE_WITHIN: Duration = Duration::from_secs(20);
 
-/// Makes this process the one to which orphans are given.
+/// Makes this process the subreaper of its descendants.
 ///
 /// # Errors
-/// The kernel's.
+/// Kernel errors.
 pub(crate) fn adopt() -> std::io::Result<()> {
     Ok(rustix::process::set_child_subreaper(Some(
         rustix::process::getpid(),
     ))?)
 }
 
-/// What lives below this process, but for `spared`, whose children count.
+/// Returns the living descendants of this process, without `spared` but with their children.
 pub(crate) fn living(spared: &[i32]) -> BTreeSet<i32> {
     let found = below(std::process::id().cast_signed());
     found
@@ -32,7 +34,8 @@ pub(crate) fn living(spared: &[i32]) -> BTreeSet<i32> {
         .collect()
 }
 
-/// Memory that processes have in use by themselves, in bytes: what they share with others does not count.
+/// Returns the private memory of processes in bytes. Memory shared with other processes does not
+/// count.
 pub(crate) fn memory(pids: &BTreeSet<i32>) -> u64 {
     let page = rustix::param::page_size() as u64;
     let used = |pid: &i32| {
@@ -45,10 +48,10 @@ pub(crate) fn memory(pids: &BTreeSet<i32>) -> u64 {
     pids.iter().filter_map(used).sum()
 }
 
-/// Kills everything below this process but for `spared`, and buries it.
+/// Kills all descendants of this process, except `spared`, and reaps them.
 ///
 /// # Errors
-/// How many cannot be killed.
+/// The number of processes that cannot be killed.
 pub(crate) fn end(spared: &[i32]) -> Result<(), usize> {
     let begin = Instant::now();
     loop {
@@ -67,10 +70,10 @@ pub(crate) fn end(spared: &[i32]) -> Result<(), usize> {
     }
 }
 
-/// Stops everybody before anybody is killed, so that nobody starts another one meanwhile.
+/// Stops all descendants before the kill, so that none can start another one meanwhile.
 fn stopped(spared: &[i32]) -> BTreeSet<i32> {
     let mut known = BTreeSet::new();
-    // A hostile one may be faster than this; it is looked at again after the kill.
+    // A hostile process may fork faster than this loop. The caller checks again after the kill.
     for _ in 0..16 {
         let living = living(spared);
         let mut more = false;
@@ -87,7 +90,7 @@ fn stopped(spared: &[i32]) -> BTreeSet<i32> {
     known
 }
 
-/// Waits for children that have ended, but for `spared`.
+/// Reaps children that have ended, except `spared`.
 fn bury(spared: &[i32]) {
     let own = children_of(std::process::id().cast_signed()).unwrap_or_else(|| {
         let own = std::process::id().cast_signed();
@@ -105,12 +108,12 @@ fn bury(spared: &[i32]) {
 
 fn signal(pid: i32, signal: Signal) {
     if let Some(pid) = Pid::from_raw(pid) {
-        // It may have ended by itself.
+        // The process may have ended by itself.
         let _ = kill_process(pid, signal);
     }
 }
 
-/// A process as the kernel lists it.
+/// A process as listed by the kernel.
 #[derive(Debug, Clone, Copy)]
 struct Listed {
     parent: i32,
@@ -119,7 +122,7 @@ struct Listed {
 
 fn listed(pid: i32) -> Option<Listed> {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    // The command stands in parentheses and may contain anything; behind it come state and parent.
+    // The command is in parentheses and may contain anything. State and parent follow it.
     let (_, rest) = stat.rsplit_once(')')?;
     let mut fields = rest.split_whitespace();
     let state = fields.next()?;
@@ -136,8 +139,8 @@ fn processes() -> BTreeMap<i32, Listed> {
         .collect()
 }
 
-/// Everybody below a process. By the kernel's lists of children, where it keeps some. A list may lack one while
-/// others of it end, and whoever is missed so is found by the next look.
+/// Returns all descendants of a process. It uses the kernel's lists of children, if they exist. A
+/// list may miss a child while other children end. The next call finds such a child.
 fn below(root: i32) -> BTreeSet<i32> {
     let mut found = BTreeSet::from([root]);
     let mut open = vec![root];
@@ -167,7 +170,8 @@ fn below_by_parents(root: i32) -> BTreeSet<i32> {
     }
 }
 
-/// The children of a process, whichever of its threads they are listed with. `None`: this kernel keeps no lists.
+/// Returns the children of all threads of a process, or `None` if this kernel keeps no lists of
+/// children.
 fn children_of(process: i32) -> Option<BTreeSet<i32>> {
     if !Path::new("/proc/thread-self/children").exists() {
         return None;
@@ -175,7 +179,7 @@ fn children_of(process: i32) -> Option<BTreeSet<i32>> {
     let threads = std::fs::read_dir(format!("/proc/{process}/task"));
     let mut found = BTreeSet::new();
     for thread in threads.into_iter().flatten().flatten() {
-        // A thread that has ended meanwhile has none.
+        // A thread that has ended meanwhile has no list.
         let list = std::fs::read_to_string(thread.path().join("children"));
         let list = list.unwrap_or_default();
         found.extend(

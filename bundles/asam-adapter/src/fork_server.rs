@@ -1,6 +1,8 @@
-//! How a run begins: plainly, by a shell, or as the fork of an interpreter that has loaded the module already.
+//! Start of a run: plainly in a shell, or as a fork of an interpreter that has already loaded the
+//! module.
 //!
-//! A warm run is a plain one, only sooner ([`crate::warm`]). Whatever cannot be known to be so is run plainly.
+//! A forked run gives the same results as a plain run, but starts faster ([`crate::warm`]). If this
+//! is not certain, the run is plain.
 
 use std::ffi::OsString;
 use std::io::{self, PipeWriter};
@@ -17,29 +19,29 @@ use crate::hosted::Limits;
 use crate::process::Run;
 use crate::warm::{self, Server, SpawnError, WhyCold, recognise};
 
-/// Variables that no module gets: whoever has these is believed to be a bundle of ours.
+/// Variables that are hidden from modules. They identify qcbus' own bundles.
 const OURS: [&str; 2] = ["QCBUS_LAUNCH", "QCBUS_SANDBOX"];
-/// How long a module may take to be loaded.
+/// Time limit for loading a module.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Begins runs, and keeps what makes them begin sooner.
+/// Starts runs and holds the fork server that makes them start faster.
 #[derive(Debug)]
 pub(crate) struct ForkServer {
     server: Option<Server>,
-    /// It is of no use to try again.
+    /// Whether the fork server is disabled for all later runs.
     is_cold: bool,
 }
 
-/// The first process of a run.
+/// First process of a run.
 #[derive(Debug)]
 pub(crate) enum Started {
     Cold(Child),
-    /// A process of the server's.
+    /// A process forked by the fork server.
     Warm(u32),
 }
 
 impl ForkServer {
-    /// One that begins runs plainly only, when that is wanted.
+    /// Creates a starter of runs. If `is_cold` is set, all runs are plain.
     pub fn new(is_cold: bool) -> ForkServer {
         ForkServer {
             server: None,
@@ -47,10 +49,10 @@ impl ForkServer {
         }
     }
 
-    /// Begins a run, whose output goes to `writer`. `plainly`: not warm, this time.
+    /// Starts a run with its output to `writer`. If `plainly` is set, it uses no fork server.
     ///
     /// # Errors
-    /// The system's.
+    /// System errors.
     pub fn start(
         &mut self,
         run: &Run<'_>,
@@ -58,7 +60,7 @@ impl ForkServer {
         plainly: bool,
     ) -> io::Result<Started> {
         if !plainly && !self.is_cold {
-            // What is installed may have changed, or the interpreter may have gone: another one, once.
+            // If the installation has changed or the interpreter has ended, it is restarted once.
             for _ in 0..2 {
                 match self.warm(run, &writer) {
                     Ok(pid) => return Ok(Started::Warm(pid)),
@@ -111,7 +113,7 @@ impl ForkServer {
             let command = without_going_where_it_is(run.command, run.directory);
             let started = recognise(command, &path, Path::new("/"))
                 .and_then(|entry| Server::start(&entry, environment, &limits, PATIENCE));
-            // It would be the same for every job, and cost the time of an import each time.
+            // The result is the same for every job, and each attempt costs the time of an import.
             let started = started.inspect_err(|_| self.is_cold = true)?;
             return Ok(self.server.insert(started));
         }
@@ -120,10 +122,10 @@ impl ForkServer {
             .ok_or_else(|| WhyCold::new("it was let go"))
     }
 
-    /// How a run has ended, when it has.
+    /// Returns the exit status of a run, or `None` if the run has not ended.
     ///
     /// # Errors
-    /// The system's; of a warm one that its interpreter has gone.
+    /// System errors; for a forked run also that its interpreter has ended.
     pub fn ended(&mut self, started: &mut Started) -> io::Result<Option<ExitStatus>> {
         match started {
             Started::Cold(child) => child.try_wait(),
@@ -141,24 +143,24 @@ impl ForkServer {
         }
     }
 
-    /// What is readable when a warm run has ended.
+    /// Returns a descriptor that becomes readable when a forked run ends.
     pub fn heard(&self) -> Option<BorrowedFd<'_>> {
         self.server.as_ref().map(|server| server.as_fd())
     }
 
-    /// Processes that are no part of any run.
+    /// Returns the processes that belong to no run.
     pub fn spared(&self) -> Vec<i32> {
         let server = self.server.as_ref();
         server.map(|it| it.id().cast_signed()).into_iter().collect()
     }
 
-    /// Lets the interpreter go, which has gone or is not to be relied on.
+    /// Drops the interpreter, because it has ended or is unreliable.
     pub fn let_go(&mut self) {
         self.server = None;
     }
 }
 
-/// All variables of a run, as its shell would have them.
+/// Returns all variables of a run, as a shell would set them.
 fn environment(run: &Run<'_>) -> Vec<(OsString, OsString)> {
     let is_given = |name: &OsString| run.environment.iter().any(|(other, _)| other == name);
     let inherited = std::env::vars_os()
@@ -187,12 +189,13 @@ fn start(run: &Run<'_>, writer: PipeWriter) -> io::Result<Child> {
     }
     let limits = run.limits;
     let runner = std::process::id();
-    // SAFETY: between fork and exec only system calls are made; nothing is allocated and no lock is taken.
+    // SAFETY: only system calls are made between fork and exec; nothing is allocated and no lock is
+    // taken.
     unsafe {
         command.pre_exec(move || {
             rustix::process::setsid()?;
             restrict(&limits)?;
-            // It may be gone already, and then nobody would end this.
+            // The parent may have ended before `prctl`. Then this process would never be killed.
             let failed = libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) != 0;
             let parent = rustix::process::getppid().map(|it| it.as_raw_nonzero().get());
             if failed || parent != Some(runner.cast_signed()) {
@@ -224,16 +227,17 @@ fn restrict(limits: &Limits) -> io::Result<()> {
     Ok(())
 }
 
-/// What this process may not have itself it cannot give.
+/// Limits a value to this process's own hard limit, because it cannot grant more.
 fn at_most(resource: Resource, bytes: u64) -> u64 {
     getrlimit(resource)
         .maximum
         .map_or(bytes, |it| it.min(bytes))
 }
 
-/// The command without [`goes_where_it_is`]'s beginning, if no shell would make something else of it.
+/// Strips the prefix of [`goes_where_it_is`] from the command, if a shell would treat the rest in
+/// the same way.
 fn without_going_where_it_is<'c>(command: &'c str, directory: &Path) -> &'c str {
-    // Without quotes a shell takes other paths apart.
+    // A shell splits an unquoted path that has other characters.
     let plain = |it: &u8| it.is_ascii_alphanumeric() || b"/._-".contains(it);
     let is_one_word = directory.as_os_str().as_encoded_bytes().iter().all(plain);
     match goes_where_it_is(command) {
@@ -242,9 +246,9 @@ fn without_going_where_it_is<'c>(command: &'c str, directory: &Path) -> &'c str 
     }
 }
 
-/// What follows in a command that begins as those in the manifests of ASAM's own modules do, with
-/// `cd $ASAM_QC_FRAMEWORK_WORKING_DIR &&`, and whether that is in quotes. A run is in that directory already, and needs
-/// no shell to go there.
+/// Returns the rest of a command that begins with `cd $ASAM_QC_FRAMEWORK_WORKING_DIR &&`, and
+/// whether the variable is quoted. The manifests of ASAM's modules begin in this way. A run already
+/// starts in that directory and needs no shell for this.
 pub fn goes_where_it_is(command: &str) -> Option<(&str, bool)> {
     const NAMES: [(&str, bool); 4] = [
         ("\"$ASAM_QC_FRAMEWORK_WORKING_DIR\"", true),

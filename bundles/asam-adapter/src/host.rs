@@ -1,4 +1,4 @@
-//! The bus process: learns what a module is, and is its bundle from then on.
+//! The bus process: learns the properties of a module and then runs as its bundle.
 
 use std::ffi::OsString;
 
@@ -12,8 +12,9 @@ use crate::learn::learn;
 use crate::runner;
 use crate::runners::Runners;
 
-/// Runs the adapter. `program` are the words behind the name of the program that lead here, such as `asam-adapter`;
-/// `arguments` what follows them. What there is to say goes to the log, and where that ends by itself to `complain`.
+/// Runs the adapter. `program` has the words after the program name that select the adapter, such
+/// as `asam-adapter`. `arguments` are the words after them. Messages go to the log. Errors that
+/// prevent the start go to `complain`.
 pub fn run(
     program: &[&str],
     arguments: impl IntoIterator<Item = OsString>,
@@ -40,7 +41,7 @@ pub fn run(
             return Exit::Usage;
         }
     };
-    // Beside a broker several jobs are under way at the same time; a file is one.
+    // With a broker several jobs run at the same time. A single file is one job.
     let count = match &mode {
         Mode::Bus(options) => options.threads,
         _ => 1,
@@ -59,7 +60,7 @@ fn begin(
     count: usize,
     program: &[&str],
 ) -> Result<&'static qcbus_sdk::Bundle, String> {
-    // Before anything is run: each run looks whether they are still the same.
+    // The digests are taken before the first run, and each run compares them.
     hosted.programs.iter_mut().for_each(crate::Program::look);
     let name = hosted.name.clone();
     let runners = Runners::start(count, &hosted, program)
@@ -69,7 +70,7 @@ fn begin(
     Ok(bundle(hosted, learned, runners))
 }
 
-/// It reads nothing of its own, and what its manifest declares is for what the offices run.
+/// Returns the bus process's permissions. The files in the manifest are for the runners.
 fn own() -> OwnFiles {
     OwnFiles {
         restricted: true,

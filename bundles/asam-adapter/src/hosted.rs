@@ -1,4 +1,4 @@
-//! What is hosted: the module, and what it may use up.
+//! Description of a hosted module and its limits.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -10,49 +10,51 @@ use qcbus_sdk::run::UsageError;
 
 use crate::program::Program;
 
-/// A one-shot module of ASAM's framework that takes part as a bundle.
+/// An ASAM module that takes part as a bundle.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hosted {
-    /// The name under which it joins, which is that of the bundle in results and configurations.
+    /// Name under which the module joins, and name of the bundle in results and configurations.
     pub name: String,
-    /// The command, for a shell: `qc_opendrive -c $ASAM_QC_FRAMEWORK_CONFIG_FILE`.
+    /// Shell command of the module: `qc_opendrive -c $ASAM_QC_FRAMEWORK_CONFIG_FILE`.
     pub command: String,
-    /// The `application` by which the module finds its section of a configuration, where that is known. Otherwise
-    /// it is learned: modules have one written in their code, which need not be the name of their manifest.
+    /// The `application` name of the module's section in a configuration, if known. Otherwise it is
+    /// learned. Modules have it fixed in their code, and it may differ from the name in their
+    /// manifest.
     pub application: Option<String>,
-    /// Where it runs, when that is not the private directory of the job.
+    /// Working directory of the module, if it is not the private directory of the job.
     pub directory: Option<PathBuf>,
-    /// Variables of its environment besides those that there are.
+    /// Additional environment variables of the module.
     pub environment: Vec<(String, String)>,
-    /// The kinds of files that it takes, when they are not to be learned.
+    /// Kinds of files that the module accepts, or `None` if they must be learned.
     pub kinds: Option<Vec<FileKind>>,
-    /// What a run may use up.
+    /// Resource limits of a run.
     pub limits: Limits,
-    /// The files that the command runs, where they are known.
+    /// Files that the command runs, as far as they are known.
     pub programs: Vec<Program>,
-    /// Where private directories are made.
+    /// Directory in which private directories are created.
     pub scratch: PathBuf,
-    /// Every run begins from nothing: no interpreter is kept that has loaded the module already.
+    /// Whether every run starts without a fork server that has loaded the module already.
     pub is_cold: bool,
 }
 
-/// What a run may use up. What goes beyond is killed.
+/// Resource limits of a run. A run that exceeds a limit is killed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Time by the clock on the wall.
+    /// Wall-clock time.
     pub time: Duration,
-    /// Memory of all its processes together, and private memory of each, in bytes.
+    /// Memory of all processes together, and private memory of each process, in bytes.
     pub memory: u64,
-    /// What it prints, and the largest file that it writes, in bytes.
+    /// Printed output and size of the largest written file, in bytes.
     pub output: u64,
-    /// Processes at the same time.
+    /// Number of simultaneous processes.
     pub processes: usize,
 }
 
 impl Default for Limits {
     fn default() -> Limits {
         Limits {
-            // Before the broker loses patience (`--job-deadline`) and ends the whole bundle, without saying which limit.
+            // This is below the broker's `--job-deadline`. At that deadline the broker ends the
+            // whole bundle without naming a limit.
             time: Duration::from_secs(50),
             memory: 4096 << 20,
             output: 256 << 20,
@@ -61,25 +63,25 @@ impl Default for Limits {
     }
 }
 
-/// The directory for private directories of this user, unless another is given.
+/// Returns the default directory for the private directories of this user.
 pub fn usual_scratch() -> PathBuf {
     let user = rustix::process::geteuid().as_raw();
     std::env::temp_dir().join(format!("qcbus-asam-{user}"))
 }
 
-/// What a command line says: what is hosted, and the arguments that are the SDK's.
+/// Parsed command line: the hosted module and the arguments for the SDK.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Asked {
     pub hosted: Hosted,
-    /// This is the process that runs modules.
+    /// Whether this process is a runner.
     pub is_runner: bool,
     pub rest: Vec<OsString>,
 }
 
-/// Reads the arguments of the adapter.
+/// Parses the arguments of the adapter.
 ///
 /// # Errors
-/// [`UsageError`] says what does not fit.
+/// [`UsageError`] describes the invalid argument.
 pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Asked, UsageError> {
     use lexopt::Arg::{Long, Short, Value};
     let mut parser = lexopt::Parser::from_args(arguments);
@@ -146,7 +148,7 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Ask
 }
 
 impl Hosted {
-    /// The arguments from which [`parse`] reads this again.
+    /// Returns the arguments from which [`parse`] builds the same value again.
     pub(crate) fn arguments(&self) -> Vec<OsString> {
         let mut words: Vec<OsString> = Vec::new();
         let mut add = |option: &str, value: OsString| words.extend([option.into(), value]);

@@ -1,4 +1,4 @@
-//! Which checkers a module has, and which files it takes: learned from runs over small valid files.
+//! Learns the checkers and the accepted files of a module from runs over small valid files.
 
 use std::path::Path;
 
@@ -12,10 +12,10 @@ use crate::results::{Report, Told, read};
 use crate::runners::Runners;
 use crate::samples::{SAMPLES, Sample};
 
-/// What was learned of a module.
+/// Learned properties of a module.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Learned {
-    /// The name by which it finds its section of a configuration.
+    /// Name of the module's section in a configuration.
     pub application: String,
     pub version: String,
     pub description: String,
@@ -29,23 +29,23 @@ pub(crate) struct Known {
     pub id: String,
     pub description: String,
     pub uids: Vec<String>,
-    /// The kinds of files over which it was heard of.
+    /// Kinds of files for which the module reported this checker.
     pub kinds: Vec<FileKind>,
 }
 
-/// Names in the code of the modules that ASAM publishes.
+/// Application names in the code of the modules that ASAM publishes.
 const PUBLISHED: [&str; 3] = ["xodrBundle", "xoscBundle", "otxBundle"];
 
-/// What a name is preceded by when it would be that of a bundle of ours.
+/// Prefix of a hosted name that would otherwise be the name of one of qcbus' own bundles.
 pub(crate) const PREFIX: &str = "asam.";
 
-/// Where samples are said to lie.
+/// Pretended directory of the samples.
 const NOWHERE: &str = "/sample of qcbus";
 
-/// Learns what the module is.
+/// Learns the properties of the module.
 ///
 /// # Errors
-/// Why it is of no use, for a person.
+/// The reason why the module is unusable, as text for the user.
 pub(crate) fn learn(hosted: &Hosted, runners: &Runners) -> Result<Learned, String> {
     let wanted = |it: &&Sample| {
         hosted
@@ -90,7 +90,7 @@ pub(crate) fn learn(hosted: &Hosted, runners: &Runners) -> Result<Learned, Strin
     }
 }
 
-/// Lines that are told of what a module printed when nothing could be learned of it.
+/// Number of output lines that are shown when nothing could be learned from a module.
 const LINES: usize = 6;
 
 fn of_no_use(failures: &[String], hosted: &Hosted) -> String {
@@ -105,7 +105,7 @@ fn of_no_use(failures: &[String], hosted: &Hosted) -> String {
     text.join("\n")
 }
 
-/// The first line, and the last ones: what a program printed before it failed is at the end.
+/// Returns the first and last lines, because a failing program prints the reason at the end.
 fn shortened(text: &str) -> String {
     let lines: Vec<&str> = text.lines().collect();
     let [first, rest @ ..] = &lines[..] else {
@@ -133,7 +133,8 @@ fn request(sample: &Sample, hosted: &Hosted) -> Request {
     }
 }
 
-/// The names by which a module may look for its section: one is in its code, and nobody else knows it.
+/// Returns the names under which a module may look for its section. The actual name is fixed in the
+/// module's code.
 fn applications(hosted: &Hosted) -> Vec<String> {
     if let Some(application) = &hosted.application {
         return vec![application.clone()];
@@ -149,8 +150,9 @@ fn applications(hosted: &Hosted) -> Vec<String> {
     all
 }
 
-/// Whether a module has looked at a file of its own kind: over a valid one it finds no error, or most of its checkers
-/// come to an end. One that is given another standard's file says that the root is wrong, and skips the rest.
+/// Checks whether a module accepts a valid sample of a kind. It must find no error, or most of its
+/// checkers must complete. A module for another standard reports a wrong root element and skips the
+/// other checkers.
 fn takes(report: &Report) -> bool {
     let completed = |it: &&Told| it.ending == Ending::Completed;
     let count = report.checkers.iter().filter(completed).count();

@@ -1,12 +1,14 @@
-//! One-shot modules of ASAM's quality checker framework as bundles on the bus, unchanged.
+//! Runs unchanged ASAM modules as bundles on the bus.
 //!
-//! Such a module is a program that is started once for every file, reads a configuration, and writes a result file.
-//! The adapter is two kinds of processes. The *bus process* is a bundle like any other, confined like any other. The
-//! *office*, started before that, gives every run a private directory with the very bytes of the documents and a
-//! configuration, runs the module there within limits, ends everything that it leaves, and hands back what it wrote.
-//! What a result says is read and judged by the bus process, behind its fence.
+//! An ASAM module is a program of ASAM's quality checker framework. It is started once for each
+//! file, reads a configuration and writes a result file. The adapter has two kinds of processes.
+//! The *bus process* is a bundle in the same sandbox as any other. The *runner* is started before
+//! it. For each run it creates a private directory with the exact bytes of the documents and a
+//! configuration. It runs the module there within limits, ends all of its processes and returns the
+//! result file. The bus process judges the result in its sandbox.
 //!
-//! Which checkers a module has it does not tell: they are learned from a run over small valid files ([`learn`]).
+//! A module does not list its checkers. They are learned from a run over small valid files
+//! ([`learn`]).
 
 mod bundle;
 mod channel;

@@ -1,4 +1,4 @@
-//! The adapter as a program of its own; `qcbus asam-adapter` is the same.
+//! The adapter as a separate program; `qcbus asam-adapter` does the same.
 
 use std::process::ExitCode;
 
@@ -9,6 +9,6 @@ fn main() -> ExitCode {
 
 fn complain(why: &str) {
     use std::io::Write as _;
-    // Where nobody listens there is nobody to be told that.
+    // If stderr is closed, the error cannot be reported anywhere.
     let _ = writeln!(std::io::stderr(), "{why}");
 }

@@ -1,4 +1,4 @@
-//! What a bus process asks of an office, and what that answers.
+//! Requests of a bus process to a runner, and their answers.
 
 use std::path::PathBuf;
 
@@ -6,72 +6,74 @@ use qcbus_formats::config::Config;
 use qcbus_messages::path_text;
 use serde::{Deserialize, Serialize};
 
-/// Largest message, in bytes: the documents of a job with everything that they refer to.
+/// Maximum size of a message in bytes: the documents of a job with all files that they refer to.
 pub(crate) const MOST: u64 = 8 << 30;
 
-/// Run the module once.
+/// Request to run the module once.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct Request {
-    /// The documents, the one that is checked first.
+    /// Documents, with the checked file first.
     pub files: Vec<Document>,
-    /// The configuration in force.
+    /// Configuration in force.
     pub config: Option<Config>,
-    /// The names by which the module may look for its section of a configuration.
+    /// Names under which the module may look for its section of a configuration.
     pub applications: Vec<String>,
-    /// It is a report module, with these parameters: its one file is a result.
+    /// Parameters of a report module, or `None` for a checker module. Its only file is a result.
     pub report: Option<Vec<(String, String)>>,
 }
 
 /// A file of a job.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Document {
-    /// Where it really is.
+    /// Original path of the file.
     #[serde(with = "path_text::one")]
     pub path: PathBuf,
     pub bytes: Bytes,
-    /// Where it really is packed, when `path` is only where it would be if it were not.
+    /// Original path of a packed file. `path` is then the path that it would have without packing.
     pub packed: Option<PathBuf>,
 }
 
-/// Where the bytes of a file are.
+/// Location of the bytes of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Bytes {
-    /// In the body of the message, so many, behind those of the files before.
+    /// In the body of the message, after the bytes of the files before. The value is their number.
     Here(u64),
-    /// Still at their path, with this SHA-256: an image does not have them, because they are packed or in another
-    /// encoding.
+    /// On disk at the file's path, with this SHA-256. The image does not contain these bytes,
+    /// because the file is packed or in another encoding.
     OnDisk([u8; 32]),
 }
 
-/// What came of it. The body of the message is the result file, or what a report module has written.
+/// Outcome of a request. The body of the message is the result file, or the output of a report
+/// module.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) enum Answer {
     Ran(Ran),
     /// The module was not started.
     Not(String),
-    /// The program is not the one that was learned, for a person.
+    /// The program differs from the learned one. The value is a text for the user.
     Changed(String),
 }
 
 /// A run that has ended.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Ran {
-    /// Why nothing of it counts, reads on after the name of the module.
+    /// Reason why the run is rejected, to be read after the name of the module.
     pub fault: Option<String>,
-    /// What it printed last.
+    /// Final output of the run.
     pub said: String,
-    /// The name in whose section it found where to write its result. `None`: it wrote none.
+    /// Name of the section from which the run took its result path, or `None` if it wrote no
+    /// result.
     pub application: Option<String>,
-    /// The file that it was given.
+    /// File that was given to the run.
     pub input: String,
-    /// Where that one is packed, if it is.
+    /// Original path of the input file, if it is packed.
     pub packed: Option<String>,
-    /// The directory that stands for `real`.
+    /// Directory that replaces `real` in the run.
     pub staged: String,
-    /// The directory in which all documents lie, in truth.
+    /// Original directory of all documents.
     pub real: String,
-    /// The private directory, in which everything else is.
+    /// Private directory. It contains all other files of the run.
     pub room: String,
-    /// The files that a report module has written, each with its length, in the order of the body.
+    /// Files written by a report module with their lengths, in the order of the body.
     pub reports: Vec<(String, u64)>,
 }

@@ -1,4 +1,4 @@
-//! Puts the documents of a job into a private directory, at the same places relative to each other.
+//! Copies the documents of a job to a private directory and keeps their relative paths.
 
 use std::fs::{File, Metadata};
 use std::io::{self, Write as _};
@@ -10,23 +10,23 @@ use sha2::{Digest as _, Sha256};
 
 use crate::messages::{Bytes, Document, MOST};
 
-/// Documents that lie in a private directory.
+/// Documents in a private directory.
 pub(crate) struct Staged {
-    /// The directory that stands for `real`.
+    /// Directory that replaces `real`.
     pub directory: PathBuf,
-    /// The directory in which all of them lie, in truth.
+    /// Original directory of all documents.
     pub real: PathBuf,
     files: Vec<Copied>,
 }
 
-/// A file in its place.
+/// A copied file.
 struct Copied {
     path: PathBuf,
     look: Look,
     digest: [u8; 32],
 }
 
-/// Differs when a file was changed or replaced.
+/// File metadata that differs after a file was changed or replaced.
 type Look = (u64, u64, u64, i64, i64);
 
 fn look(found: &Metadata) -> Look {
@@ -35,10 +35,10 @@ fn look(found: &Metadata) -> Look {
 }
 
 impl Staged {
-    /// Writes the files below a directory. `body` has the bytes of those that are here.
+    /// Writes the files below a directory. `body` has the bytes of files in the message.
     ///
     /// # Errors
-    /// The system's, and when a file is not any more what it was.
+    /// System errors, and an error if a file has changed on disk.
     pub fn write(files: &[Document], mut body: &[u8], directory: &Path) -> io::Result<Staged> {
         let real = common(files)?;
         let mut staged = Staged {
@@ -79,7 +79,7 @@ impl Staged {
         }
         let mut out = File::create_new(&path)?;
         out.write_all(bytes)?;
-        // Nobody is to write to it by mistake.
+        // The file is read-only to prevent accidental writes.
         out.set_permissions(std::fs::Permissions::from_mode(0o400))?;
         self.files.push(Copied {
             look: look(&out.metadata()?),
@@ -89,12 +89,13 @@ impl Staged {
         Ok(())
     }
 
-    /// The file that is to be checked.
+    /// Returns the file to check.
     pub fn input(&self) -> &Path {
         self.files.first().map_or(&self.directory, |it| &it.path)
     }
 
-    /// A document that is not any more what it was when it was written: what was found is about something else.
+    /// Returns a document that has changed since it was written. The findings are then about
+    /// another text.
     pub fn changed(&self) -> Option<PathBuf> {
         let changed = self.files.iter().find(|it| it.has_changed())?;
         let inside = changed.path.strip_prefix(&self.directory).ok()?;
@@ -108,7 +109,7 @@ impl Copied {
         if now.is_ok_and(|now| look(&now) == self.look) {
             return false;
         }
-        // Only its rights or its names, perhaps.
+        // Maybe only the permissions or the hard links have changed.
         let read = foreign::read(&self.path, MOST);
         read.map_or(true, |it| {
             <[u8; 32]>::from(Sha256::digest(&it)) != self.digest
@@ -116,7 +117,7 @@ impl Copied {
     }
 }
 
-/// The directory in which all files lie, directly or deeper.
+/// Returns the deepest directory that contains all files.
 fn common(files: &[Document]) -> io::Result<PathBuf> {
     let mut parents = files.iter().filter_map(|it| it.path.parent());
     let first = parents.next().ok_or(io::ErrorKind::InvalidInput)?;

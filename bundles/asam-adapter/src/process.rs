@@ -1,4 +1,4 @@
-//! One run of a module: started, watched, and ended with everything that it has started.
+//! A run of a module: starts it, monitors it, and ends it with all of its descendants.
 
 use std::ffi::OsString;
 use std::io::{self, PipeReader, Read as _};
@@ -16,51 +16,52 @@ use crate::family;
 use crate::fork_server::{ForkServer, Started};
 use crate::hosted::Limits;
 
-/// How often a run is looked at while nothing is heard of it.
+/// Interval of the limit checks while a run is silent.
 const TICK: Duration = Duration::from_millis(100);
-/// Bytes that are kept of what it printed last.
+/// Number of bytes of the final output that are stored.
 const SAID: usize = 4 << 10;
 
-/// What is run, and within what.
+/// Command of a run with its environment and limits.
 pub(crate) struct Run<'r> {
-    /// For a shell.
+    /// Shell command.
     pub command: &'r str,
-    /// Variables besides those of this process.
+    /// Variables in addition to those of this process.
     pub environment: &'r [(OsString, OsString)],
-    /// Where it runs.
+    /// Working directory.
     pub directory: &'r Path,
     pub limits: Limits,
-    /// What it may do to others: nothing but this and writing in its room. `None`: it is not confined.
+    /// Permissions besides writing in its private directory, or `None` if the run is not confined.
     pub may: Option<May>,
 }
 
-/// How a run has ended.
+/// End of a run.
 #[derive(Debug)]
 pub(crate) struct Ended {
-    /// Why nothing of it counts, reads on after the name of the module. `None`: exit code 0.
+    /// Reason why the run is rejected, to be read after the name of the module. `None`: exit code
+    /// 0.
     pub fault: Option<String>,
-    /// What it printed last.
+    /// Final output of the run.
     pub said: String,
 }
 
-/// Why a run has no end that could be told.
+/// Reason why the end of a run is unknown.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Broken {
-    /// Nobody waits for it any more.
+    /// The requesting process has ended.
     #[error("nobody waits for it any more")]
     Unwanted,
-    /// It was not started.
+    /// The run was not started.
     #[error("it cannot be started: {0}")]
     Start(io::Error),
-    /// The interpreter that keeps it warm has gone, and nobody can tell how it ended.
+    /// The fork server has ended, so the exit status of the run is unknown.
     #[error("{0}")]
     Unkept(io::Error),
-    /// What it has started cannot be ended, so that nothing else can be run here.
+    /// Descendants of the run cannot be ended, so this process cannot run anything more.
     #[error("{0} of its processes cannot be killed")]
     Lasts(usize),
 }
 
-/// Runs it to its end. `caller` is looked at: when nobody is at its other end any more the run is over.
+/// Runs the module to its end. The run is aborted if the other end of `caller` is closed.
 ///
 /// # Errors
 /// [`Broken`].
@@ -94,7 +95,7 @@ pub(crate) fn run(
     if let Err(Broken::Unkept(_)) = end {
         watched.fork_server.let_go();
     }
-    // Before anything is looked at: nothing is written any more by then.
+    // All processes must end before the results are read, so that the files cannot change any more.
     family::end(&watched.fork_server.spared()).map_err(Broken::Lasts)?;
     watched.hear();
     let fault = end?;
@@ -108,7 +109,7 @@ struct Watched<'k> {
     limits: Limits,
     begin: Instant,
     fork_server: &'k mut ForkServer,
-    /// Can be waited for together with other things; older kernels have none.
+    /// Descriptor for waiting together with other events. Older kernels do not have it.
     handle: Option<OwnedFd>,
     started: Started,
     reader: PipeReader,
@@ -116,7 +117,7 @@ struct Watched<'k> {
 }
 
 impl Watched<'_> {
-    /// Waits until it has ended, or must. Gives why nothing of it counts.
+    /// Waits until the run has ended or must be ended. Returns a reason to reject it, if any.
     fn end(&mut self, caller: BorrowedFd<'_>) -> Result<Option<String>, Broken> {
         let mut looked = Instant::now();
         loop {
@@ -144,7 +145,7 @@ impl Watched<'_> {
         }
     }
 
-    /// Waits until something happens. `true`: nobody waits for it any more.
+    /// Waits for the next event. Returns `true` if the requesting process has ended.
     fn wait(&self, caller: BorrowedFd<'_>) -> bool {
         let mut fds = vec![PollFd::from_borrowed_fd(caller, PollFlags::empty())];
         if !self.heard.closed {
@@ -161,7 +162,7 @@ impl Watched<'_> {
             tv_sec: 0,
             tv_nsec: TICK.subsec_nanos().into(),
         };
-        // Interrupted or not, everything is looked at again.
+        // The caller checks everything again, even after an interrupt.
         let _ = poll(&mut fds, Some(&tick));
         fds[0].revents().intersects(PollFlags::HUP | PollFlags::ERR)
     }
@@ -216,7 +217,7 @@ impl Watched<'_> {
         };
         Some(match (status.code(), status.signal()) {
             (None, Some(signal)) => by_signal(signal),
-            // What the shell says of what it has run.
+            // The shell reports a signal that ended its command in this way.
             (Some(code), _) if (129..160).contains(&code) => {
                 format!("ended with exit code {code}: it {}", by_signal(code - 128))
             }
@@ -227,7 +228,7 @@ impl Watched<'_> {
     }
 }
 
-/// What was printed.
+/// Output of a run.
 #[derive(Default)]
 struct Heard {
     bytes: u64,
@@ -238,7 +239,8 @@ struct Heard {
 impl Heard {
     fn read(&mut self, reader: &mut PipeReader) {
         let mut some = [0; 16 << 10];
-        // A turn, not until there is nothing left: one that floods would never let us look at the clock.
+        // The number of reads is limited. Otherwise endless output would prevent the check of the
+        // time limit.
         for _ in 0..64 {
             match reader.read(&mut some) {
                 Ok(0) => {
@@ -257,7 +259,7 @@ impl Heard {
         }
     }
 
-    /// The last lines.
+    /// Returns the last lines.
     fn text(&self) -> String {
         let text = String::from_utf8_lossy(&self.last);
         let begins = usize::try_from(self.bytes).is_ok_and(|it| it <= SAID);

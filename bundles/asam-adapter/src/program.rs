@@ -1,4 +1,5 @@
-//! The files that a module's command runs: they must stay the ones from which it was learned what the module checks.
+//! The files that a module's command runs. They must not change after the module's checkers were
+//! learned.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -7,25 +8,26 @@ use qcbus_disk::{FileFingerprint, foreign};
 use qcbus_messages::Digest;
 use sha2::{Digest as _, Sha256};
 
-/// Most bytes of such a file. A larger one, and one that cannot be read, is not compared.
+/// Maximum size of such a file in bytes. A larger file or an unreadable file is not compared.
 const MOST: u64 = 256 << 20;
 
 /// A file that a command runs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Program {
-    /// Its absolute path.
+    /// Absolute path of the file.
     pub path: PathBuf,
-    /// Of what it was when the module was learned; `None` where nobody has looked, or it could not be read.
+    /// Digest of the file when the module was learned. `None` if it was not computed or the file
+    /// could not be read.
     pub digest: Option<Digest>,
 }
 
 impl Program {
-    /// Nobody has looked at it yet.
+    /// Creates a program without a digest.
     pub(crate) fn at(path: PathBuf) -> Program {
         Program { path, digest: None }
     }
 
-    /// Remembers what it is now.
+    /// Stores the current digest of the file.
     pub(crate) fn look(&mut self) {
         self.digest = digest_of(&self.path).ok();
     }
@@ -36,7 +38,7 @@ fn digest_of(path: &Path) -> io::Result<Digest> {
     Ok(Digest(Sha256::digest(bytes).into()))
 }
 
-/// Programs, and how each looked when it was last seen to be the one that was learned.
+/// Programs, each with its file mark when its digest was last found unchanged.
 #[derive(Debug)]
 pub(crate) struct Programs(Vec<(Program, Option<FileFingerprint>)>);
 
@@ -45,7 +47,7 @@ impl Programs {
         Programs(programs.iter().map(|it| (it.clone(), None)).collect())
     }
 
-    /// Why what would be run now is not what was learned, for a person.
+    /// Returns a text for the user if a program differs from the learned one.
     pub(crate) fn changed(&mut self) -> Option<String> {
         self.0.iter_mut().find_map(|(program, seen)| {
             let digest = program.digest?;

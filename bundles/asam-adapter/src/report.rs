@@ -1,4 +1,4 @@
-//! A report module of ASAM's framework: given a result, it writes whatever it writes.
+//! Report modules of ASAM's framework: such a module reads a result and writes report files.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -18,15 +18,15 @@ pub struct ReportModule {
     runners: Runners,
 }
 
-/// A file that it has written: its name, below its own directory, and what is in it.
+/// A written report file: its name relative to the module's own directory, and its content.
 pub type ReportFile = (String, Vec<u8>);
 
 impl ReportModule {
-    /// Starts what runs the module. `program` are the words behind the name of the program that lead to the adapter;
-    /// what `arguments` there are for somebody else is returned.
+    /// Starts the runner of the module. `program` has the words after the program name that select
+    /// the adapter. Returns the `arguments` that are not for the adapter.
     ///
     /// # Errors
-    /// The exit code, with why for a person.
+    /// The exit code and the reason as text for the user.
     pub fn start(
         program: &[&str],
         arguments: impl IntoIterator<Item = OsString>,
@@ -39,15 +39,15 @@ impl ReportModule {
         Ok((ReportModule { hosted, runners }, asked.rest))
     }
 
-    /// The name under which it joins.
+    /// Returns the name under which the module joins.
     pub fn name(&self) -> &str {
         &self.hosted.name
     }
 
-    /// Has it report on a result, with the parameters of a configuration.
+    /// Runs the module on a result with the parameters of a configuration.
     ///
     /// # Errors
-    /// Why there is no report, for a person.
+    /// The reason for a missing report, as text for the user.
     pub fn report(&self, result: &Path, params: &[Param]) -> Result<Vec<ReportFile>, String> {
         let bytes = std::fs::read(result)
             .map_err(|error| format!("cannot read {}: {error}", result.display()))?;
@@ -66,7 +66,7 @@ impl ReportModule {
             report: Some(params.collect()),
         };
         let answered = self.runners.ask(&request, &[&bytes]);
-        // Whoever started this process starts a new one.
+        // The parent of this process starts a new one.
         let answered = answered.unwrap_or_else(|error| {
             tracing::error!(module = name, %error, "the runner is gone");
             std::process::exit(i32::from(Exit::Internal.code()))

@@ -1,4 +1,4 @@
-//! What a module has written, led back to the files that were really checked.
+//! Reading of a module's result: maps all paths in it back to the files that were checked.
 
 use std::path::Path;
 
@@ -9,18 +9,18 @@ use qcbus_formats::xqar::{
 
 use crate::messages::Ran;
 
-/// What a module says of one file.
+/// Result of a module for one file.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Report {
-    /// Version of its bundle.
+    /// Version of the module's bundle.
     pub version: String,
-    /// What its bundle checks.
+    /// Description of the module's bundle.
     pub description: String,
-    /// Each once.
+    /// Results of the checkers, one for each checker id.
     pub checkers: Vec<Told>,
 }
 
-/// What one checker says.
+/// Result of one checker.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Told {
     pub id: String,
@@ -34,7 +34,7 @@ pub(crate) struct Told {
 /// Reads the result of a run.
 ///
 /// # Errors
-/// Why nothing of it counts, for a person.
+/// The reason why the result is rejected, as text for the user.
 pub(crate) fn read(name: &str, ran: &Ran, result: &[u8]) -> Result<Report, String> {
     let paths = Paths::of(ran);
     let fails = |what: &str| Err(paths.sentence(name, what, &ran.said));
@@ -68,7 +68,7 @@ pub(crate) fn read(name: &str, ran: &Ran, result: &[u8]) -> Result<Report, Strin
     Ok(report)
 }
 
-/// The file that a result is about, when that is not the one which was given.
+/// Returns the input file that a result names, if it differs from the input file of the run.
 fn about_another(results: &Results, ran: &Ran) -> Option<String> {
     let named = |bundle: &CheckerBundle| {
         let mut params = bundle.params.iter();
@@ -80,7 +80,8 @@ fn about_another(results: &Results, ran: &Ran) -> Option<String> {
 }
 
 impl Report {
-    /// Ids are unique: what is said twice of one checker is said once, and nothing is dropped for it.
+    /// Adds the result of a checker. Ids are unique: several results of one checker are merged, and
+    /// no issue is dropped.
     fn add(&mut self, told: Told) {
         let Some(known) = self.checkers.iter_mut().find(|it| it.id == told.id) else {
             self.checkers.push(told);
@@ -94,8 +95,8 @@ impl Report {
     }
 }
 
-/// How the status of a checker that was skipped begins when that is for what others have found. So say all modules that
-/// are made as ASAM's are, and then nobody has looked.
+/// Text in the summary of a checker that was skipped because of other checkers' issues. All modules
+/// built like ASAM's use it. Such a checker has not checked the file.
 const PRECONDITIONS: &str = "precondition";
 
 fn told(checker: Checker, paths: &Paths) -> Told {
@@ -138,7 +139,8 @@ fn told(checker: Checker, paths: &Paths) -> Told {
     }
 }
 
-/// Names those that were in the way of checkers whose preconditions do not hold: a result does not say which of them.
+/// Names the checkers that blocked others whose preconditions do not hold. A result does not name
+/// them.
 fn block(checkers: &mut [Told]) {
     let in_the_way = |it: &&Told| match it.ending {
         Ending::Completed => !it.issues.is_empty(),
@@ -154,9 +156,9 @@ fn block(checkers: &mut [Told]) {
     }
 }
 
-/// Leads texts back from the private directory.
+/// Mapping of paths in the private directory to the original paths.
 pub(crate) struct Paths {
-    /// What stands for what, the longer first.
+    /// Pairs of a private path and its replacement. Longer paths come first.
     pairs: Vec<(String, String)>,
 }
 
@@ -176,7 +178,7 @@ impl Paths {
             pair(ran.room.clone(), "(its private directory)"),
         ];
         Paths {
-            // An answer without paths leads nowhere.
+            // An answer without paths has empty entries here. They must not replace anything.
             pairs: packed
                 .into_iter()
                 .chain(pairs)
@@ -224,11 +226,11 @@ impl Paths {
         for (_, value) in &mut element.attributes {
             self.in_place(value);
         }
-        // As deep as the reader lets them be.
+        // The XML reader limits the depth of this recursion.
         element.children.iter_mut().for_each(|it| self.element(it));
     }
 
-    /// A sentence about the module, with what it printed last.
+    /// Returns a sentence about the module, followed by its final output.
     pub fn sentence(&self, name: &str, what: &str, said: &str) -> String {
         let what = self.lead_back(what);
         match said.trim() {

@@ -1,4 +1,4 @@
-//! The process that runs modules: one run after the other, as it is asked.
+//! The process that runs modules: it handles one request after the other.
 
 use std::ffi::OsString;
 use std::io;
@@ -21,7 +21,7 @@ use crate::program::Programs;
 use crate::scratch::{Room, Scratch};
 use crate::written;
 
-/// Serves until nobody is at the other end of the socket, which stands where a program's input does.
+/// Serves requests until the other end of the socket on stdin is closed.
 pub(crate) fn serve(hosted: &Hosted) -> Exit {
     match runner(hosted) {
         Ok(()) => Exit::Accepted,
@@ -33,7 +33,7 @@ pub(crate) fn serve(hosted: &Hosted) -> Exit {
 }
 
 fn runner(hosted: &Hosted) -> io::Result<()> {
-    // Closed when a run becomes a program, which has an input of its own.
+    // The duplicate is closed on exec. A run has its own stdin.
     let socket: OwnedFd = io::stdin().as_fd().try_clone_to_owned()?;
     family::adopt()?;
     let may = match Orders::given() {
@@ -65,17 +65,17 @@ fn runner(hosted: &Hosted) -> io::Result<()> {
     Ok(())
 }
 
-/// Why there was no run.
+/// Reason why a run did not happen.
 enum NotRun {
-    /// For a person.
+    /// Reason as text for the user.
     Why(String),
-    /// The program is not the one that was learned.
+    /// The program differs from the learned one.
     Changed(String),
-    /// Its interpreter has gone.
+    /// The interpreter of the run has ended.
     Unkept(String),
-    /// Nobody waits for it any more.
+    /// The requesting process has ended.
     Over,
-    /// Nothing can be run here any more.
+    /// This process cannot run anything more.
     Lost(Broken),
 }
 
@@ -89,28 +89,29 @@ struct Runner<'h> {
     hosted: &'h Hosted,
     scratch: Scratch,
     channel: Channel,
-    /// What runs may do. `None`: they are not confined.
+    /// Permissions of runs, or `None` if runs are not confined.
     may: Option<May>,
     fork_server: ForkServer,
     programs: Programs,
 }
 
-/// What a run is prepared with.
+/// Prepared files and directories of a run.
 struct Prepared {
     room: Room,
     directory: PathBuf,
-    /// Its own directory, in which it runs unless its manifest says otherwise.
+    /// Own directory of the run. It is the working directory, unless the manifest names another
+    /// one.
     work: PathBuf,
     config: PathBuf,
     staged: Staged,
-    /// The names of sections, each with the file for its result.
+    /// Section names, each with its result file.
     sections: Vec<(String, String)>,
 }
 
 impl Runner<'_> {
     fn answer(&mut self, message: &Message) -> Result<(Ran, Vec<u8>), NotRun> {
         match self.run(message, false) {
-            // It may have been the run that has ended its interpreter: plainly there is none.
+            // The run itself may have ended its interpreter. A plain run uses no such interpreter.
             Err(NotRun::Unkept(why)) => {
                 tracing::warn!(
                     module = self.hosted.name,
@@ -142,7 +143,7 @@ impl Runner<'_> {
             Err(error @ Broken::Start(_)) => return Err(NotRun::Why(error.to_string())),
             Err(error @ Broken::Lasts(_)) => return Err(NotRun::Lost(error)),
         };
-        // It may have become another just before it was started.
+        // The program may have been replaced just before it was started.
         self.is_as_learned()?;
         let text = |path: &Path| path.to_string_lossy().into_owned();
         let mut ran = Ran {
@@ -234,8 +235,8 @@ impl Runner<'_> {
         all
     }
 
-    /// What a run may do: what the module's manifest declares, and anything in its own room. The rooms of others are
-    /// no more its business than the rest of the disk.
+    /// Returns the permissions of a run: those in the module's manifest, and full access to its own
+    /// private directory. The private directories of other runs are not accessible.
     fn may_in(&self, room: &Room) -> Option<May> {
         let mut may = self.may.clone()?;
         may.write.retain(|it| *it != self.hosted.scratch);
@@ -243,7 +244,8 @@ impl Runner<'_> {
         Some(may)
     }
 
-    /// The result file, once nobody can write to it any more; what is wrong with it is the run's fault.
+    /// Reads the result file. All processes of the run have ended, so the file cannot change. An
+    /// invalid result is a fault of the run.
     fn collect(&self, prepared: &Prepared, ran: &mut Ran) -> Vec<u8> {
         if ran.fault.is_some() {
             return Vec::new();
@@ -283,7 +285,7 @@ impl Runner<'_> {
             return Err("left something as its result that is no file".to_owned());
         }
         let modified = |it: &Path| std::fs::metadata(it).and_then(|it| it.modified());
-        // On the same disk, so by the same clock.
+        // Both files are on the same disk, so their times come from the same clock.
         if let (Ok(config), Ok(result)) = (modified(config), found.modified())
             && result < config
         {

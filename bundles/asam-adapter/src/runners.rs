@@ -1,4 +1,4 @@
-//! The offices of a bus process: as many as it has threads, and each has one job at a time.
+//! The runners of a bus process: one for each thread. Each runner has one job at a time.
 
 use std::ffi::OsString;
 use std::io;
@@ -11,7 +11,7 @@ use crate::channel::Channel;
 use crate::hosted::Hosted;
 use crate::messages::{Answer, MOST, Ran, Request};
 
-/// All offices.
+/// All runners of a bus process.
 #[derive(Debug)]
 pub(crate) struct Runners {
     free: Mutex<Vec<Channel>>,
@@ -19,29 +19,30 @@ pub(crate) struct Runners {
     next: AtomicU64,
 }
 
-/// What an office has answered: the run with the result file, or why there was none.
+/// Answer of a runner: the run with its result file, or the reason why the module did not run.
 pub(crate) type Answered = Result<(Ran, Vec<u8>), String>;
 
 impl Runners {
-    /// Starts them. `program` are the words behind the name of this program that lead to the adapter.
+    /// Starts the runners. `program` has the words after the program name that select the adapter.
     ///
     /// # Errors
-    /// The system's.
+    /// System errors.
     pub fn start(count: usize, hosted: &Hosted, program: &[&str]) -> io::Result<Runners> {
         let channels = (0..count.max(1)).map(|_| start(hosted, program));
         let random = std::hash::BuildHasher::hash_one(&std::hash::RandomState::new(), count);
         Ok(Runners {
             free: Mutex::new(channels.collect::<io::Result<_>>()?),
             freed: Condvar::new(),
-            // A bus process that follows another one on the same channels numbers otherwise.
+            // A later bus process on the same channels must use other numbers.
             next: AtomicU64::new(random),
         })
     }
 
-    /// Has the module run once, when an office is free.
+    /// Runs the module once, as soon as a runner is free.
     ///
     /// # Errors
-    /// When the office is gone, or the program is not the one that was learned: nothing more can be run.
+    /// If the runner has ended or the program differs from the learned one. No more runs are
+    /// possible then.
     pub fn ask(&self, request: &Request, body: &[&[u8]]) -> io::Result<Answered> {
         let channel = self.take();
         let number = self.next.fetch_add(1, Ordering::Relaxed) ^ process_salt();
@@ -51,10 +52,10 @@ impl Runners {
         Ok(answered)
     }
 
-    /// Has the module run over several inputs, as many at a time as there are offices, without any thread.
+    /// Runs the module over several inputs without a thread. All runners work at the same time.
     ///
     /// # Errors
-    /// As [`Runners::ask`].
+    /// As for [`Runners::ask`].
     pub fn ask_all(&self, requests: &[(Request, Vec<u8>)]) -> io::Result<Vec<Answered>> {
         let mut answers = Vec::new();
         let count = self.lock().len().max(1);
@@ -97,7 +98,7 @@ impl Runners {
     }
 }
 
-/// Sessions are forked from one process, and must not give the same numbers.
+/// Returns a value that keeps the request numbers of sessions forked from one process distinct.
 fn process_salt() -> u64 {
     u64::from(std::process::id()) << 32
 }
@@ -106,7 +107,7 @@ fn hear(channel: &Channel, number: u64) -> io::Result<Answered> {
     loop {
         let message = channel.receive(MOST)?;
         let message = message.ok_or_else(|| io::Error::from(io::ErrorKind::UnexpectedEof))?;
-        // What a bus process before this one has asked for is nobody's any more.
+        // This answer belongs to a request of an earlier bus process.
         if message.number != number {
             continue;
         }
@@ -121,7 +122,7 @@ fn hear(channel: &Channel, number: u64) -> io::Result<Answered> {
 fn start(hosted: &Hosted, program: &[&str]) -> io::Result<Channel> {
     let (own, other) = Channel::pair()?;
     let arguments = program.iter().map(OsString::from);
-    // What runs here, whatever lies at its path by now.
+    // This path is the running program, even if the file at its original path was replaced.
     let mut command = Command::new("/proc/self/exe");
     if let Some(name) = std::env::args_os().next() {
         command.arg0(name);

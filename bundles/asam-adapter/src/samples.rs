@@ -1,16 +1,16 @@
-//! Small valid files, one of each kind, over which a module tells which checkers it has.
+//! Small valid files, one of each kind. They are used to learn the checkers of a module.
 
 use qcbus_document::FileKind;
 
-/// A file in which there is nothing to find.
+/// A valid file without any issue.
 pub(crate) struct Sample {
     pub kind: FileKind,
-    /// What it is called.
+    /// Name of the file.
     pub name: &'static str,
     pub text: &'static str,
 }
 
-/// The samples. What no sample is there for, no module is asked about.
+/// All samples. Modules are not tested with kinds of files that have no sample.
 pub(crate) static SAMPLES: [Sample; 2] = [
     Sample {
         kind: FileKind::Xodr,

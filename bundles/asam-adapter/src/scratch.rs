@@ -1,7 +1,7 @@
 //! Private directories, one for each run.
 //!
-//! Its office holds a lock on it as long as it lasts. What nobody holds was left by an office that was killed, and goes
-//! when the next one begins.
+//! The runner holds a lock on the directory during the run. A directory without a lock was left by
+//! a killed runner. The next runner removes it at its start.
 
 use std::fs::File;
 use std::io;
@@ -12,20 +12,20 @@ use std::process::{Command, Stdio};
 use qcbus_disk::trust;
 use rustix::fs::{FlockOperation, flock};
 
-/// Where private directories are made.
+/// Directory in which private directories are created.
 #[derive(Debug)]
 pub(crate) struct Scratch {
     root: PathBuf,
 }
 
 impl Scratch {
-    /// Makes `root`, and removes what dead offices have left there.
+    /// Creates `root` and removes the directories of dead runners in it.
     ///
     /// # Errors
-    /// The system's, and when the root is not in our hands alone.
+    /// System errors, and an error if other users can write to the root.
     pub fn open(root: &Path) -> io::Result<Scratch> {
         trust::make_private_directory(root).map_err(io::Error::other)?;
-        // Modules may write paths as the kernel knows them, and those are to be found again.
+        // Modules may write canonical paths, and these must be found again in the result.
         let root = root.canonicalize()?;
         let scratch = Scratch { root };
         let _lock = scratch.lock()?;
@@ -33,10 +33,10 @@ impl Scratch {
         Ok(scratch)
     }
 
-    /// A directory for one run. It goes with the value.
+    /// Creates a directory for one run. It is removed when the value is dropped.
     ///
     /// # Errors
-    /// The system's.
+    /// System errors.
     pub fn for_a_run(&self) -> io::Result<Room> {
         let _lock = self.lock()?;
         let own = std::process::id();
@@ -48,7 +48,7 @@ impl Scratch {
         Ok(Room { path, _lock: lock })
     }
 
-    /// While it is shut no directory is new and not yet locked, and none is swept.
+    /// Locks the root, so that no directory is swept and none is new and still unlocked.
     fn lock(&self) -> io::Result<File> {
         let lock = File::open(&self.root)?;
         flock(&lock, FlockOperation::LockExclusive)?;
@@ -56,24 +56,24 @@ impl Scratch {
     }
 }
 
-/// The private directory of one run.
+/// Private directory of one run.
 #[derive(Debug)]
 pub(crate) struct Room {
     path: PathBuf,
-    /// Held as long as it is in use.
+    /// Held while the directory is in use.
     _lock: File,
 }
 
 impl Room {
-    /// Where it is.
+    /// Returns the path of the directory.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// A directory in it.
+    /// Creates a subdirectory.
     ///
     /// # Errors
-    /// The system's.
+    /// System errors.
     pub fn directory(&self, name: &str) -> io::Result<PathBuf> {
         let path = self.path.join(name);
         private(&path)?;
@@ -91,12 +91,12 @@ fn private(path: &Path) -> io::Result<()> {
     std::fs::DirBuilder::new().mode(0o700).create(path)
 }
 
-/// Removes directories that nobody holds.
+/// Removes the directories that have no lock.
 fn sweep(root: &Path) {
     let entries = std::fs::read_dir(root).into_iter().flatten().flatten();
     for entry in entries {
         let path = entry.path();
-        // A module may have shut its own; one that cannot be asked for its lock may be in use.
+        // A module may have removed its read permission. An unreadable directory may be in use.
         let opened = File::open(&path).or_else(|_| {
             std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o700))?;
             File::open(&path)
@@ -108,7 +108,7 @@ fn sweep(root: &Path) {
     }
 }
 
-/// Removes whatever lies there, however its owner has left it.
+/// Removes a path regardless of the permissions in it.
 fn remove(path: &Path) {
     let gone = |it: &io::Result<()>| match it {
         Ok(()) => true,
@@ -117,7 +117,7 @@ fn remove(path: &Path) {
     if gone(&std::fs::remove_dir_all(path)) {
         return;
     }
-    // What may not be looked into is made so that it may; what is too deep for open directories is not for `rm`.
+    // Permissions are added first. `rm` can remove trees that are too deep for open directories.
     open_up(path, 64);
     if gone(&std::fs::remove_dir_all(path)) {
         return;

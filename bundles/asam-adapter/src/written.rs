@@ -1,21 +1,21 @@
-//! What a report module has written.
+//! Files written by a report module.
 
 use std::path::{Path, PathBuf};
 
 use qcbus_disk::foreign;
 
-/// Files of one run.
+/// Maximum number of files of one run.
 const MOST_FILES: usize = 1000;
-/// Directories in each other.
+/// Maximum depth of nested directories.
 const DEEPEST: usize = 8;
 
-/// The names of files, each with its length, and the bytes of all of them in a row.
+/// Names of files with their lengths, and the concatenated bytes of all files.
 pub(crate) type Written = (Vec<(String, u64)>, Vec<u8>);
 
-/// All regular files below a directory, by name. Links and whatever else there is are nobody's report.
+/// Reads all regular files below a directory, sorted by name. Links and other entries are ignored.
 ///
 /// # Errors
-/// For a person: when there is more than is taken, or something cannot be read.
+/// As text for the user: if a limit is exceeded or a file cannot be read.
 pub(crate) fn in_directory(directory: &Path, most: u64) -> Result<Written, String> {
     let mut paths = Vec::new();
     walk(directory, 0, &mut paths)?;

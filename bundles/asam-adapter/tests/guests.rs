@@ -1,5 +1,5 @@
-//! Modules that misbehave on purpose. Whatever they do, nobody takes it for a look at the file: every checker of theirs
-//! is open, says why, and nothing of theirs is left, neither a process nor a directory.
+//! Tests with modules that misbehave on purpose. In each case, every checker of the module is
+//! failed and gives the reason. No process and no directory of the module remains.
 
 #![expect(
     clippy::unwrap_used,
@@ -12,21 +12,21 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-/// Long enough for the slowest machine, so that a test that hangs ends.
+/// Timeout that ends a hanging test. It is long enough for the slowest machine.
 const WATCHDOG: Duration = Duration::from_secs(240);
 
-/// What every guest begins with: where its input is, and how a result is written.
+/// Beginning of every guest script: location of the input, and a function that writes a result.
 const MANNERS: &str = include_str!("guests/manners.sh");
 
-/// A guest and what it has been given.
+/// A guest module and its files.
 struct Guest {
     dir: tempfile::TempDir,
-    /// In the command line of everything that it starts and leaves.
+    /// Text in the command line of every process that it starts and leaves behind.
     mark: String,
 }
 
 impl Guest {
-    /// One that is polite while it is asked what it has, and does this over a real file.
+    /// Creates a guest that answers sample runs correctly and executes this script for a real file.
     fn doing(script: &str) -> Guest {
         let dir = tempfile::tempdir().unwrap();
         let mark = format!("{}.{}", 86_400 + std::process::id(), unique());
@@ -61,7 +61,7 @@ impl Guest {
         command
     }
 
-    /// Has it judge the file. Gives the exit code and all that is said.
+    /// Lets the guest check the file. Returns the exit code and the whole output.
     fn judge(&self, limits: &[&str]) -> (Option<i32>, String) {
         let output = within(self.command(limits).spawn().unwrap());
         let said = [output.stdout, output.stderr].concat();
@@ -70,7 +70,7 @@ impl Guest {
         (output.status.code(), said)
     }
 
-    /// Nothing is left of it.
+    /// Asserts that no process and no directory of the guest remains.
     fn is_gone(&self, said: &str) {
         let begin = Instant::now();
         while !processes_with(&self.mark).is_empty() {
@@ -85,7 +85,7 @@ impl Guest {
         entries.map(|it| it.unwrap().path()).collect()
     }
 
-    /// Both its checkers are open, and say this.
+    /// Asserts that both its checkers have failed with these reasons.
     fn is_open(&self, limits: &[&str], why: &[&str]) {
         let (code, said) = self.judge(limits);
         assert_eq!(code, Some(3), "{said}");
@@ -131,7 +131,7 @@ fn within(mut child: Child) -> Output {
     output
 }
 
-/// Living processes that have this in their command line.
+/// Returns the living processes that have this text in their command line.
 fn processes_with(mark: &str) -> Vec<i32> {
     let entries = std::fs::read_dir("/proc").unwrap().flatten();
     let pids = entries.filter_map(|it| it.file_name().to_str()?.parse::<i32>().ok());
@@ -242,7 +242,7 @@ fn who_floods_is_ended() {
 
 #[test]
 fn who_takes_all_memory_is_ended() {
-    // Doubles a text until it does not fit.
+    // The script doubles a text until the memory limit is reached.
     let leak = "polite; x=xxxxxxxxxxxxxxxx; while :; do x=$x$x; done";
     Guest::doing(leak).is_open(
         &["--memory-mb", "64", "--seconds", "60"],
@@ -356,7 +356,7 @@ fn a_module_that_tells_nothing_of_itself_is_of_no_use() {
     }
 }
 
-/// The id of a process that this one has started whose command line has a word.
+/// Returns the id of a child of this process that has this word in its command line.
 fn child_of(parent: u32, word: &str) -> Option<i32> {
     let children =
         std::fs::read_to_string(format!("/proc/{parent}/task/{parent}/children")).ok()?;
@@ -390,7 +390,7 @@ fn who_is_killed_leaves_no_process_and_the_next_no_directory() {
         eprintln!("skipped: this kernel does not list the children of a process");
         return;
     }
-    // Whatever is left of it in its own directory, and without a word of its command line.
+    // The module starts processes whose command lines have the mark and no other text of the guest.
     let script = "sleep $MARK & sleep $MARK";
     for victim in ["the bus process", "the runner"] {
         let guest = Guest::doing(script);
@@ -415,7 +415,8 @@ fn who_is_killed_leaves_no_process_and_the_next_no_directory() {
             });
             continue;
         }
-        // What the shell of the module has started itself has nobody who ends it but a broker, whose orphan it is.
+        // Only a broker ends the processes that the module's shell started, as its descendants. No
+        // broker runs here, so the test kills them.
         processes_with(&guest.mark)
             .into_iter()
             .filter(is_module)

@@ -1,4 +1,4 @@
-//! Modules in Python are kept warm, and what becomes of that is no business of the result.
+//! Python modules run in a fork server, and this does not change the result.
 
 #![expect(
     clippy::unwrap_used,
@@ -9,7 +9,8 @@
 use std::os::unix::fs::PermissionsExt as _;
 use std::process::{Command, Stdio};
 
-/// Says in its result by whom it was begun; over a real file it does what is put in.
+/// A module that states in its result which process started it. For a real file, it executes the
+/// inserted code.
 const MODULE: &str = r#"#!PYTHON
 import os, re, signal, sys
 
@@ -37,9 +38,10 @@ if __name__ == "__main__":
     main()
 "#;
 
-/// What a module says that does this over a real file; `None` where there is no Python.
+/// Returns the output of a module that executes this code for a real file, or `None` if there is no
+/// Python.
 fn says(deed: &str, more: &[&str]) -> Option<String> {
-    // Itself, and not a script that finds it.
+    // The path must be the interpreter itself, not a script that finds it.
     let asked = Command::new("python3")
         .args(["-c", "import sys; print(sys.executable, end='')"])
         .output();

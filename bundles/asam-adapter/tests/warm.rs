@@ -1,6 +1,7 @@
-//! A warm run is a plain one, only sooner.
+//! A forked run has the same result as a plain run, but it is faster.
 //!
-//! Every program here is run by a shell as its command says, and by a server; both must write, print and end the same.
+//! Every program here runs once in a shell with its command, and again in a fork server. Both runs
+//! must write, print and end the same.
 
 #![expect(
     clippy::unwrap_used,
@@ -27,7 +28,7 @@ use std::time::{Duration, Instant};
 use qcbus_asam_adapter::warm::{Limits, Run, Server, SpawnError, recognise};
 use rustix::process::{Pid, Signal, WaitOptions, kill_process, set_child_subreaper, waitpid};
 
-/// Everything that a program can see of how it was started.
+/// Everything that a program can observe of its start.
 const LOOKS: &str = "
 import os, sys, logging
 logging.basicConfig(format='%(message)s', level=logging.INFO)
@@ -59,7 +60,7 @@ fn what_a_program_sees_is_the_same() {
     );
     assert_eq!(seen.stderr, "logged\nto stderr\n");
     assert_eq!(seen.files["written"], "by it");
-    // By its whole path, by its interpreter, as a module.
+    // The program is called by its full path, by its interpreter and as a module.
     let (script, python) = (shop.path("bin/looks"), shop.python.display().to_string());
     shop.same(&format!("{} a", script.display()));
     shop.same(&format!("{python} -u {} a", script.display()));
@@ -87,7 +88,7 @@ fn every_form_of_a_first_line_is_understood() {
         format!("#!/bin/sh\n'''exec' {python} \"$0\" \"$@\"\n' '''"),
         "#!/usr/bin/env python3".to_owned(),
     ] {
-        // `-E` does without PYTHONPATH.
+        // `-E` ignores PYTHONPATH.
         let path = shop.path("lib");
         let body = "import sys\nimport os\nif __name__ == '__main__':\n    sys.path.append(PATH)\n    \
                     from form_main import main\n    sys.exit(main())\n";
@@ -236,9 +237,9 @@ fn limits_are_those_of_the_job() {
         outcome.stdout,
         "[(1073741824, 1073741824), (77, 77), (5000, 5000)]\n"
     );
-    // Without any it is as before.
+    // A run without limits is not affected by earlier limits.
     assert!(!shop.warm(&mut server, &environment).stdout.contains("77"));
-    // A directory that is not there is this job's trouble, not the server's.
+    // A missing directory is a failure of this job, not of the server.
     let null = File::open("/dev/null").unwrap();
     let run = Run {
         environment: &environment,
@@ -264,7 +265,7 @@ fn what_cannot_be_the_same_is_run_plainly() {
         let got = shop.why_cold(name);
         assert_eq!(got, *why, "{name}");
     }
-    // Names alone are no calls.
+    // A name without a call is accepted.
     shop.console("named", "from datetime import datetime\nclass A:\n    seed = None\n    def x(self): return datetime.now()\ndef main(now=datetime.now):\n    print('a')\n");
     assert_eq!(shop.same("named").stdout, "a\n");
 }
@@ -424,7 +425,7 @@ fn an_upgrade_is_noticed() {
     drop(server);
     let mut server = shop.start("upgraded").unwrap();
     assert_eq!(shop.warm(&mut server, &environment).stdout, "newer\n");
-    // A module that would be found before an installed one.
+    // Python would find this module before an installed one.
     fs::write(shop.path("bin/part.py"), "VALUE = 'nearer'\n").unwrap();
     let outdated = server.spawn(&run).unwrap_err();
     assert!(
@@ -435,7 +436,6 @@ fn an_upgrade_is_noticed() {
     );
     let mut server = shop.start("upgraded").unwrap();
     assert_eq!(shop.warm(&mut server, &environment).stdout, "nearer\n");
-    // The program is gone.
     fs::remove_file(shop.path("bin/upgraded")).unwrap();
     assert!(matches!(server.spawn(&run), Err(SpawnError::Outdated(_))));
 }
@@ -473,18 +473,19 @@ fn a_killed_server_leaves_its_jobs_to_the_subreaper() {
     assert_eq!(server.running(), [pid]);
     assert!(matches!(server.spawn(&run), Err(SpawnError::Gone(_))));
     drop(server);
-    // The job goes on, and its end is the subreaper's to see.
+    // The job continues, and the subreaper receives its exit status.
     drop(ours);
     let (_, status) = waitpid(Some(process(pid)), WaitOptions::empty())
         .unwrap()
         .unwrap();
     assert_eq!(status.exit_status(), Some(7));
-    // Another one takes its place.
+    // A new server replaces the killed one.
     let mut server = shop.start("waits").unwrap();
     assert_eq!(shop.warm(&mut server, &environment).status.code(), Some(7));
 }
 
-/// A module of ASAM's, and how much sooner it is. `QCBUS_ASAM_VENV` names the environment; without it, `target/asam-venv`.
+/// Compares runs of ASAM's own modules and prints the time of each. `QCBUS_ASAM_VENV` names the
+/// environment; without it, `target/asam-venv`.
 #[test]
 fn asams_own_modules_give_the_same_results() {
     let venv = std::env::var_os("QCBUS_ASAM_VENV").map(PathBuf::from);
@@ -545,7 +546,7 @@ fn compare(shop: &Workshop, program: &Path, config: &str) {
     assert_eq!(warm.status, plain.status, "{warm:?}");
     assert_eq!(warm.files, plain.files);
     assert!(warm.files["result.xqar"].contains("checkerId"), "{warm:?}");
-    // Lines of the log begin with the time.
+    // Log lines begin with the time, so it is removed.
     let without_times = |text: &str| -> Vec<String> {
         text.lines()
             .map(|line| line.split_once(" - ").unwrap_or(("", line)).1.to_owned())
@@ -562,7 +563,7 @@ fn a_server_dies_with_whoever_started_it() {
     let starts = || {
         let server = shop.start("lives").unwrap();
         let pid = server.id();
-        // Nobody drops it, as when its caller is killed: the kernel ends it.
+        // The server is not dropped, as when its caller is killed. The kernel must end it.
         std::mem::forget(server);
         pid
     };

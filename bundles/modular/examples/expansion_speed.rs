@@ -1,9 +1,10 @@
-//! Times the expansion of a modular scenario in this process.
+//! Measures the time of the expansion of a modular scenario in this process.
 //!
 //!     cargo run --release -p qcbus-modular --example expansion_speed FILE…
 //!
-//! Prints, for each file, the median of 201 runs in microseconds: reading it with everything that belongs
-//! to it (its expanded image among that), expanding its documents, and writing the expanded text.
+//! Prints, for each file, the median of 201 runs in microseconds. The times cover reading the file
+//! with all its dependencies (including its expanded image), expanding its documents, and writing
+//! the expanded text.
 
 #![expect(clippy::print_stdout, reason = "it prints what it measured")]
 

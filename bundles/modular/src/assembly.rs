@@ -1,18 +1,18 @@
-//! What rules about modular scenarios look at: `Rule<Modular>` gets an `&Assembly<'_>`.
+//! The model of the rules about modular scenarios: `Rule<Modular>` gets an `&Assembly<'_>`.
 
 use qcbus_document::{Document, FileKind, Node};
 use qcbus_messages::DocumentRole;
 use qcbus_sdk::modular::{Expansion, OFFERS, Piece, Problem, Spot, What};
 use qcbus_sdk::{Finding, Model, Place, Sink, Subject, Unbuilt};
 
-/// A modular scenario with the documents that it is made of, expanded once for all rules.
+/// A modular scenario with its documents, expanded once for all rules.
 pub enum Modular {}
 
 /// A modular scenario, or a library file for one.
 pub struct Assembly<'d> {
     /// The file with its linked documents.
     pub subject: &'d Subject<'d>,
-    /// What becomes of it.
+    /// The result of its expansion.
     pub expansion: Expansion<'d>,
 }
 
@@ -43,7 +43,7 @@ impl Model for Modular {
 /// An archive of a scenario's documents.
 #[derive(Clone, Copy)]
 pub struct Archive<'d> {
-    /// Its path; of one within another, `archive!member`.
+    /// Path of the archive; `archive!member` for an archive within another one.
     pub path: &'d str,
     listing: Document<'d>,
 }
@@ -51,16 +51,16 @@ pub struct Archive<'d> {
 /// A file in an archive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Member<'d> {
-    /// Its name in the archive.
+    /// Name of the file in the archive.
     pub name: &'d str,
-    /// Checksum of its content, as the archive has it.
+    /// Checksum of the content, as recorded in the archive.
     pub crc32: &'d str,
-    /// Unpacked, in bytes.
+    /// Unpacked size in bytes.
     pub size: u64,
 }
 
 impl<'d> Archive<'d> {
-    /// The files in it.
+    /// Returns the files in the archive.
     pub fn members(&self) -> impl Iterator<Item = Member<'d>> + use<'d> {
         self.listing.elements("Member").map(|node| Member {
             name: node.attr("name").unwrap_or(""),
@@ -74,12 +74,12 @@ impl<'d> Archive<'d> {
 }
 
 impl<'d> Assembly<'d> {
-    /// The file as it is written.
+    /// Returns the file as it is written.
     pub fn root(&self) -> Document<'d> {
         self.subject.written()
     }
 
-    /// The archives of the documents, the one that is checked first.
+    /// Returns the archives of the documents. The checked archive comes first.
     pub fn archives(&self) -> impl Iterator<Item = Archive<'d>> {
         let listings = self.subject.with_role(DocumentRole::Listing);
         listings.map(|linked| Archive {
@@ -88,13 +88,14 @@ impl<'d> Assembly<'d> {
         })
     }
 
-    /// The scenarios that it is made of, itself first.
+    /// Returns the scenarios that make up this one. The checked file comes first.
     pub fn scenarios(&self) -> impl Iterator<Item = Document<'d>> {
         let linked = self.subject.with_role(DocumentRole::Scenario);
         std::iter::once(self.root()).chain(linked.map(|linked| linked.document))
     }
 
-    /// What a reference leads to, whether or not it can be taken; `None` when nothing was found.
+    /// Returns the document that a reference leads to, even if it is unusable, or `None` if not
+    /// found.
     pub fn target(&self, reference: Node<'_>) -> Option<Document<'d>> {
         let pieces = &self.expansion.pieces;
         let path = reference.document().path();
@@ -104,7 +105,7 @@ impl<'d> Assembly<'d> {
         pieces.get(link.to as usize).map(|piece| piece.document)
     }
 
-    /// The first reference that leads to a document; `None` for the file that is checked.
+    /// Returns the first reference that leads to a document, or `None` for the checked file.
     pub fn reference_to(&self, document: Document<'_>) -> Option<Node<'d>> {
         let pieces = &self.expansion.pieces;
         let of = |piece: &Piece<'_>| piece.document.path() == document.path();
@@ -116,8 +117,9 @@ impl<'d> Assembly<'d> {
         })
     }
 
-    /// Says something of a document: of the file that is checked where it is, of another one at the
-    /// reference that leads there, with its place as the second.
+    /// Reports a finding about a document. For the checked file, the finding is at the place
+    /// itself. For another file, it is at the reference that leads there, with `at` as the second
+    /// place.
     pub fn say_of<'s, 'f>(
         &self,
         found: &'s mut Sink<'f>,
@@ -134,14 +136,14 @@ impl<'d> Assembly<'d> {
         }
     }
 
-    /// The problems of some sorts, in the order in which the expansion came upon them.
+    /// Returns the problems of the given kinds, in the order in which the expansion found them.
     pub fn problems(&self, sorts: &'static [What]) -> impl Iterator<Item = &Problem<'d>> {
         let all = self.expansion.problems.iter();
         all.filter(move |problem| sorts.contains(&problem.what))
     }
 }
 
-/// The place of a spot.
+/// Returns the place of a spot.
 pub fn place(spot: Spot<'_>) -> Place<'_> {
     match spot {
         Spot::Node(node) => Place::Node(node),
@@ -149,7 +151,7 @@ pub fn place(spot: Spot<'_>) -> Place<'_> {
     }
 }
 
-/// Says a problem of the expansion, with what it is about in the other file.
+/// Reports a problem of the expansion, with its place in the other file.
 pub fn say<'s, 'd, 'p>(
     found: &'s mut Sink<'d>,
     problem: &Problem<'p>,
@@ -162,7 +164,7 @@ pub fn say<'s, 'd, 'p>(
     }
 }
 
-/// Says all problems of some sorts.
+/// Reports all problems of the given kinds.
 pub fn say_all(assembly: &Assembly<'_>, found: &mut Sink<'_>, sorts: &'static [What], there: &str) {
     for problem in assembly.problems(sorts) {
         say(found, problem, there);

@@ -1,13 +1,13 @@
-//! What the short examples of the pages are put into.
+//! Templates around the short examples of the rule pages.
 //!
 //! | `in=` | the example is |
 //! |---|---|
-//! | (nothing) | what follows the file header |
+//! | (nothing) | everything after the file header |
 //! | `act` | the maneuver groups of the only act; `Ego` and `Other` are declared |
-//! | `group` | what follows the actors (`Ego`) of the only maneuver group, `Cars` |
+//! | `group` | everything after the actors (`Ego`) of the only maneuver group, `Cars` |
 //! | `library` | the content of `<SpeedActionTarget>` in a library file, in the group `Drive` for `Veh` |
 //! | `libraryAct` | the maneuver groups of a library file |
-//! | `libraryAction` | the content of the only `<PrivateAction>` there |
+//! | `libraryAction` | the content of the only `<PrivateAction>` of a library file |
 
 use qcbus_sdk::pages::Template;
 
@@ -73,7 +73,7 @@ macro_rules! now {
     };
 }
 
-/// A scenario whose only act has these groups.
+/// A scenario with these groups in its only act.
 macro_rules! main {
     ($($groups:expr),* $(,)?) => {
         document!(
@@ -86,7 +86,7 @@ macro_rules! main {
     };
 }
 
-/// A library file whose only act has these groups.
+/// A library file with these groups in its only act.
 macro_rules! library {
     ($($groups:expr),* $(,)?) => {
         document!(
@@ -111,7 +111,7 @@ macro_rules! drive {
     };
 }
 
-/// The templates; the first is for examples that name none.
+/// The templates. The first one is for examples without `in=`.
 pub static TEMPLATES: &[Template] = &[
     Template {
         name: "file",

@@ -1,10 +1,10 @@
-//! The checker bundle for modular scenarios: OpenSCENARIO files that take maneuver groups from other
-//! files by `ScenarioReference`, and the archives (`.mosc`) that they travel in.
+//! The checker bundle for modular scenarios. These are OpenSCENARIO files that take maneuver groups
+//! from other files by `ScenarioReference`, and their archives (`.mosc`).
 //!
-//! It looks at how a scenario is put together. What it is put together to is looked at by the bundle
-//! for OpenSCENARIO, which reads the expanded scenario.
+//! The bundle checks how a scenario is put together. The bundle for OpenSCENARIO checks the
+//! expanded scenario.
 //!
-//! One rule is one file in `rules/` with its page beside it; `rules/mod.rs` is the list.
+//! Each rule is one file in `rules/` with its page beside it; `rules/mod.rs` is the list.
 
 mod assembly;
 mod examples;

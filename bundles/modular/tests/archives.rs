@@ -1,5 +1,5 @@
-//! Archives and files as bytes, which pages cannot show: byte order marks, damage, names that a packer refuses,
-//! and what must not be said twice.
+//! Tests of archives and files as bytes, which pages cannot show: byte order marks, damage, names
+//! that a packer refuses, and faults that must be reported only once.
 
 #![expect(
     clippy::unwrap_used,
@@ -23,7 +23,7 @@ fn archive(name: &str, members: Files) -> (String, Vec<u8>) {
     file(name, pack(&members).unwrap())
 }
 
-/// A scenario with a group for each of these references: file, group.
+/// Returns a scenario with one group for each of these references: file, group.
 fn main(references: &[(&str, &str)]) -> String {
     let mut groups = String::new();
     for (index, (file, group)) in references.iter().enumerate() {
@@ -52,8 +52,8 @@ fn scenario(groups: &str) -> String {
     )
 }
 
-/// Writes files into a folder of this test and says what the rules about files, archives and references
-/// find in the first.
+/// Writes files into a folder of this test. Returns the findings in the first file of the rules
+/// about files, archives and references.
 fn found(test: &str, files: Files) -> Vec<String> {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(test);
     for (name, bytes) in &files {
@@ -91,7 +91,7 @@ fn said(path: &Path) -> Vec<String> {
     all
 }
 
-/// Each of the findings begins and goes on like this.
+/// Asserts that each finding starts with the expected rule and contains the expected text.
 #[track_caller]
 fn expect(found: &[String], expected: &[(&str, &str)]) {
     let fits = found.len() == expected.len()
@@ -291,7 +291,8 @@ fn a_bare_doctype_counts_only_as_one() {
     }
 }
 
-/// `outer.mosc` with a library and `inner.mosc`, to which it refers, with another file.
+/// Returns `outer.mosc` with a library and `inner.mosc`, to which it refers and which has another
+/// file.
 fn nested(inner: (String, Vec<u8>)) -> Files {
     let uses_inner = main(&[(inner.0.as_str(), "Drive")]);
     let of_inner = vec![file("main.xosc", uses_inner), inner];
@@ -341,7 +342,7 @@ fn what_an_inner_archive_finds_in_the_outer_one_is_used() {
     );
 }
 
-/// A chain of so many references.
+/// Returns a chain of this number of references.
 fn chain(length: usize) -> Files {
     let mut files = Vec::new();
     let mut group = "Drive".to_owned();

@@ -1,5 +1,5 @@
-//! Cases of which it is known what the reference tool does: where it is right, the expansion is the
-//! same by canonical form; where it is wrong, the check that says so fires.
+//! Tests of cases with known results of the reference tool. If the tool is right, the expansion has
+//! the same canonical form. If it is wrong, the check for this fault fires.
 
 #![expect(
     clippy::unwrap_used,
@@ -18,7 +18,7 @@ use qcbus_sdk::modular::SearchPath;
 use qcbus_sdk::{Loaded, Plan, examine};
 use sha2::{Digest, Sha256};
 
-/// The checks by their numbers in the list of cases.
+/// The checks in the order of their numbers in the list of cases.
 const CHECKS: [&str; 38] = [
     "archive.main_present",
     "reference.file_found",
@@ -60,7 +60,7 @@ const CHECKS: [&str; 38] = [
     "library.name_with_dot",
 ];
 
-/// Where the reference tool has the same expansion, whatever else it does.
+/// Cases in which the expansion of the reference tool is the same, whatever else it does.
 const SAME: [&str; 23] = [
     "02_value_before_key",
     "12_key_matches_nothing",
@@ -87,7 +87,8 @@ const SAME: [&str; 23] = [
     "81_dup_zip_entry",
 ];
 
-/// Of a search path the platform's separator is taken as well as `;`, so the file is found.
+/// A case with the platform's separator in a search path. It is accepted as well as `;`, so the
+/// file is found.
 const FOUND_HERE: &str = "45_scenario_path_colon";
 
 fn cases() -> Option<PathBuf> {
@@ -102,7 +103,7 @@ fn cases() -> Option<PathBuf> {
     there.then(|| cases.to_path_buf())
 }
 
-/// A case with an archive: its name and what is to be said of it.
+/// A case with an archive: its name and the expected results.
 struct Case {
     name: String,
     folder: PathBuf,
@@ -149,7 +150,7 @@ fn load(case: &Case) -> Loaded {
     Loaded::searching(&case.folder.join("in.mosc"), &case.folder, &search).unwrap()
 }
 
-/// What the expansion is, when there is one.
+/// Returns the expansion, if there is one.
 fn expanded(loaded: &Loaded) -> Option<String> {
     let subject = loaded.subject(&BUNDLE).unwrap();
     let expansion = subject.expansion();
@@ -205,8 +206,8 @@ fn every_check_of_the_list_is_a_rule() {
     assert_eq!(uids, BTreeSet::from(listed));
 }
 
-/// SHA-256 of the canonical form: no comments, instructions and blanks at the ends of text, attributes
-/// sorted, all elements with end tags.
+/// Returns the SHA-256 of the canonical form. It has no comments, no instructions and no blanks at
+/// the ends of text. Attributes are sorted, and all elements have end tags.
 fn digest(text: &str) -> String {
     let prepared = qcbus_ingest::prepare_bytes(
         Path::new("/x.xosc"),

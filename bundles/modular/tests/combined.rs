@@ -1,4 +1,4 @@
-//! What comes of putting scenarios and library files together, beyond what pages show.
+//! Tests of combined scenarios and library files, beyond the examples of the pages.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
 
@@ -6,7 +6,8 @@ use std::path::PathBuf;
 
 use qcbus_sdk::{Loaded, Plan, examine};
 
-/// What a rule finds in `main.xosc` among some files: its texts, each with its number of places.
+/// Returns the findings of a rule in `main.xosc` among some files: their texts, each with its
+/// number of places.
 fn found(test: &str, files: &[(&str, String)], rule: &str) -> Vec<(String, usize)> {
     let directory = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(test);
     let _ = std::fs::remove_dir_all(&directory);
@@ -35,7 +36,7 @@ fn file(declared: &str, groups: &str) -> String {
 
 const ENTITIES: &str = r#"<Entities><ScenarioObject name="Ego"/></Entities>"#;
 
-/// A group that takes one of another file.
+/// Returns a group that takes a group from another file.
 fn taking(name: &str, from: &str, group: &str, keys: &[(&str, &str)]) -> String {
     let keys: String = keys
         .iter()
@@ -49,7 +50,7 @@ fn taking(name: &str, from: &str, group: &str, keys: &[(&str, &str)]) -> String 
     )
 }
 
-/// A group that others take, with what its only action does.
+/// Returns a group that others take, with the content of its only action.
 fn offering(name: &str, action: &str) -> String {
     format!(
         r#"<ManeuverGroup name="{name}" maximumExecutionCount="1">
@@ -76,7 +77,8 @@ fn a_parameter_that_many_values_need_is_said_once() {
         ("lib.xosc", library),
     ];
     let said = found("parameters", &files, "result_parameters_resolved");
-    // The first group that needs it, the value in the library file, and the second group.
+    // The places are the first group that needs the parameter, the value in the library file, and
+    // the second group.
     assert_eq!(said.len(), 1, "{said:?}");
     assert_eq!(said[0].1, 3, "{said:?}");
 }
@@ -157,10 +159,10 @@ fn values_of_inner_scenarios_are_judged_where_they_are_written() {
     };
     let said = found("inner", &files(outer(&[])), "value_range");
     assert_eq!(said.len(), 2, "{said:?}");
-    // What an outer scenario replaces does no harm.
+    // A value that an outer scenario replaces is not reported.
     let said = found("outer", &files(outer(&[("value", "1")])), "value_range");
     assert_eq!(said, []);
-    // Dots that nesting makes are as they must be.
+    // Nesting creates dots in names, and these are allowed.
     let said = found("dots", &files(outer(&[])), "library_name_with_dot");
     assert_eq!(said, []);
 }
@@ -198,7 +200,7 @@ fn a_group_that_is_not_found_hides_no_other() {
     assert_eq!(found("other", &files, "value_type").len(), 1);
 }
 
-/// So many groups that take one.
+/// Returns a scenario with this number of groups that take a library group.
 fn often(count: usize, from: &str, keys: &[(&str, &str)]) -> String {
     let groups = (0..count).map(|index| taking(&format!("G{index}"), from, "Drive", keys));
     file(ENTITIES, &groups.collect::<String>())
@@ -240,7 +242,7 @@ fn what_is_wrong_with_a_library_is_said_once() {
         ("empty", String::new(), "reference_file_found", 1),
         ("map", "<OpenDRIVE/>".to_owned(), "reference_file_found", 1),
         ("inner", file("", &inner), "reference_unexpanded", 1),
-        // One for each of the two elements with a list.
+        // Each of the two elements with a list has one finding.
         ("lists", file("", &lists), "key_path_exact", 2),
         (
             "nothing",

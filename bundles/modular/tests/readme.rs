@@ -1,4 +1,4 @@
-//! The list of the rules in the bundle's README is the list of the rules. `QCBUS_BLESS=1` writes it.
+//! Checks that the list of rules in the bundle's README is complete. `QCBUS_BLESS=1` writes it.
 
 #![expect(
     clippy::unwrap_used,

@@ -1,4 +1,4 @@
-//! No set of files, however broken, makes a rule panic.
+//! Checks that a damaged set of files never makes a rule panic.
 
 use qcbus_modular::BUNDLE;
 use qcbus_sdk::robust::Robust;
@@ -33,7 +33,7 @@ const ROBUST: Robust = Robust {
 
 const MAIN: &str = include_str!("../../../tests/farm/modular/convoy.xosc");
 const LIBRARY: &str = include_str!("../../../tests/farm/modular/moves.xosc");
-/// A library that takes a group itself.
+/// A library that itself takes a group.
 const FURTHER: &str = include_str!("../../../tests/farm/faulty/misassembled.xosc");
 
 #[test]

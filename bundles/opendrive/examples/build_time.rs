@@ -1,4 +1,4 @@
-//! How long it takes to build the model and to ask everything of it, by size of the map.
+//! Measures the time for building and querying the whole model, by size of the map.
 //!
 //! `cargo run --release -p qcbus-opendrive --example build_time -- MAP.xodr [MEGABYTES]` repeats
 //! the roads of the map with fresh ids until the file has that size.
@@ -34,7 +34,7 @@ fn main() {
     }
 }
 
-/// The map with its roads repeated under fresh ids until it has `size` bytes.
+/// Repeats the roads of the map with fresh ids until the text has `size` bytes.
 fn repeat_roads(text: &str, size: usize) -> String {
     let (Some(from), Some(to)) = (text.find("<road "), text.rfind("</road>")) else {
         return text.to_owned();

@@ -1,23 +1,23 @@
-//! Finding things by their ids, which are strings and not always unique.
+//! Lookup by ids. Ids are strings and not always unique.
 
 use foldhash::{HashMap, HashMapExt as _};
 
 /// Ids with their places; duplicates are kept in the order of their places.
 #[derive(Debug, Default)]
 pub(crate) struct IdIndex<'a> {
-    /// In order of id, then of place.
+    /// Sorted by id, then by place.
     ids: Vec<(&'a str, u32)>,
-    /// Where in `ids` those begin that are this id.
+    /// Position in `ids` of the first entry of each id.
     first: HashMap<&'a str, u32>,
 }
 
 impl<'a> IdIndex<'a> {
-    /// The index of these ids, whose places are counted from zero.
+    /// Builds the index of these ids. Their places are counted from zero.
     pub(crate) fn new(ids: impl Iterator<Item = &'a str>) -> IdIndex<'a> {
         IdIndex::of(ids.zip(0..).collect())
     }
 
-    /// The index of these pairs of id and place.
+    /// Builds the index of these pairs of id and place.
     pub(crate) fn of(mut ids: Vec<(&'a str, u32)>) -> IdIndex<'a> {
         ids.sort_unstable();
         let mut first = HashMap::with_capacity(ids.len());
@@ -27,11 +27,11 @@ impl<'a> IdIndex<'a> {
         IdIndex { ids, first }
     }
 
-    /// The places of an id, ascending.
+    /// Returns the places of an id in ascending order.
     pub(crate) fn places(&self, id: &str) -> impl Iterator<Item = usize> {
         let from = self.first.get(id).map(|from| *from as usize);
         let rest = from.and_then(|from| self.ids.get(from..)).unwrap_or(&[]);
-        // Whoever asks for the first one only does not pay for a search of the others.
+        // The search for further entries is lazy, so a lookup of the first entry only stays cheap.
         let same = rest
             .iter()
             .enumerate()
@@ -39,7 +39,7 @@ impl<'a> IdIndex<'a> {
         same.map(|(_, (_, place))| *place as usize)
     }
 
-    /// The ids that occur more than once, each with all its places, in order of id.
+    /// Returns the ids that occur more than once, each with all its places, in order of id.
     pub(crate) fn duplicates(&self) -> impl Iterator<Item = &[(&'a str, u32)]> {
         self.ids
             .chunk_by(|(one, _), (next, _)| one == next)

@@ -1,5 +1,5 @@
-//! What touches what: linked road ends and linked lanes (OpenDRIVE 1.9, 10.3, 11.6, 12.3, 12.4,
-//! 12.6, 12.7).
+//! Contacts between linked road ends and between linked lanes (OpenDRIVE 1.9, 10.3, 11.6, 12.3,
+//! 12.4, 12.6, 12.7).
 
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
@@ -13,65 +13,65 @@ use crate::road::Road;
 use crate::section_ref::SectionRef;
 use crate::value::{ContactPoint, LayerKind, Side};
 
-/// What is found out about links when first asked for.
+/// Data about links, computed on first use.
 #[derive(Debug, Default)]
 pub(crate) struct Caches<'a> {
-    /// What junctions say; what lanes say is kept with their roads.
+    /// Joints of junctions. Joints of lanes are cached in their roads.
     joints: OnceLock<Box<[LaneJoint<'a>]>>,
     pub(crate) touching: OnceLock<Box<[crate::TouchingLanes<'a>]>>,
-    /// What each road's own links say about its start and its end.
+    /// Contacts from the links of each road, for its start and its end.
     linked: OnceLock<Vec<[Option<RoadContact<'a>>; 2]>>,
     connections: OnceLock<Vec<(usize, Connection<'a>)>>,
-    /// What each of the connections brings together.
+    /// Contact of each connection.
     connected: OnceLock<Vec<Option<RoadContact<'a>>>>,
     contacts: OnceLock<Vec<RoadContact<'a>>>,
-    /// Both ends of every contact, in order, with the contact's place.
+    /// Both ends of every contact, sorted, with the place of the contact.
     by_end: OnceLock<Vec<(RoadEnd, u32)>>,
 }
 
 /// An end of a road.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct RoadEnd {
-    /// The road's place in the map.
+    /// Place of the road in the map.
     pub road: usize,
-    /// Which of its ends.
+    /// The end of the road.
     pub end: ContactPoint,
 }
 
 /// A statement of the file that two road ends touch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RoadContact<'a> {
-    /// One end: the one that bears the link, or the incoming road's.
+    /// One end: the end of the road with the link, or of the incoming road.
     pub from: RoadEnd,
-    /// The other end: the linked road's, the connecting road's.
+    /// The other end: of the linked or connecting road.
     pub to: RoadEnd,
-    /// The element that says so: a road's `<predecessor>` or `<successor>`, or a `<connection>`.
+    /// Element with the statement: `<predecessor>` or `<successor>` of a road, or `<connection>`.
     pub node: Node<'a>,
-    /// The place of the junction when a `<connection>` says so.
+    /// Place of the junction if the statement is a `<connection>`.
     pub junction: Option<usize>,
 }
 
 /// A statement of the file that two lane ends touch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LaneJoint<'a> {
-    /// The lane that bears the link, or the one on the incoming road.
+    /// The lane with the link, or the lane on the incoming road.
     pub from: LaneEnd,
     /// The linked lane.
     pub to: LaneEnd,
-    /// The element that says so: a lane's `<predecessor>` or `<successor>`, or a `<laneLink>`.
+    /// Element with the statement: `<predecessor>` or `<successor>` of a lane, or `<laneLink>`.
     pub node: Node<'a>,
-    /// The place of the junction when a `<laneLink>` says so.
+    /// Place of the junction if the statement is a `<laneLink>`.
     pub junction: Option<usize>,
 }
 
 impl LaneJoint<'_> {
-    /// Whether s runs in opposite directions on both sides: end touches end or start touches
+    /// Checks whether s runs in opposite directions on both sides: end touches end or start touches
     /// start.
     pub fn is_reversed(&self) -> bool {
         self.from.end == self.to.end
     }
 
-    /// Whether both lanes belong to the same road.
+    /// Checks whether both lanes belong to the same road.
     pub fn is_within_road(&self) -> bool {
         let (from, to) = (self.from.lane, self.to.lane);
         from.road == to.road && (from.layer, from.section) != (to.layer, to.section)
@@ -88,13 +88,13 @@ pub struct LaneEnd {
 }
 
 impl<'a> RoadMap<'a> {
-    /// The road at a place of [`RoadMap::roads`].
+    /// Returns the road at a place of [`RoadMap::roads`].
     #[inline]
     pub fn road_at(&self, index: usize) -> Option<&Road<'a>> {
         self.roads().get(index)
     }
 
-    /// All connections of all junctions with their junction's place, in document order.
+    /// Returns all connections with their junctions, in document order.
     pub fn connections(&self) -> impl Iterator<Item = (&Junction<'a>, Connection<'a>)> {
         self.all_connections()
             .iter()
@@ -110,9 +110,9 @@ impl<'a> RoadMap<'a> {
         })
     }
 
-    /// Every statement that two road ends touch: the links of roads to roads by `@contactPoint`,
-    /// and the connections of junctions; in document order. References to roads that do not
-    /// exist and links to places within a road (`@elementS`) are left out.
+    /// Returns every statement that two road ends touch, in document order. Statements are links
+    /// between roads by `@contactPoint` and connections of junctions. References to missing roads
+    /// and links to places within a road (`@elementS`) are left out.
     pub fn road_contacts(&self) -> &[RoadContact<'a>] {
         self.caches.contacts.get_or_init(|| {
             let links = self
@@ -126,7 +126,7 @@ impl<'a> RoadMap<'a> {
         })
     }
 
-    /// What a road's own link says about one of its ends.
+    /// Returns the contact that a road's own link states for one of its ends.
     #[inline]
     pub fn linked_end(&self, road: &Road<'a>, end: ContactPoint) -> Option<RoadContact<'a>> {
         let linked = self.caches.linked.get_or_init(|| {
@@ -159,7 +159,7 @@ impl<'a> RoadMap<'a> {
         })
     }
 
-    /// The road ends that a connection of a common or direct junction brings together.
+    /// Returns the road ends that a connection of a common or direct junction joins.
     pub fn connection_contact(
         &self,
         junction: &Junction<'a>,
@@ -171,7 +171,7 @@ impl<'a> RoadMap<'a> {
             all.map(|(junction, connection)| self.read_contact(junction, connection))
                 .collect()
         });
-        // They stand in document order.
+        // The connections are in document order.
         let place = all.binary_search_by_key(&connection.node(), |(_, one)| one.node());
         match place.ok().and_then(|place| connected.get(place)) {
             Some(known) => *known,
@@ -205,7 +205,7 @@ impl<'a> RoadMap<'a> {
         })
     }
 
-    /// Which ends of a road, start and end, have a junction as their link says.
+    /// Checks for both ends of a road, start and end, whether its link leads to the junction.
     pub fn ends_at(&self, junction: &Junction<'a>, road: &Road<'a>) -> [bool; 2] {
         ContactPoint::BOTH.map(|end| {
             let link = road.link(end);
@@ -213,9 +213,9 @@ impl<'a> RoadMap<'a> {
         })
     }
 
-    /// The end of the incoming road at which a junction lies. It follows from the incoming
-    /// road's own links; where both its ends meet the junction, from the target road's link back,
-    /// else from what lies nearer. Virtual junctions touch their main road somewhere within.
+    /// Returns the junction's end of the incoming road. Its own links decide if exactly one end
+    /// leads there. Otherwise the target road's link back decides. If that is missing and both ends
+    /// lead there, the nearer end counts. Virtual junctions touch their main road between its ends.
     pub fn incoming_end(
         &self,
         junction: &Junction<'a>,
@@ -242,8 +242,8 @@ impl<'a> RoadMap<'a> {
         }
     }
 
-    /// The road ends that the file says touch an end of a road, without repetition, in document
-    /// order of the statements. Both directions of each statement count.
+    /// Returns the road ends that touch an end of a road, without repetition, in document order of
+    /// the statements. Both directions of each statement count.
     pub fn neighbours(&self, road: &Road<'a>, end: ContactPoint) -> Vec<RoadEnd> {
         let own = RoadEnd {
             road: road.index(),
@@ -261,7 +261,7 @@ impl<'a> RoadMap<'a> {
         others.filter(|other| seen.insert(*other)).collect()
     }
 
-    /// The statements about one road end, from either side, in document order.
+    /// Returns the statements about one road end, from both sides, in document order.
     pub fn contacts_of(&self, own: RoadEnd) -> impl Iterator<Item = &RoadContact<'a>> {
         let contacts = self.road_contacts();
         let by_end = self.caches.by_end.get_or_init(|| {
@@ -280,22 +280,22 @@ impl<'a> RoadMap<'a> {
             .filter_map(|(_, at)| contacts.get(*at as usize))
     }
 
-    /// Every statement that two lane ends touch: links within a road, links across roads, lane
-    /// links of junctions; in document order, lanes first. Found once and kept.
+    /// Returns every statement that two lane ends touch: links within a road, links across roads
+    /// and lane links of junctions. They are in document order, lanes first, and cached.
     ///
-    /// Left out are links to lanes that do not exist, and those whose other side is unknown
-    /// because a road link or a contact point is missing.
+    /// Links to missing lanes are left out. So are links with an unknown other side, because a road
+    /// link or contact point is missing.
     pub fn lane_joints(&self) -> impl Iterator<Item = &LaneJoint<'a>> + Clone {
         let roads = self.roads().iter();
         let of_lanes = roads.flat_map(|road| self.joints_of(road));
         of_lanes.chain(self.junction_joints())
     }
 
-    /// The statements of the lanes of one road; see [`RoadMap::lane_joints`].
+    /// Returns the statements of the lanes of one road; see [`RoadMap::lane_joints`].
     pub fn joints_of<'m>(&'m self, road: &'m Road<'a>) -> &'m [LaneJoint<'a>] {
         road.joints.get_or_init(|| {
             let lanes = || road.sections().flat_map(SectionRef::lanes);
-            // Memory that is taken and not needed costs more than to count.
+            // Counting first is cheaper than allocating unused memory.
             let links = |lane: LaneRef<'_, 'a>| {
                 let ends = ContactPoint::BOTH.map(|end| lane.links(end).count());
                 ends.into_iter().sum::<usize>()
@@ -310,7 +310,7 @@ impl<'a> RoadMap<'a> {
         })
     }
 
-    /// The statements of junctions; see [`RoadMap::lane_joints`].
+    /// Returns the statements of junctions; see [`RoadMap::lane_joints`].
     pub fn junction_joints(&self) -> &[LaneJoint<'a>] {
         self.caches.joints.get_or_init(|| {
             let mut joints = Vec::new();
@@ -346,7 +346,7 @@ impl<'a> RoadMap<'a> {
         }
     }
 
-    /// The lane that a link of `lane` at `end` with this id and layer leads to; see
+    /// Returns the lane that a link of `lane` at `end` with this id and layer leads to; see
     /// [`RoadMap::linked_section`].
     pub fn linked_lane(
         &self,
@@ -362,9 +362,9 @@ impl<'a> RoadMap<'a> {
         })
     }
 
-    /// The section that a link of `lane` at `end` with this layer leads to, and which of its ends
-    /// lies there: the next section of the same road, on the other layer the one that is there, and
-    /// at the end of a road the one of the road that is linked. `id` tells the side.
+    /// Returns the section that a link of `lane` at `end` with this layer leads to, and its
+    /// touching end. This is the next section of the road, or on another layer the section at that
+    /// station. At the end of a road, it is a section of the linked road. `id` selects the side.
     pub fn linked_section<'m>(
         &'m self,
         lane: LaneRef<'m, 'a>,
@@ -380,7 +380,7 @@ impl<'a> RoadMap<'a> {
         {
             return Some((next, end.other()));
         }
-        // Temporary lanes may begin and end anywhere, permanent ones with the road.
+        // Temporary lanes may begin and end anywhere. Permanent lanes begin and end with the road.
         let always = layer == own_layer && layer == LayerKind::Permanent;
         if always || lane.is_at_road_end(end) {
             let to = self.linked_end(lane.at.road, end)?.to;
@@ -395,7 +395,7 @@ impl<'a> RoadMap<'a> {
         Some((other, end.other()))
     }
 
-    /// The lane with an id in the section at an end of a road.
+    /// Returns the lane with this id in the section at an end of a road.
     pub fn lane_at_road_end(&self, at: RoadEnd, id: i64, layer: LayerKind) -> Option<LaneEnd> {
         let road = self.road_at(at.road)?;
         let side = Side::of_lane_id(id).unwrap_or(Side::Right);
@@ -438,7 +438,7 @@ impl<'a> RoadMap<'a> {
     }
 }
 
-/// The section of another layer of the same road that touches an end of a lane.
+/// Returns the section of another layer of the same road that touches an end of a lane.
 fn other_layer<'m, 'a>(
     lane: LaneRef<'m, 'a>,
     end: ContactPoint,
@@ -453,7 +453,7 @@ fn other_layer<'m, 'a>(
     road.layer(layer)?.section_at(road, side, station)
 }
 
-/// The end of the incoming road that lies nearer to the contact point of the target road.
+/// Returns the end of the incoming road that is nearer to the contact point of the target road.
 fn nearer_end(
     incoming: &Road<'_>,
     target: &Road<'_>,

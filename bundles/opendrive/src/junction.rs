@@ -12,7 +12,7 @@ use crate::view::{children, view};
 /// The types of junction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum JunctionType {
-    /// `default`, also what a missing `@type` means: a common junction (12.2).
+    /// `default`, also the meaning of a missing `@type`: a common junction (12.2).
     Common,
     /// `direct` (12.6).
     Direct,
@@ -23,7 +23,7 @@ pub enum JunctionType {
 }
 
 impl JunctionType {
-    /// The standard's word for `@type`.
+    /// Returns the word of the standard for `@type`.
     pub fn as_str(self) -> &'static str {
         match self {
             JunctionType::Common => "default",
@@ -62,58 +62,58 @@ impl<'a> Junction<'a> {
         }
     }
 
-    /// The `<junction>` element.
+    /// Returns the `<junction>` element.
     pub fn node(&self) -> Node<'a> {
         self.node
     }
 
-    /// Its place among the map's junctions.
+    /// Returns the place among the junctions of the map.
     pub fn index(&self) -> usize {
         self.index as usize
     }
 
-    /// `@id`, empty when missing.
+    /// Returns `@id`, or an empty string if it is missing.
     pub fn id(&self) -> &'a str {
         self.id
     }
 
-    /// `@type`; `None` when it is a word that the standard does not know.
+    /// Returns `@type`, or `None` if the standard does not define the word.
     pub fn kind(&self) -> Option<JunctionType> {
         self.kind
     }
 
-    /// `@mainRoad` of a virtual junction.
+    /// Returns `@mainRoad` of a virtual junction.
     pub fn main_road(&self) -> Option<&'a str> {
         self.node.attr("mainRoad")
     }
 
-    /// `@sStart` of a virtual junction, in metres on the main road.
+    /// Returns `@sStart` of a virtual junction, in metres on the main road.
     pub fn s_start(&self) -> Option<f64> {
         number(self.node, "sStart")
     }
 
-    /// `@sEnd` of a virtual junction, in metres on the main road.
+    /// Returns `@sEnd` of a virtual junction, in metres on the main road.
     pub fn s_end(&self) -> Option<f64> {
         number(self.node, "sEnd")
     }
 
-    /// `@orientation` of a virtual junction: `+`, `-` or `none`.
+    /// Returns `@orientation` of a virtual junction: `+`, `-` or `none`.
     pub fn orientation(&self) -> Option<&'a str> {
         self.node.attr("orientation")
     }
 
-    /// The junction reference line (12.9), empty without `<planView>`.
+    /// Returns the junction reference line (12.9). It is empty without `<planView>`.
     pub fn plan_view(&self) -> &PlanView<'a> {
         self.plan_view
             .get_or_init(|| PlanView::read(self.node.child("planView")))
     }
 
-    /// The `<boundary>` (12.10).
+    /// Returns the `<boundary>` (12.10).
     pub fn boundary(&self) -> Option<Boundary<'a>> {
         self.node.child("boundary").map(Boundary::of)
     }
 
-    /// The first `<elevationGrid>` (12.11).
+    /// Returns the first `<elevationGrid>` (12.11).
     pub fn elevation_grid(&self) -> Option<ElevationGrid<'a>> {
         self.elevation_grids().next()
     }
@@ -129,7 +129,7 @@ impl<'a> Junction<'a> {
         cross_paths: CrossPath "crossPath",
         /// The road sections of a crossing (12.8).
         road_sections: RoadSection "roadSection",
-        /// All elevation grids; the standard allows one.
+        /// All elevation grids. The standard allows one.
         elevation_grids: ElevationGrid "elevationGrid",
     }
 }
@@ -143,9 +143,9 @@ view! {
         kind: text "type",
         /// `@incomingRoad`.
         incoming_road: text "incomingRoad",
-        /// `@connectingRoad`, in all but direct junctions.
+        /// `@connectingRoad`, for all junctions except direct ones.
         connecting_road: text "connectingRoad",
-        /// `@linkedRoad`, in direct junctions.
+        /// `@linkedRoad`, for direct junctions.
         linked_road: text "linkedRoad",
         /// `@contactPoint`: the end of the connecting or linked road.
         contact_point: contact "contactPoint",
@@ -153,17 +153,17 @@ view! {
 }
 
 impl<'a> Connection<'a> {
-    /// Whether it is a virtual connection (12.7).
+    /// Checks whether this is a virtual connection (12.7).
     pub fn is_virtual(&self) -> bool {
         self.kind() == Some("virtual")
     }
 
-    /// The road that the incoming road leads to: the connecting one, else the linked one.
+    /// Returns the road that the incoming road leads to: the connecting road, else the linked road.
     pub fn target_road(&self) -> Option<&'a str> {
         self.connecting_road().or(self.linked_road())
     }
 
-    /// `<predecessor>` or `<successor>` of a virtual connection.
+    /// Returns `<predecessor>` or `<successor>` of a virtual connection.
     pub fn link(&self, end: ContactPoint) -> Option<RoadLink<'a>> {
         self.node.child(end.link_name()).map(RoadLink::of)
     }
@@ -227,7 +227,7 @@ view! {
 }
 
 impl<'a> CrossPath<'a> {
-    /// `<startLaneLink>` or `<endLaneLink>`.
+    /// Returns `<startLaneLink>` or `<endLaneLink>`.
     pub fn lane_link(&self, end: ContactPoint) -> Option<CrossPathLaneLink<'a>> {
         let name = match end {
             ContactPoint::Start => "startLaneLink",
@@ -236,7 +236,7 @@ impl<'a> CrossPath<'a> {
         self.node.child(name).map(CrossPathLaneLink::of)
     }
 
-    /// The id of the road that is met at this end of the crossing road.
+    /// Returns the id of the road at this end of the crossing road.
     pub fn road_at(&self, end: ContactPoint) -> Option<&'a str> {
         match end {
             ContactPoint::Start => self.road_at_start(),
@@ -248,11 +248,11 @@ impl<'a> CrossPath<'a> {
 view! {
     /// A `<startLaneLink>` or `<endLaneLink>` of a cross path (12.5).
     CrossPathLaneLink {
-        /// `@from`: a lane of the road that is crossed.
+        /// `@from`: a lane of the crossed road.
         from: integer "from",
         /// `@to`: a lane of the crossing road.
         to: integer "to",
-        /// `@s`: the place on the road that is crossed, in metres.
+        /// `@s`: the place on the crossed road, in metres.
         s: number "s",
     }
 }
@@ -303,7 +303,7 @@ view! {
     }
 }
 
-/// A station of a road given as a number or as one of the road's ends.
+/// A station of a road, given as a number or as one end of the road.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SegmentStation {
     /// A number: s in metres.
@@ -313,12 +313,12 @@ pub enum SegmentStation {
 }
 
 impl<'a> BoundarySegment<'a> {
-    /// `@sStart` of a lane segment; `begin` is an old word for `start`.
+    /// Returns `@sStart` of a lane segment. `begin` is an old word for `start`.
     pub fn s_start(&self) -> Option<SegmentStation> {
         segment_station(self.node.attr("sStart")?)
     }
 
-    /// `@sEnd` of a lane segment.
+    /// Returns `@sEnd` of a lane segment.
     pub fn s_end(&self) -> Option<SegmentStation> {
         segment_station(self.node.attr("sEnd")?)
     }
@@ -339,7 +339,7 @@ view! {
     ElevationGrid {
         /// `@gridSpacing`, in metres.
         grid_spacing: number "gridSpacing",
-        /// `@sStart`: where the first row lies on the junction reference line, in metres.
+        /// `@sStart`: the place of the first row on the junction reference line, in metres.
         s_start: number "sStart",
     }
 }
@@ -364,17 +364,17 @@ view! {
 }
 
 impl GridRow<'_> {
-    /// The height on the reference line, in metres.
+    /// Returns the height on the reference line, in metres.
     pub fn center(&self) -> Option<f64> {
         parse_number(self.center_text()?)
     }
 
-    /// The heights to the left, from inside to outside; `None` when one is broken.
+    /// Returns the heights to the left, from inside to outside, or `None` if one is malformed.
     pub fn left(&self) -> Option<Vec<f64>> {
         heights(self.left_text())
     }
 
-    /// The heights to the right, from inside to outside; `None` when one is broken.
+    /// Returns the heights to the right, from inside to outside, or `None` if one is malformed.
     pub fn right(&self) -> Option<Vec<f64>> {
         heights(self.right_text())
     }

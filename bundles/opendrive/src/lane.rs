@@ -12,7 +12,7 @@ use crate::surface::BorderPoint;
 use crate::value::{ContactPoint, Side, flag, known, numbers, parse_flag, parse_integer};
 use crate::view::view;
 
-/// The part of a lane section in which a lane is written.
+/// The part of a lane section that contains a lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum LaneGroup {
     /// `<left>`
@@ -24,7 +24,7 @@ pub enum LaneGroup {
 }
 
 impl LaneGroup {
-    /// The group that an element stands for.
+    /// Returns the group of an element.
     pub fn of(node: Node<'_>) -> Option<LaneGroup> {
         match node.name() {
             "left" => Some(LaneGroup::Left),
@@ -34,7 +34,7 @@ impl LaneGroup {
         }
     }
 
-    /// The side of the road; `None` for the center.
+    /// Returns the side of the road, or `None` for the center.
     pub fn side(self) -> Option<Side> {
         match self {
             LaneGroup::Left => Some(Side::Left),
@@ -44,36 +44,36 @@ impl LaneGroup {
     }
 }
 
-/// One `<lane>`; its records are read when first asked for.
+/// One `<lane>`. Its records are read on first use.
 #[derive(Debug)]
 pub struct Lane<'a> {
     node: Node<'a>,
     id: Option<i64>,
     group: LaneGroup,
-    /// Its place on its side, counted from the center outward.
+    /// Rank on its side, counted from the center outward.
     rank: u32,
     id_text: Option<&'a str>,
     kind: Option<&'a str>,
     level: Option<bool>,
-    /// Whether it says anything about the direction of traffic: hardly any does.
+    /// Whether the lane has an attribute about the direction of traffic. Few lanes have one.
     has_direction: bool,
     link: Option<Node<'a>>,
-    /// What it is linked to at its start and at its end.
+    /// Links at the start and at the end.
     linked: [Linked<'a>; 2],
-    /// Which elements it has, by [`Name::bit`].
+    /// Set of the child element names, by [`Name::bit`].
     has: u32,
     records: OnceLock<Box<LaneRecords<'a>>>,
-    /// Its borders at the start and at the end, once somebody has asked.
+    /// Borders at the start and at the end, computed on first use.
     borders: [OnceLock<Box<Borders>>; 2],
 }
 
-/// The links of a lane at an end, of which there mostly is one at most.
+/// The links of a lane at an end. Most lanes have at most one.
 #[derive(Debug, Clone, Copy, Default)]
 enum Linked<'a> {
     #[default]
     Nowhere,
     Once(Node<'a>),
-    /// They are looked up when somebody asks.
+    /// Several links, which are looked up on demand.
     Several,
 }
 
@@ -102,7 +102,7 @@ impl<'a> Linked<'a> {
 /// The inner and the outer border of a lane at an end.
 pub(crate) type Borders = [Option<BorderPoint>; 2];
 
-/// The records that give a lane its shape.
+/// The records that define the shape of a lane.
 #[derive(Debug)]
 struct LaneRecords<'a> {
     widths: Profile<'a>,
@@ -152,65 +152,65 @@ impl<'a> Lane<'a> {
         }
     }
 
-    /// The `<lane>` element.
+    /// Returns the `<lane>` element.
     #[inline]
     pub fn node(&self) -> Node<'a> {
         self.node
     }
 
-    /// `@id`, if it is an integer.
+    /// Returns `@id` if it is an integer.
     #[inline]
     pub fn id(&self) -> Option<i64> {
         self.id
     }
 
-    /// `@id` as written.
+    /// Returns `@id` as written.
     #[inline]
     pub fn id_text(&self) -> Option<&'a str> {
         self.id_text
     }
 
-    /// The group in which it is written, whatever its id says.
+    /// Returns the group that contains the lane, regardless of its id.
     #[inline]
     pub fn group(&self) -> LaneGroup {
         self.group
     }
 
-    /// `@type`.
+    /// Returns `@type`.
     #[inline]
     pub fn kind(&self) -> Option<&'a str> {
         self.kind
     }
 
-    /// `@level`: whether the lane is kept out of the lateral profile; false when missing.
+    /// Returns `@level`: whether the lane is outside of the lateral profile; false when missing.
     #[inline]
     pub fn level(&self) -> Option<bool> {
         self.level
     }
 
-    /// `@direction`: `standard`, `reversed` or `both`.
+    /// Returns `@direction`: `standard`, `reversed` or `both`.
     pub fn direction(&self) -> Option<&'a str> {
         self.has_direction.then(|| self.node.attr("direction"))?
     }
 
-    /// `@dynamicLaneDirection`.
+    /// Returns `@dynamicLaneDirection`.
     pub fn dynamic_direction(&self) -> Option<bool> {
         self.has_direction
             .then(|| flag(self.node, "dynamicLaneDirection"))?
     }
 
-    /// `@advisory`.
+    /// Returns `@advisory`.
     pub fn advisory(&self) -> Option<&'a str> {
         self.node.attr("advisory")
     }
 
-    /// The `<link>` element.
+    /// Returns the `<link>` element.
     #[inline]
     pub fn link_node(&self) -> Option<Node<'a>> {
         self.link
     }
 
-    /// The linked lanes at an end: `<predecessor>` or `<successor>` elements, of any number.
+    /// Returns the links at an end: any number of `<predecessor>` or `<successor>` elements.
     #[inline]
     pub fn links(&self, end: ContactPoint) -> impl Iterator<Item = LaneLink<'a>> + use<'a> {
         let linked = match end {
@@ -239,25 +239,26 @@ impl<'a> Lane<'a> {
         })
     }
 
-    /// The `<width>` records (11.7.1): metres over the distance from the section's start.
+    /// Returns the `<width>` records (11.7.1): metres over the distance from the section's start.
     #[inline]
     pub fn widths(&self) -> &Profile<'a> {
         &self.records().widths
     }
 
-    /// The `<border>` records (11.7.2): t of the outer border.
+    /// Returns the `<border>` records (11.7.2): t of the outer border.
     #[inline]
     pub fn borders(&self) -> &Profile<'a> {
         &self.records().borders
     }
 
-    /// The `<height>` records (11.7.3) in document order.
+    /// Returns the `<height>` records (11.7.3) in document order.
     #[inline]
     pub fn heights(&self) -> &[LaneHeight<'a>] {
         self.records().heights.items()
     }
 
-    /// Records of any name in document order: `roadMark`, `material`, `speed`, `access`, `rule`.
+    /// Returns records by name, in document order: `roadMark`, `material`, `speed`, `access`,
+    /// `rule`.
     pub fn records_named<'s>(
         &self,
         name: &'s str,
@@ -265,7 +266,7 @@ impl<'a> Lane<'a> {
         self.elements(name).map(LaneRecord::of)
     }
 
-    /// The elements of any name directly within it; costs nothing where there are none.
+    /// Returns the child elements of any name. The call is cheap if there are none.
     #[inline]
     pub fn elements<'s>(&self, name: &'s str) -> impl Iterator<Item = Node<'a>> + use<'a, 's> {
         let any = self.has & Name::bit_of(name) != 0;
@@ -273,7 +274,7 @@ impl<'a> Lane<'a> {
         node.flat_map(move |node| node.children_named(name))
     }
 
-    /// Its borders at an end, as `find` finds them when it is asked for the first time.
+    /// Returns the borders at an end. On first use, `find` computes them.
     pub(crate) fn borders_or(&self, end: ContactPoint, find: impl FnOnce() -> Borders) -> &Borders {
         let slot = match end {
             ContactPoint::Start => &self.borders[0],
@@ -282,8 +283,8 @@ impl<'a> Lane<'a> {
         slot.get_or_init(|| Box::new(find()))
     }
 
-    /// How far the height record that is valid at `ds` lifts the lane's borders above the road
-    /// surface, inner and outer, in metres: zero without a record.
+    /// Returns the heights of the inner and outer border above the road surface at `ds`, in metres.
+    /// They come from the valid height record and are zero without a record.
     pub fn lift(&self, ds: impl Into<Station>) -> Option<(f64, f64)> {
         let (heights, ds) = (&self.records().heights, ds.into());
         if heights.silent_at(ds) {
@@ -293,13 +294,13 @@ impl<'a> Lane<'a> {
         Some((record.inner()?, record.outer()?))
     }
 
-    /// The absolute value of its id; lanes without one are farthest out.
+    /// Returns the absolute value of the id. Lanes without an id are farthest out.
     #[inline]
     pub(crate) fn distance(&self) -> u64 {
         self.id.map_or(u64::MAX, i64::unsigned_abs)
     }
 
-    /// Its place on its side, counted from the center outward from zero.
+    /// Returns the rank on its side, counted from the center outward from zero.
     #[inline]
     pub(crate) fn rank(&self) -> u32 {
         self.rank
@@ -330,23 +331,23 @@ impl<'a> LaneHeight<'a> {
         }
     }
 
-    /// The element.
+    /// Returns the element.
     #[inline]
     pub fn node(&self) -> Node<'a> {
         self.node
     }
 
-    /// `@sOffset`, in metres from the section's start.
+    /// Returns `@sOffset`, in metres from the section's start.
     pub fn s_offset(&self) -> Option<f64> {
         known(self.s_offset)
     }
 
-    /// `@inner`: height of the inner border above the road surface, in metres.
+    /// Returns `@inner`: the height of the inner border above the road surface, in metres.
     pub fn inner(&self) -> Option<f64> {
         known(self.inner)
     }
 
-    /// `@outer`: height of the outer border above the road surface, in metres.
+    /// Returns `@outer`: the height of the outer border above the road surface, in metres.
     pub fn outer(&self) -> Option<f64> {
         known(self.outer)
     }

@@ -9,17 +9,17 @@ use crate::section_ref::SectionRef;
 use crate::station::Station;
 use crate::value::{ContactPoint, Side};
 
-/// Where a lane stands in the map: road, layer, section and lane by their places in document
-/// order. [`RoadMap::lane`](crate::RoadMap::lane) leads back to the lane.
+/// Key of a lane in the map: the places of road, layer, section and lane in document order.
+/// [`RoadMap::lane`](crate::RoadMap::lane) returns the lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LaneKey {
-    /// The road's place in the map.
+    /// Place of the road in the map.
     pub road: u32,
-    /// The layer's place in the road.
+    /// Place of the layer in the road.
     pub layer: u32,
-    /// The section's place in the layer.
+    /// Place of the section in the layer.
     pub section: u32,
-    /// The lane's place in the section.
+    /// Place of the lane in the section.
     pub lane: u32,
 }
 
@@ -36,7 +36,7 @@ impl Edge {
     /// Both borders.
     pub const BOTH: [Edge; 2] = [Edge::Inner, Edge::Outer];
 
-    /// The word for it: `inner` or `outer`.
+    /// Returns the word `inner` or `outer`.
     pub fn as_str(self) -> &'static str {
         match self {
             Edge::Inner => "inner",
@@ -45,7 +45,7 @@ impl Edge {
     }
 }
 
-/// A lane together with the section, layer and road that it belongs to.
+/// A lane with its section, layer and road.
 #[derive(Debug, Clone, Copy)]
 pub struct LaneRef<'m, 'a> {
     /// The section.
@@ -71,13 +71,13 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         Some(LaneRef { at, lane, index })
     }
 
-    /// The lane itself.
+    /// Returns the lane itself.
     #[inline]
     pub fn lane(self) -> &'m Lane<'a> {
         self.lane
     }
 
-    /// Its place in the map.
+    /// Returns the key of the lane in the map.
     #[inline]
     pub fn key(self) -> LaneKey {
         let narrow = |index: usize| u32::try_from(index).unwrap_or(u32::MAX);
@@ -89,19 +89,19 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         }
     }
 
-    /// The side on which it is written; `None` for the center lane.
+    /// Returns the side that contains the lane, or `None` for the center lane.
     #[inline]
     pub fn side(self) -> Option<Side> {
         self.lane.group().side()
     }
 
-    /// The length of the section for this lane's side, in metres.
+    /// Returns the length of the section for the side of this lane, in metres.
     #[inline]
     pub fn length(self) -> Option<f64> {
         self.at.length(self.side().unwrap_or(Side::Right))
     }
 
-    /// The station at an end of the section: at its start, or just before its end.
+    /// Returns the station at an end of the section: at its start, or just before its end.
     #[inline]
     pub fn end_station(self, end: ContactPoint) -> Option<Station> {
         match end {
@@ -113,8 +113,8 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         }
     }
 
-    /// The width at `ds` metres from the section's start: from `<width>`, or between two
-    /// `<border>`s where the side has no widths. Negative in faulty files; zero for the center.
+    /// Returns the width at `ds` metres from the section's start: from `<width>`, or from two
+    /// `<border>`s if the side has no widths. Negative in faulty files; zero for the center lane.
     pub fn width(self, ds: impl Into<Station>) -> Option<f64> {
         let ds = ds.into();
         let Some(side) = self.side() else {
@@ -126,26 +126,26 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         finite((self.outer_t(ds)? - self.inner_t(ds)?) * side.sign())
     }
 
-    /// The width at an end of the section.
+    /// Returns the width at an end of the section.
     pub fn width_at(self, end: ContactPoint) -> Option<f64> {
         self.width(self.end_station(end)?)
     }
 
-    /// t of the outer border at `ds`, given t of the inner one.
+    /// Returns t of the outer border at `ds` for a given t of the inner border.
     #[inline]
     pub(crate) fn outer_from(self, by_width: bool, inner: f64, ds: Station) -> Option<f64> {
         let side = self.side()?;
         if by_width {
             finite(inner + side.sign() * self.widths().at(ds)?)
         } else {
-            // 11.7.2: independent of the inner border; and of the lane offset, which is not
-            // allowed beside it.
+            // By 11.7.2, the border is independent of the inner border. It is also independent of
+            // the lane offset, which is not allowed beside it.
             self.borders().at(ds)
         }
     }
 
-    /// t of a border at `ds` metres from the section's start; `None` when a width further in is
-    /// not defined or the ids do not tell the order of the lanes.
+    /// Returns t of a border at `ds` metres from the section's start. Returns `None` if an inner
+    /// width is undefined or the ids do not define the order of the lanes.
     pub fn t(self, edge: Edge, ds: impl Into<Station>) -> Option<f64> {
         let center = |section: SectionRef<'m, 'a>, station| section.center_t(station).map(|t| [t]);
         let [t] = self.sum(
@@ -157,17 +157,17 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         Some(t)
     }
 
-    /// t of the inner border.
+    /// Returns t of the inner border.
     pub fn inner_t(self, ds: impl Into<Station>) -> Option<f64> {
         self.t(Edge::Inner, ds)
     }
 
-    /// t of the outer border.
+    /// Returns t of the outer border.
     pub fn outer_t(self, ds: impl Into<Station>) -> Option<f64> {
         self.t(Edge::Outer, ds)
     }
 
-    /// The slope dt/ds of a border.
+    /// Returns the slope dt/ds of a border.
     pub fn t_slope(self, edge: Edge, ds: impl Into<Station>) -> Option<f64> {
         let part = |profile: &Profile<'a>, station| Some([profile.slope_at(station)?]);
         let [slope] = self.sum(edge, ds.into(), part, |section, station| {
@@ -176,14 +176,14 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         Some(slope)
     }
 
-    /// t of a border and its slope dt/ds.
+    /// Returns t of a border and its slope dt/ds.
     pub(crate) fn t_and_slope(self, edge: Edge, ds: Station) -> Option<[f64; 2]> {
         self.sum(edge, ds, Profile::both_at, |section, station| {
             Some([section.center_t(station)?, section.center_slope(station)?])
         })
     }
 
-    /// Adds up what `part` takes from the profiles from the center to this lane's border.
+    /// Sums up the values of `part` over the profiles from the center to the border of this lane.
     fn sum<const N: usize>(
         self,
         edge: Edge,
@@ -215,13 +215,13 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         sum.iter().all(|value| value.is_finite()).then_some(sum)
     }
 
-    /// The next lane towards the center on the same side; `None` for the innermost one.
+    /// Returns the next lane towards the center on the same side, or `None` for the innermost lane.
     pub fn inner_neighbour(self) -> Option<LaneRef<'m, 'a>> {
         self.at
             .side_lane(self.side()?, self.lane.rank().checked_sub(1)?)
     }
 
-    /// The next lane away from the center on the same side.
+    /// Returns the next lane away from the center on the same side.
     pub fn outer_neighbour(self) -> Option<LaneRef<'m, 'a>> {
         self.at
             .side_lane(self.side()?, self.lane.rank().checked_add(1)?)

@@ -14,7 +14,7 @@ use crate::station::Station;
 use crate::steps::{Starts, Steps};
 use crate::value::{ContactPoint, LayerKind, Side, flag, known, layer, number};
 
-/// One `<lanes>` element: until 1.8 a road has one, since 1.9 a temporary one may lie over it.
+/// One `<lanes>` element. Until 1.8 a road has one; since 1.9 a temporary one may lie over it.
 #[derive(Debug)]
 pub struct LaneLayer<'a> {
     node: Node<'a>,
@@ -22,7 +22,7 @@ pub struct LaneLayer<'a> {
     kind: LayerKind,
     offset: Profile<'a>,
     steps: Steps<LaneSection<'a>>,
-    /// The first and the last section, each for the left and the right side.
+    /// The first and the last section, each for the left and right side.
     terminal: [[Option<u32>; 2]; 2],
 }
 
@@ -49,35 +49,35 @@ impl<'a> LaneLayer<'a> {
         }
     }
 
-    /// The `<lanes>` element.
+    /// Returns the `<lanes>` element.
     pub fn node(&self) -> Node<'a> {
         self.node
     }
 
-    /// Its place among the road's layers.
+    /// Returns the place among the layers of the road.
     #[inline]
     pub fn index(&self) -> usize {
         self.index as usize
     }
 
-    /// Permanent or temporary.
+    /// Returns the kind of the layer: permanent or temporary.
     #[inline]
     pub fn kind(&self) -> LayerKind {
         self.kind
     }
 
-    /// The lane offset (11.5): t of the center lane over s.
+    /// Returns the lane offset (11.5): t of the center lane over s.
     #[inline]
     pub fn offset(&self) -> &Profile<'a> {
         &self.offset
     }
 
-    /// How many sections there are.
+    /// Returns the number of sections.
     pub fn section_count(&self) -> usize {
         self.steps.items().len()
     }
 
-    /// The sections in document order; `road` is the road that the layer belongs to.
+    /// Returns the sections in document order. `road` is the road of the layer.
     #[inline]
     pub fn sections<'m>(
         &'m self,
@@ -89,14 +89,14 @@ impl<'a> LaneLayer<'a> {
             .map(move |section| SectionRef::new(road, self, section))
     }
 
-    /// The section at a place in document order.
+    /// Returns the section at a place in document order.
     #[inline]
     pub fn section<'m>(&'m self, road: &'m Road<'a>, index: usize) -> Option<SectionRef<'m, 'a>> {
         let section = self.steps.items().get(index)?;
         Some(SectionRef::new(road, self, section))
     }
 
-    /// The sections in ascending order of `@s`; none when one has no `@s`.
+    /// Returns the sections in ascending order of `@s`. Returns none if a section has no `@s`.
     pub fn in_order<'m>(
         &'m self,
         road: &'m Road<'a>,
@@ -106,8 +106,8 @@ impl<'a> LaneLayer<'a> {
             .map(move |section| SectionRef::new(road, self, section))
     }
 
-    /// The section that holds for a side at `s`: the last of those for this side that start at
-    /// or before it, unless it has ended.
+    /// Returns the section that is valid for a side at `s`. This is the last section of the side
+    /// that starts at or before `s`, unless it has ended.
     pub fn section_at<'m>(
         &'m self,
         road: &'m Road<'a>,
@@ -125,7 +125,7 @@ impl<'a> LaneLayer<'a> {
         (!over || at_very_end).then_some(section)
     }
 
-    /// The first or the last section that holds for a side.
+    /// Returns the first or last section that is valid for a side.
     pub fn end_section<'m>(
         &'m self,
         road: &'m Road<'a>,
@@ -146,9 +146,9 @@ impl Starts for LaneSection<'_> {
     }
 }
 
-/// Tells every section, side by side, its neighbours and where it ends: where the next section
-/// takes over, where `@length` is used up (1.9, temporary layer), or where the road ends.
-/// Returns the first and the last section of both sides.
+/// Sets the neighbours and the end of every section, for each side. A section ends where the next
+/// one starts, after `@length` (1.9, temporary layer), or at the end of the road. Returns the first
+/// and last section of both sides.
 fn chain(steps: &mut Steps<LaneSection<'_>>, road_length: f64) -> [[Option<u32>; 2]; 2] {
     let order: Vec<usize> = (0..steps.ranks())
         .filter_map(|rank| steps.index(rank))
@@ -159,7 +159,7 @@ fn chain(steps: &mut Steps<LaneSection<'_>>, road_length: f64) -> [[Option<u32>;
     [[left_first, right_first], [left_last, right_last]]
 }
 
-/// [`chain`] for one side; returns its first and its last section.
+/// Does the work of [`chain`] for one side. Returns the first and last section of the side.
 fn chain_side(
     sections: &mut [LaneSection<'_>],
     order: &[usize],
@@ -193,21 +193,21 @@ pub struct LaneSection<'a> {
     node: Node<'a>,
     index: u32,
     s: f64,
-    /// Where it ends for the left and for the right side; not finite when nobody knows.
+    /// End of the section for the left and right side. Not finite if unknown.
     ends: [f64; 2],
-    /// The sections before and after it, for either side.
+    /// The previous and the next section, for either side.
     previous: [Option<u32>; 2],
     next: [Option<u32>; 2],
-    /// `@length`, infinite when missing.
+    /// `@length`, or infinity if missing.
     own_length: f64,
-    /// Whether it covers the left and the right side.
+    /// Whether the section covers the left and right side.
     sides: [bool; 2],
     lanes: Box<[Lane<'a>]>,
     /// Places in `lanes` from the center outward, left and right.
     outward: [Box<[u32]>; 2],
-    /// Whether the ids of a side tell the order of its lanes.
+    /// Whether the ids of a side define the order of its lanes.
     numbered: [bool; 2],
-    /// Whether a side has `<width>` records; found when first asked.
+    /// Whether a side has `<width>` records, computed on first use.
     widths: OnceLock<[bool; 2]>,
 }
 
@@ -248,48 +248,48 @@ impl<'a> LaneSection<'a> {
         }
     }
 
-    /// The `<laneSection>` element.
+    /// Returns the `<laneSection>` element.
     pub fn node(&self) -> Node<'a> {
         self.node
     }
 
-    /// Its place among the sections of its layer, in document order.
+    /// Returns the place among the sections of the layer, in document order.
     #[inline]
     pub fn index(&self) -> usize {
         self.index as usize
     }
 
-    /// `@s`, in metres.
+    /// Returns `@s`, in metres.
     #[inline]
     pub fn s(&self) -> Option<f64> {
         known(self.s)
     }
 
-    /// `@singleSide`.
+    /// Returns `@singleSide`.
     pub fn single_side(&self) -> Option<bool> {
         flag(self.node, "singleSide")
     }
 
-    /// Whether the section says something about this side: a section for a single side is silent
-    /// about the other.
+    /// Checks whether the section covers this side. A section for a single side does not cover the
+    /// other.
     #[inline]
     pub fn covers(&self, side: Side) -> bool {
         self.sides[slot(side)]
     }
 
-    /// Where the section ends for a side, in metres along s.
+    /// Returns the end of the section for a side, in metres along s.
     #[inline]
     pub fn end(&self, side: Side) -> Option<f64> {
         finite(self.ends[slot(side)])
     }
 
-    /// The length for a side in metres; zero or negative in faulty files.
+    /// Returns the length for a side in metres. It is zero or negative in faulty files.
     #[inline]
     pub fn length(&self, side: Side) -> Option<f64> {
         finite(self.end(side)? - self.s()?)
     }
 
-    /// The length over all sides that it covers: the shorter one if they differ.
+    /// Returns the shortest length of all covered sides.
     pub fn shortest_length(&self) -> Option<f64> {
         let sides = Side::BOTH.into_iter().filter(|side| self.covers(*side));
         let lengths = sides
@@ -298,14 +298,14 @@ impl<'a> LaneSection<'a> {
         lengths.into_iter().reduce(f64::min)
     }
 
-    /// Whether the ids of a side tell the order of its lanes: all are integers of the side's
-    /// sign, none occurs twice, and there are at most 256. Otherwise its borders cannot be evaluated.
+    /// Checks whether the ids of a side define the order of its lanes, so that borders can be
+    /// evaluated. There are at most 256 ids, all unique integers with the sign of the side.
     #[inline]
     pub fn is_numbered(&self, side: Side) -> bool {
         self.numbered[slot(side)]
     }
 
-    /// The section before or after it for a side.
+    /// Returns the previous or next section for a side.
     #[inline]
     pub(crate) fn beside(&self, side: Side, end: ContactPoint) -> Option<u32> {
         match end {
@@ -314,7 +314,7 @@ impl<'a> LaneSection<'a> {
         }
     }
 
-    /// Whether a side has widths, as `any` finds out when it is asked for the first time.
+    /// Checks whether a side has widths. On first use, `any` computes the answer.
     #[inline]
     pub(crate) fn widths_or(&self, side: Side, any: impl Fn(Side) -> bool) -> bool {
         self.widths.get_or_init(|| Side::BOTH.map(any))[slot(side)]
@@ -331,8 +331,8 @@ impl<'a> LaneSection<'a> {
     }
 }
 
-/// More lanes on one side than this are no road any more. Borders add up all widths further in,
-/// so that a limit keeps the work on a hostile file linear.
+/// Maximum number of lanes per side on a real road. A border is the sum of all inner widths. The
+/// limit keeps the work on a hostile file linear.
 const MAX_LANES: usize = 256;
 
 fn slot(side: Side) -> usize {
@@ -342,7 +342,7 @@ fn slot(side: Side) -> usize {
     }
 }
 
-/// The places of a side's lanes from the center outward; every lane learns its rank.
+/// Returns the places of a side's lanes from the center outward and sets the rank of each lane.
 fn outward(lanes: &mut [Lane<'_>], side: Side) -> Vec<u32> {
     let of_side = lanes
         .iter()

@@ -1,4 +1,4 @@
-//! The lateral profile: superelevation, shape, cross section surface (OpenDRIVE 1.9, 10.5.2 to
+//! Lateral profile: superelevation, shape and cross section surface (OpenDRIVE 1.9, 10.5.2 to
 //! 10.5.4).
 
 use qcbus_document::Node;
@@ -9,7 +9,7 @@ use crate::station::Station;
 use crate::strips::CrossSectionSurface;
 use crate::value::number;
 
-/// What `<lateralProfile>` holds.
+/// Content of `<lateralProfile>`.
 #[derive(Debug, Default)]
 pub struct LateralProfile<'a> {
     /// The roll angle over s, in radians (10.5.2).
@@ -34,8 +34,8 @@ impl<'a> LateralProfile<'a> {
         }
     }
 
-    /// The height above the reference plane that shape or cross section surface give at (s, t),
-    /// in metres; zero without either. Combining both is not allowed; then none can be evaluated.
+    /// Returns the height above the reference plane at (s, t), in metres, from shape or cross
+    /// section surface. It is zero without either and undefined with both, which is not allowed.
     pub fn height(&self, s: impl Into<Station>, t: f64) -> Option<f64> {
         let s = s.into();
         match &self.cross_section_surface {
@@ -45,7 +45,7 @@ impl<'a> LateralProfile<'a> {
         }
     }
 
-    /// Whether every point of a cross section lies in one plane.
+    /// Checks whether all points of a cross section lie in one plane.
     pub fn is_flat(&self) -> bool {
         self.shape.is_empty() && self.cross_section_surface.is_none()
     }
@@ -55,7 +55,7 @@ impl<'a> LateralProfile<'a> {
 #[derive(Debug, Default)]
 pub struct Shape<'a> {
     rows: Vec<ShapeRow<'a>>,
-    /// A record has no `@s`: nobody can say to which cross section it belongs.
+    /// Whether a record has no `@s`, so that its cross section is unknown.
     unplaced: bool,
 }
 
@@ -64,7 +64,7 @@ pub struct Shape<'a> {
 pub struct ShapeRow<'a> {
     /// `@s` of the records, in metres.
     pub s: f64,
-    /// Height over t; the records start at their `@t`.
+    /// Height over t. The records start at their `@t`.
     pub profile: Profile<'a>,
 }
 
@@ -89,19 +89,19 @@ impl<'a> Shape<'a> {
         Shape { rows, unplaced }
     }
 
-    /// Whether there is no shape at all.
+    /// Checks whether there is no shape.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty() && !self.unplaced
     }
 
-    /// The cross sections in ascending order of s.
+    /// Returns the cross sections in ascending order of s.
     pub fn rows(&self) -> &[ShapeRow<'a>] {
         &self.rows
     }
 
-    /// The height at (s, t) in metres. Between two cross sections it is interpolated linearly
-    /// along s (10.5.3); the last one goes on to the road's end, and before the first one there
-    /// is none: zero, the default. `None` where a cross section does not reach out to t.
+    /// Returns the height at (s, t) in metres. Between two cross sections, it is interpolated
+    /// linearly along s (10.5.3). The last one continues to the end of the road. Before the first
+    /// one, the height is zero, the default. Returns `None` if a cross section does not reach t.
     pub fn height(&self, s: f64, t: f64) -> Option<f64> {
         if self.unplaced || !s.is_finite() {
             return None;

@@ -1,12 +1,12 @@
 //! The OpenDRIVE model: typed views and geometry over the document image.
 //!
-//! [`RoadMap`] is built once per document and shared by all rules. It holds what every rule asks
-//! for (roads, junctions, an index of ids) and fills in the rest when it is first asked. Views
-//! keep their [`Node`](qcbus_document::Node), so that a finding can always name its exact place.
+//! [`RoadMap`] is built once per document and shared by all rules. It holds the data for all rules
+//! (roads, junctions, an index of ids) and computes the rest on first use. Views keep their
+//! [`Node`](qcbus_document::Node), so a finding can always name its exact place.
 //!
-//! Numbers are `Option<f64>`: `Some` means present, well-formed and finite. Whatever rests on a
-//! missing or broken number cannot be evaluated and is `None`; nothing panics. Section numbers in
-//! this crate are those of ASAM OpenDRIVE 1.9.0.
+//! Numbers are `Option<f64>`: `Some` means present, well-formed and finite. A result that depends
+//! on a missing or malformed number is `None`; no function panics. Section numbers in this crate
+//! refer to ASAM OpenDRIVE 1.9.0.
 
 pub mod geometry;
 

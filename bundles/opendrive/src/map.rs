@@ -15,7 +15,7 @@ use crate::section_ref::SectionRef;
 use crate::signals::{Controller, Signal, VmsGroup};
 use crate::value::{integer, is_user_data};
 
-/// The version that a file says it is written for (`header@revMajor`, `@revMinor`).
+/// The version of a file (`header@revMajor`, `@revMinor`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Version {
     /// `@revMajor`
@@ -25,8 +25,8 @@ pub struct Version {
 }
 
 impl Version {
-    /// The edition of the standard that files of this version follow: 1.8 stands for 1.8.1,
-    /// which has replaced 1.8.0 without a number of its own in the header.
+    /// Returns the edition of the standard for this version. 1.8 stands for 1.8.1, which replaced
+    /// 1.8.0 without a new number in the header.
     pub fn edition(self) -> (u16, u16, u16) {
         let patch = if (self.major, self.minor) == (1, 8) {
             1
@@ -43,14 +43,14 @@ impl std::fmt::Display for Version {
     }
 }
 
-/// A signal with its id and whether it changes.
+/// A signal with its id and whether it is dynamic.
 #[derive(Debug, Clone, Copy)]
 pub struct SignalKey<'a> {
     /// The signal.
     pub signal: Signal<'a>,
-    /// Its `@id`.
+    /// `@id` of the signal.
     pub id: Option<&'a str>,
-    /// Its `@dynamic`.
+    /// `@dynamic` of the signal.
     pub dynamic: Option<bool>,
 }
 
@@ -64,7 +64,7 @@ impl<'a> SignalKey<'a> {
     }
 }
 
-/// An OpenDRIVE file as roads and junctions, built once and shared by all rules.
+/// An OpenDRIVE file with roads and junctions, built once and shared by all rules.
 #[derive(Debug)]
 pub struct RoadMap<'a> {
     root: Option<Node<'a>>,
@@ -82,8 +82,8 @@ pub struct RoadMap<'a> {
 }
 
 impl<'a> RoadMap<'a> {
-    /// Reads the roads and junctions of a document; what is within them is read when first asked
-    /// for. Takes time proportional to the number of their direct children.
+    /// Reads the roads and junctions of a document. Their content is read on first use. The time is
+    /// proportional to the number of their direct children.
     pub fn new(document: Document<'a>) -> RoadMap<'a> {
         let root = document.root();
         let mut roads = Vec::new();
@@ -115,40 +115,40 @@ impl<'a> RoadMap<'a> {
         }
     }
 
-    /// The root element, whatever its name.
+    /// Returns the root element, regardless of its name.
     pub fn root(&self) -> Option<Node<'a>> {
         self.root
     }
 
-    /// The `<header>` element.
+    /// Returns the `<header>` element.
     pub fn header(&self) -> Option<Node<'a>> {
         self.header
     }
 
-    /// The version in the header.
+    /// Returns the version in the header.
     pub fn version(&self) -> Option<Version> {
         self.version
     }
 
-    /// All roads in document order.
+    /// Returns all roads in document order.
     #[inline]
     pub fn roads(&self) -> &[Road<'a>] {
         &self.roads
     }
 
-    /// The first road with this id.
+    /// Returns the first road with this id.
     #[inline]
     pub fn road(&self, id: &str) -> Option<&Road<'a>> {
         self.roads_with_id(id).next()
     }
 
-    /// All roads with this id, in document order; more than one in faulty files.
+    /// Returns all roads with this id, in document order. Only faulty files have more than one.
     pub fn roads_with_id(&self, id: &str) -> impl Iterator<Item = &Road<'a>> {
         let places = self.road_ids.places(id);
         places.filter_map(|place| self.roads.get(place))
     }
 
-    /// The road within which a node lies, the road's own element included.
+    /// Returns the road that contains a node. The node may be the road element itself.
     pub fn road_of(&self, node: Node<'a>) -> Option<&Road<'a>> {
         let after = self.roads.partition_point(|road| road.node() <= node);
         let road = self.roads.get(after.checked_sub(1)?)?;
@@ -156,61 +156,61 @@ impl<'a> RoadMap<'a> {
         inside.then_some(road)
     }
 
-    /// All junctions in document order.
+    /// Returns all junctions in document order.
     #[inline]
     pub fn junctions(&self) -> &[Junction<'a>] {
         &self.junctions
     }
 
-    /// The first junction with this id.
+    /// Returns the first junction with this id.
     #[inline]
     pub fn junction(&self, id: &str) -> Option<&Junction<'a>> {
         self.junctions_with_id(id).next()
     }
 
-    /// All junctions with this id, in document order; more than one in faulty files.
+    /// Returns all junctions with this id, in document order. Only faulty files have more than one.
     pub fn junctions_with_id(&self, id: &str) -> impl Iterator<Item = &Junction<'a>> {
         let places = self.junction_ids.places(id);
         places.filter_map(|place| self.junctions.get(place))
     }
 
-    /// The signal controllers (14.6).
+    /// Returns the signal controllers (14.6).
     pub fn controllers(&self) -> impl Iterator<Item = Controller<'a>> + use<'a> {
         listed(self.root, "controller").map(Controller::of)
     }
 
-    /// The junction groups (12.13).
+    /// Returns the junction groups (12.13).
     pub fn junction_groups(&self) -> impl Iterator<Item = JunctionGroup<'a>> + use<'a> {
         listed(self.root, "junctionGroup").map(JunctionGroup::of)
     }
 
-    /// The stations (15.4).
+    /// Returns the railroad stations (15.4).
     pub fn stations(&self) -> impl Iterator<Item = RailroadStation<'a>> + use<'a> {
         listed(self.root, "station").map(RailroadStation::of)
     }
 
-    /// The groups of boards with variable messages (14.7), within a road's signals or a junction.
+    /// Returns the VMS groups (14.7) within the signals of a road or within a junction.
     pub fn vms_groups(&self) -> impl Iterator<Item = VmsGroup<'a>> + use<'a> {
         let all = self.root.map(|root| root.descendants_named("vmsGroup"));
         let all = all.into_iter().flatten();
         all.filter(|node| !is_user_data(*node)).map(VmsGroup::of)
     }
 
-    /// The objects of all roads with their road, in document order.
+    /// Returns the objects of all roads with their road, in document order.
     pub fn objects(&self) -> impl Iterator<Item = (&Road<'a>, Object<'a>)> {
         self.roads
             .iter()
             .flat_map(|road| road.objects().map(move |object| (road, object)))
     }
 
-    /// The signals of all roads with their road, in document order.
+    /// Returns the signals of all roads with their road, in document order.
     pub fn signals(&self) -> impl Iterator<Item = (&Road<'a>, Signal<'a>)> {
         self.roads
             .iter()
             .flat_map(|road| road.signals().map(move |signal| (road, signal)))
     }
 
-    /// The signals of all roads with what rules about their controllers ask, in document order; read once.
+    /// Returns the signals of all roads for rules about controllers, in document order; cached.
     pub fn signal_keys(&self) -> &[SignalKey<'a>] {
         self.signals.get_or_init(|| {
             let signals = self.signals();
@@ -218,7 +218,7 @@ impl<'a> RoadMap<'a> {
         })
     }
 
-    /// The objects with this id, on roads and junctions, in document order.
+    /// Returns the objects with this id, on roads and junctions, in document order.
     pub fn objects_with_id(&self, id: &str) -> impl Iterator<Item = Object<'a>> {
         let index = self
             .object_ids
@@ -229,7 +229,7 @@ impl<'a> RoadMap<'a> {
             .map(Object::of)
     }
 
-    /// The signals with this id, in document order.
+    /// Returns the signals with this id, in document order.
     pub fn signals_with_id(&self, id: &str) -> impl Iterator<Item = Signal<'a>> {
         let index = self
             .signal_ids
@@ -240,7 +240,7 @@ impl<'a> RoadMap<'a> {
             .map(Signal::of)
     }
 
-    /// The controllers with this id, in document order.
+    /// Returns the controllers with this id, in document order.
     pub fn controllers_with_id(&self, id: &str) -> impl Iterator<Item = Controller<'a>> {
         let index = self
             .controller_ids
@@ -251,7 +251,7 @@ impl<'a> RoadMap<'a> {
             .map(Controller::of)
     }
 
-    /// The index of elements that lie directly within one of `parents`.
+    /// Builds the index of the elements that are direct children of one of `parents`.
     fn index_of(&self, name: &str, parents: &[&str]) -> IdIndex<'a> {
         let elements = self
             .root
@@ -271,7 +271,7 @@ impl<'a> RoadMap<'a> {
         self.root?.document().node(u32::try_from(place).ok()?)
     }
 
-    /// The ids that several roads share, each with its roads in document order.
+    /// Returns the ids that several roads share, each with its roads in document order.
     pub fn shared_road_ids(&self) -> impl Iterator<Item = (&'a str, Vec<&Road<'a>>)> {
         self.road_ids.duplicates().map(|same| {
             let roads = same
@@ -281,19 +281,19 @@ impl<'a> RoadMap<'a> {
         })
     }
 
-    /// The lane sections of all roads and layers, in document order.
+    /// Returns the lane sections of all roads and layers, in document order.
     #[inline]
     pub fn sections(&self) -> impl Iterator<Item = SectionRef<'_, 'a>> {
         self.roads.iter().flat_map(Road::sections)
     }
 
-    /// All lanes in document order.
+    /// Returns all lanes in document order.
     #[inline]
     pub fn lanes(&self) -> impl Iterator<Item = LaneRef<'_, 'a>> {
         self.sections().flat_map(SectionRef::lanes)
     }
 
-    /// The lane at a place in the map.
+    /// Returns the lane with this key.
     #[inline]
     pub fn lane(&self, key: LaneKey) -> Option<LaneRef<'_, 'a>> {
         let road = self.roads.get(key.road as usize)?;

@@ -1,11 +1,11 @@
-//! What the elements of lanes are called, looked up once per document.
+//! Names of the elements of lanes, looked up once per document.
 
 use qcbus_document::{Document, Node};
 
-/// An element name that decides where something belongs.
+/// An element name that the model reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Name {
-    /// Any that is not below.
+    /// Any other name.
     Other,
     Left,
     Center,
@@ -50,18 +50,18 @@ impl Name {
         }
     }
 
-    /// Its place in a set of names.
+    /// Returns the bit of the name in a set of names.
     pub(crate) fn bit(self) -> u32 {
         1 << (self as u32)
     }
 
-    /// The set that has only this name; the one of all others when it is not listed above.
+    /// Returns the set with only this name. All unlisted names share one bit.
     pub(crate) fn bit_of(name: &str) -> u32 {
         Name::of(name).bit()
     }
 }
 
-/// The names of a document by their numbers.
+/// The names of a document, by name number.
 #[derive(Debug)]
 pub(crate) struct Names(Vec<Name>);
 
@@ -70,13 +70,13 @@ impl Names {
         Names(document.names().map(Name::of).collect())
     }
 
-    /// The name of an element.
+    /// Returns the name of an element.
     pub(crate) fn name(&self, node: Node<'_>) -> Name {
         let name = self.0.get(usize::from(node.name_number())).copied();
         name.unwrap_or(Name::Other)
     }
 
-    /// The children of an element that have this name.
+    /// Returns the children of an element with this name.
     pub(crate) fn children<'a>(
         &self,
         node: Node<'a>,

@@ -1,4 +1,4 @@
-//! Objects, tunnels, bridges (OpenDRIVE 1.9, chapter 13).
+//! Objects, tunnels and bridges (OpenDRIVE 1.9, chapter 13).
 
 use qcbus_document::Node;
 
@@ -7,28 +7,28 @@ use crate::road::Road;
 use crate::view::{children, view};
 
 impl<'a> Road<'a> {
-    /// The objects of the road (13.1).
+    /// Returns the objects of the road (13.1).
     pub fn objects(&self) -> impl Iterator<Item = Object<'a>> + use<'a> {
         listed(self.objects_node(), "object").map(Object::of)
     }
 
-    /// The references to objects of other roads (13.10).
+    /// Returns the references to objects of other roads (13.10).
     pub fn object_references(&self) -> impl Iterator<Item = ObjectReference<'a>> + use<'a> {
         listed(self.objects_node(), "objectReference").map(ObjectReference::of)
     }
 
-    /// The tunnels (13.11).
+    /// Returns the tunnels (13.11).
     pub fn tunnels(&self) -> impl Iterator<Item = Structure<'a>> + use<'a> {
         listed(self.objects_node(), "tunnel").map(Structure::of)
     }
 
-    /// The bridges (13.12).
+    /// Returns the bridges (13.12).
     pub fn bridges(&self) -> impl Iterator<Item = Structure<'a>> + use<'a> {
         listed(self.objects_node(), "bridge").map(Structure::of)
     }
 }
 
-/// The children of one name of a list element that may be missing.
+/// Returns the children with a name of a list element, if the list exists.
 pub(crate) fn listed<'a>(
     list: Option<Node<'a>>,
     name: &'static str,
@@ -81,13 +81,13 @@ impl<'a> Object<'a> {
     children! {
         /// The `<repeat>` records (13.4).
         repeats: Repeat "repeat",
-        /// The lanes for which it is valid (13.6).
+        /// The lanes for which the object is valid (13.6).
         validities: Validity "validity",
         /// The materials (13.5).
         materials: ObjectMaterial "material",
     }
 
-    /// The outlines (13.2): within `<outlines>`, or directly within the object as before 1.5.
+    /// Returns the outlines (13.2): in `<outlines>`, or directly in the object as before 1.5.
     pub fn outlines(&self) -> impl Iterator<Item = Outline<'a>> + use<'a> {
         let old = self.node.children_named("outline");
         listed(self.node.child("outlines"), "outline")
@@ -95,27 +95,27 @@ impl<'a> Object<'a> {
             .map(Outline::of)
     }
 
-    /// The polylines of the skeleton (13.3).
+    /// Returns the polylines of the skeleton (13.3).
     pub fn polylines(&self) -> impl Iterator<Item = Polyline<'a>> + use<'a> {
         listed(self.node.child("skeleton"), "polyline").map(Polyline::of)
     }
 
-    /// The markings (13.8).
+    /// Returns the markings (13.8).
     pub fn markings(&self) -> impl Iterator<Item = Marking<'a>> + use<'a> {
         listed(self.node.child("markings"), "marking").map(Marking::of)
     }
 
-    /// The borders (13.9).
+    /// Returns the borders (13.9).
     pub fn borders(&self) -> impl Iterator<Item = ObjectBorder<'a>> + use<'a> {
         listed(self.node.child("borders"), "border").map(ObjectBorder::of)
     }
 
-    /// The CRG records of the object's surface (13.13).
+    /// Returns the CRG records of the object's surface (13.13).
     pub fn crgs(&self) -> impl Iterator<Item = crate::Crg<'a>> + use<'a> {
         listed(self.node.child("surface"), "CRG").map(crate::Crg::of)
     }
 
-    /// The `<parkingSpace>` (13.7).
+    /// Returns the `<parkingSpace>` (13.7).
     pub fn parking_space(&self) -> Option<Node<'a>> {
         self.node.child("parkingSpace")
     }
@@ -124,11 +124,11 @@ impl<'a> Object<'a> {
 view! {
     /// A `<repeat>` of an object (13.4).
     Repeat {
-        /// `@s` where it begins, in metres.
+        /// `@s` of the first instance, in metres.
         s: number "s",
         /// `@length` along the reference line, in metres.
         length: number "length",
-        /// `@distance` between two instances, in metres; zero for a continuous object.
+        /// `@distance` between two instances, in metres. Zero means a continuous object.
         distance: number "distance",
         /// `@tStart`, in metres.
         t_start: number "tStart",
@@ -171,7 +171,7 @@ view! {
 
 impl<'a> Marking<'a> {
     children! {
-        /// The outline points between which it lies.
+        /// The outline points at the ends of the marking.
         corner_references: CornerReference "cornerReference",
     }
 }
@@ -192,7 +192,7 @@ view! {
 
 impl<'a> ObjectBorder<'a> {
     children! {
-        /// The outline points between which it lies.
+        /// The outline points at the ends of the border.
         corner_references: CornerReference "cornerReference",
     }
 }
@@ -239,7 +239,7 @@ view! {
 
 impl<'a> ObjectReference<'a> {
     children! {
-        /// The lanes for which it is valid.
+        /// The lanes for which the reference is valid.
         validities: Validity "validity",
     }
 }
@@ -260,13 +260,13 @@ view! {
 
 impl<'a> Structure<'a> {
     children! {
-        /// The lanes for which it is valid.
+        /// The lanes for which the structure is valid.
         validities: Validity "validity",
     }
 }
 
 view! {
-    /// A `<validity>`: the lanes for which something holds (13.6, 14.2).
+    /// A `<validity>`: the lanes for which an element is valid (13.6, 14.2).
     Validity {
         /// `@fromLane`.
         from_lane: integer "fromLane",

@@ -23,18 +23,18 @@ view! {
 }
 
 impl<'a> Outline<'a> {
-    /// The corners and curves in document order, of whatever sort.
+    /// Returns the corners and curves of all kinds in document order.
     pub fn corners(&self) -> impl Iterator<Item = Corner<'a>> + use<'a> {
         self.node.children().filter_map(Corner::read)
     }
 
-    /// The curves (13.2, since 1.9).
+    /// Returns the curves (13.2, since 1.9).
     pub fn curves(&self) -> impl Iterator<Item = CurveLocal<'a>> + use<'a> {
         self.node.children_named("curveLocal").map(CurveLocal::of)
     }
 }
 
-/// The sorts of point of an outline or a skeleton.
+/// The kinds of points of an outline or a skeleton.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum CornerKind {
     /// `<cornerRoad>`: in s, t and dz.
@@ -48,9 +48,9 @@ pub enum CornerKind {
 /// A `<cornerRoad>`, `<cornerLocal>` or `<curveLocal>` of an outline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Corner<'a> {
-    /// Its sort.
+    /// Kind of the corner.
     pub kind: CornerKind,
-    /// Its coordinates.
+    /// Coordinates of the corner.
     pub point: ObjectPoint<'a>,
 }
 
@@ -68,8 +68,7 @@ impl<'a> Corner<'a> {
 }
 
 view! {
-    /// A corner of an outline or a vertex of a skeleton; which coordinates it has follows from
-    /// the element.
+    /// A corner of an outline or a vertex of a skeleton. The element determines its coordinates.
     ObjectPoint {
         /// `@id`.
         id: text "id",
@@ -85,13 +84,13 @@ view! {
         v: number "v",
         /// `@z` of a local point, in metres.
         z: number "z",
-        /// `@height` of the object there, in metres.
+        /// `@height` of the object at this point, in metres.
         height: number "height",
-        /// `@radius` of the object there, in metres.
+        /// `@radius` of the object at this point, in metres.
         radius: number "radius",
-        /// `@width` of the object there, in metres.
+        /// `@width` of the object at this point, in metres.
         width: number "width",
-        /// `@length` of the object there, or of the curve, in metres.
+        /// `@length` of the object at this point, or of the curve, in metres.
         length: number "length",
         /// `@intersectionPoint`.
         intersection_point: flag "intersectionPoint",
@@ -103,13 +102,13 @@ view! {
     CurveLocal {
         /// `@id`.
         id: text "id",
-        /// `@u` of its start, in metres.
+        /// `@u` of the start, in metres.
         u: number "u",
-        /// `@v` of its start, in metres.
+        /// `@v` of the start, in metres.
         v: number "v",
-        /// `@z` of its start, in metres.
+        /// `@z` of the start, in metres.
         z: number "z",
-        /// `@hdg` of its start in the local system, in radians.
+        /// `@hdg` of the start in the local system, in radians.
         hdg: number "hdg",
         /// `@length`, in metres.
         length: number "length",
@@ -117,14 +116,14 @@ view! {
 }
 
 impl<'a> CurveLocal<'a> {
-    /// The element and kind of its shape.
+    /// Returns the kind and element of the shape.
     pub fn shape(&self) -> Option<(ShapeKind, Node<'a>)> {
         self.node
             .children()
             .find_map(|child| Some((ShapeKind::of(child)?, child)))
     }
 
-    /// Its shape as a curve; `None` when a parameter is missing or broken.
+    /// Returns the shape as a curve, or `None` if a parameter is missing or malformed.
     pub fn curve(&self) -> Option<Curve> {
         let (kind, node) = self.shape()?;
         read_curve(kind, node, self.length().unwrap_or(f64::NAN))

@@ -11,26 +11,26 @@ self_cell!(
     struct Cell {
         owner: Image,
 
-        // What it has found out about itself is behind locks, so that its lifetime cannot be shortened.
+        // The map is invariant in its lifetime, because its caches are behind locks.
         #[not_covariant]
         dependent: RoadMap,
     }
 );
 
-/// A [`RoadMap`] together with the image that it reads: it can be kept for as long as anybody likes,
-/// and what it has once found out about its roads it need not find out again.
+/// A [`RoadMap`] together with its image. It can be kept for any time, so its cached data about
+/// roads is computed only once.
 pub struct OwnedMap(Cell);
 
 impl OwnedMap {
-    /// The map of an image.
+    /// Builds the map of an image.
     ///
     /// # Errors
-    /// When the bytes are no image.
+    /// If the bytes are not a valid image.
     pub fn of(image: Image) -> Result<OwnedMap, ImageError> {
         Cell::try_new(image, |image| image.document().map(RoadMap::new)).map(OwnedMap)
     }
 
-    /// Looks at the map. What borrows from it stays inside.
+    /// Calls a function with the map. Borrowed data cannot leave the call.
     pub fn with<T>(&self, look: impl for<'a> FnOnce(&RoadMap<'a>) -> T) -> T {
         self.0.with_dependent(|_, map| look(map))
     }

@@ -1,4 +1,4 @@
-//! A few roads of a map at a time.
+//! Parts of a map with a few roads each.
 
 use std::ops::Range;
 
@@ -10,20 +10,20 @@ use crate::road::Road;
 use crate::section_ref::SectionRef;
 use crate::touching::TouchingLanes;
 
-/// How many bytes of the file a part holds, if it has more than one road: so many that the image
-/// and the model of them stay in a processor's second cache (1 MiB and less) while rules look at
-/// them one after the other. Of 32 KiB to 1 MiB this was the quickest; in builds with debug
-/// assertions every road is a part of its own, so that tests notice what a rule overlooks.
+/// Minimum size of a part in bytes of the file, if roads remain. Image and model of a part stay in
+/// the second-level cache (1 MiB and less) while several rules read them. Of 32 KiB to 1 MiB, this
+/// was the fastest. In builds with debug assertions, every road is its own part. Tests then find
+/// rules that do not look beyond their part.
 const PART: u32 = if cfg!(debug_assertions) {
     1
 } else {
     128 * 1024
 };
 
-/// Some roads that follow each other in a map.
+/// Some consecutive roads of a map.
 ///
-/// What lies in them goes by the names that it has in [`RoadMap`]; what they refer to is found in
-/// the whole [`map`](MapPart::map).
+/// Elements in the part have the same keys as in [`RoadMap`]. Referenced elements are found in the
+/// whole [`map`](MapPart::map).
 #[derive(Debug, Clone, Copy)]
 pub struct MapPart<'m, 'a> {
     map: &'m RoadMap<'a>,
@@ -31,7 +31,7 @@ pub struct MapPart<'m, 'a> {
 }
 
 impl<'a> RoadMap<'a> {
-    /// The places of all roads, in parts of a size that is quick to go through several times.
+    /// Returns the places of all roads, in parts of a size that is fast for several passes.
     pub fn parts(&self) -> impl Iterator<Item = Range<usize>> {
         let mut next = 0;
         std::iter::from_fn(move || {
@@ -45,7 +45,7 @@ impl<'a> RoadMap<'a> {
         })
     }
 
-    /// The roads at these places.
+    /// Returns the roads at these places.
     #[inline]
     pub fn part(&self, places: &Range<usize>) -> MapPart<'_, 'a> {
         let roads = self.roads().get(places.clone()).unwrap_or(&[]);
@@ -54,32 +54,32 @@ impl<'a> RoadMap<'a> {
 }
 
 impl<'m, 'a> MapPart<'m, 'a> {
-    /// The map that it is a part of.
+    /// Returns the whole map.
     #[inline]
     pub fn map(self) -> &'m RoadMap<'a> {
         self.map
     }
 
-    /// The roads in document order.
+    /// Returns the roads in document order.
     #[inline]
     pub fn roads(self) -> &'m [Road<'a>] {
         self.roads
     }
 
-    /// The lane sections of these roads, in document order.
+    /// Returns the lane sections of these roads, in document order.
     #[inline]
     pub fn sections(self) -> impl Iterator<Item = SectionRef<'m, 'a>> {
         self.roads.iter().flat_map(Road::sections)
     }
 
-    /// The lanes of these roads, in document order.
+    /// Returns the lanes of these roads, in document order.
     #[inline]
     pub fn lanes(self) -> impl Iterator<Item = LaneRef<'m, 'a>> {
         self.sections().flat_map(SectionRef::lanes)
     }
 
-    /// What the lanes of these roads say about which lanes touch; with the last part also what
-    /// junctions say. See [`RoadMap::lane_joints`].
+    /// Returns the joints that the lanes of these roads state. The last part also returns the
+    /// joints of junctions. See [`RoadMap::lane_joints`].
     pub fn lane_joints(self) -> impl Iterator<Item = &'m LaneJoint<'a>> {
         let of_lanes = self
             .roads
@@ -89,8 +89,8 @@ impl<'m, 'a> MapPart<'m, 'a> {
         of_lanes.chain(last.into_iter().flatten())
     }
 
-    /// The pairs of lanes that touch as these roads say; with the last part also those that only
-    /// junctions name. See [`RoadMap::touching_lanes`].
+    /// Returns the pairs of touching lanes that these roads state. The last part also returns the
+    /// pairs that only junctions state. See [`RoadMap::touching_lanes`].
     pub fn touching_lanes(self) -> impl Iterator<Item = &'m TouchingLanes<'a>> {
         let by_lanes = self
             .roads
@@ -105,7 +105,7 @@ impl<'m, 'a> MapPart<'m, 'a> {
         self.roads.last().is_some_and(last)
     }
 
-    /// The objects of these roads with their road, in document order.
+    /// Returns the objects of these roads with their road, in document order.
     pub fn objects(self) -> impl Iterator<Item = (&'m Road<'a>, Object<'a>)> {
         let of = |road: &'m Road<'a>| road.objects().map(move |object| (road, object));
         self.roads.iter().flat_map(of)

@@ -7,7 +7,7 @@ use crate::station::Station;
 use crate::steps::{Starts, Steps};
 use crate::value::{known, numbers};
 
-/// How far beyond the ends, in metres, a place still counts as on the road.
+/// Maximum distance beyond the ends, in metres, at which a place still counts as on the road.
 pub(crate) const END_TOLERANCE: f64 = 1e-6;
 
 /// The kinds of shape that a `<geometry>` may have.
@@ -26,7 +26,7 @@ pub enum ShapeKind {
 }
 
 impl ShapeKind {
-    /// The kind of shape that an element stands for.
+    /// Returns the kind of shape of an element.
     pub fn of(node: Node<'_>) -> Option<ShapeKind> {
         match node.name() {
             "line" => Some(ShapeKind::Line),
@@ -38,7 +38,7 @@ impl ShapeKind {
         }
     }
 
-    /// The element's name.
+    /// Returns the name of the element.
     pub fn as_str(self) -> &'static str {
         match self {
             ShapeKind::Line => "line",
@@ -81,54 +81,54 @@ impl<'a> Geometry<'a> {
         }
     }
 
-    /// The `<geometry>` element.
+    /// Returns the `<geometry>` element.
     pub fn node(&self) -> Node<'a> {
         self.node
     }
 
-    /// `@s`, in metres.
+    /// Returns `@s`, in metres.
     pub fn s(&self) -> Option<f64> {
         known(self.s)
     }
 
-    /// `@length`, in metres.
+    /// Returns `@length`, in metres.
     pub fn length(&self) -> Option<f64> {
         known(self.length)
     }
 
-    /// `@hdg`, in radians.
+    /// Returns `@hdg`, in radians.
     pub fn hdg(&self) -> Option<f64> {
         known(self.hdg)
     }
 
-    /// `@x` and `@y`, in metres.
+    /// Returns `@x` and `@y`, in metres.
     pub fn origin(&self) -> Option<Point> {
         Point::finite(self.x, self.y)
     }
 
-    /// The kind of the first shape.
+    /// Returns the kind of the first shape.
     pub fn kind(&self) -> Option<ShapeKind> {
         self.shape.map(|(kind, _)| kind)
     }
 
-    /// The element of the first shape.
+    /// Returns the element of the first shape.
     pub fn shape_node(&self) -> Option<Node<'a>> {
         self.shape.map(|(_, node)| node)
     }
 
-    /// All shapes within it; the standard allows exactly one.
+    /// Returns all shapes of the geometry. The standard allows exactly one.
     pub fn shapes(&self) -> impl Iterator<Item = Node<'a>> + use<'a> {
         self.node
             .children()
             .filter(|child| ShapeKind::of(*child).is_some())
     }
 
-    /// The shape as a curve; `None` when a parameter is missing, broken or degenerate.
+    /// Returns the shape as a curve, or `None` if a parameter is missing, malformed or degenerate.
     pub fn curve(&self) -> Option<Curve> {
         self.curve
     }
 
-    /// The parametric curve, if that is its shape.
+    /// Returns the parametric curve, if that is the shape.
     pub fn param_poly3(&self) -> Option<ParamPoly3> {
         match self.curve? {
             Curve::ParamPoly3(curve) => Some(curve),
@@ -136,8 +136,8 @@ impl<'a> Geometry<'a> {
         }
     }
 
-    /// The curve in the plan view; `None` when place, heading or curve are missing, or the
-    /// length is negative.
+    /// Returns the curve in the plan view. Returns `None` if place, heading or curve are missing,
+    /// or the length is negative.
     pub fn placed(&self) -> Option<Placed> {
         if self.length.is_nan() || self.length < 0.0 {
             return None;
@@ -150,40 +150,40 @@ impl<'a> Geometry<'a> {
         })
     }
 
-    /// The pose `ds` metres after the start.
+    /// Returns the pose `ds` metres after the start.
     pub fn pose(&self, ds: f64) -> Option<Pose> {
         self.placed()?.pose(ds)
     }
 
-    /// The pose where the curve begins; differs from `@x`, `@y`, `@hdg` when a polynomial has
-    /// coefficients a or b that move or turn it.
+    /// Returns the pose at the start of the curve. It differs from `@x`, `@y`, `@hdg` if
+    /// coefficients a or b of a polynomial move or turn it.
     pub fn start(&self) -> Option<Pose> {
         self.pose(0.0)
     }
 
-    /// The pose where the curve ends, after `@length` metres (at the last parameter of a
-    /// parametric curve).
+    /// Returns the pose at the end of the curve, after `@length` metres. For a parametric curve,
+    /// this is the pose at the last parameter.
     pub fn end(&self) -> Option<Pose> {
         self.pose(self.length)
     }
 
-    /// The place where the curve begins; defined even where it has no direction.
+    /// Returns the start point of the curve. It is defined even where the curve has no direction.
     pub fn start_point(&self) -> Option<Point> {
         self.placed()?.point(0.0)
     }
 
-    /// The place where the curve ends; defined even where it has no direction.
+    /// Returns the end point of the curve. It is defined even where the curve has no direction.
     pub fn end_point(&self) -> Option<Point> {
         self.placed()?.point(self.length)
     }
 
-    /// The true length of the curve in metres; see [`Curve::true_length`].
+    /// Returns the true length of the curve in metres; see [`Curve::true_length`].
     pub fn true_length(&self) -> Option<f64> {
         self.curve?.true_length(self.length()?)
     }
 }
 
-/// Reads the parameters of a shape. `length` is the geometry's.
+/// Reads the parameters of a shape. `length` is the length of the geometry.
 pub(crate) fn read_curve(kind: ShapeKind, node: Node<'_>, length: f64) -> Option<Curve> {
     let all = |values: &[f64]| values.iter().all(|value| value.is_finite());
     match kind {
@@ -219,7 +219,7 @@ fn read_param_poly3(node: Node<'_>) -> Option<ParamPoly3> {
     })
 }
 
-/// `@pRange`; where it is missing, as 1.4 allowed, the parameter is normalized.
+/// Reads `@pRange`. If it is missing, as 1.4 allowed, the parameter is normalized.
 fn read_range(node: Node<'_>) -> Option<ParamRange> {
     match node.attr("pRange") {
         Some("arcLength") => Some(ParamRange::ArcLength),
@@ -234,8 +234,8 @@ impl Starts for Geometry<'_> {
     }
 }
 
-/// The reference line of a road or of a junction. When a geometry has no `@s`, nobody can say
-/// which one holds where: then it cannot be evaluated.
+/// The reference line of a road or a junction. If a geometry has no `@s`, the order of the
+/// geometries is unknown. The line then cannot be evaluated.
 #[derive(Debug, Clone, Default)]
 pub struct PlanView<'a> {
     steps: Steps<Geometry<'a>>,
@@ -246,7 +246,7 @@ pub struct PlanView<'a> {
 pub struct Located<'p, 'a> {
     /// The geometry on which the place lies.
     pub geometry: &'p Geometry<'a>,
-    /// Its place among the geometries, in document order.
+    /// Place of the geometry among the geometries, in document order.
     pub index: usize,
     /// Distance from the geometry's start, in metres.
     pub ds: f64,
@@ -265,24 +265,24 @@ impl<'a> PlanView<'a> {
         }
     }
 
-    /// The geometries in document order.
+    /// Returns the geometries in document order.
     pub fn geometries(&self) -> &[Geometry<'a>] {
         self.steps.items()
     }
 
-    /// The geometries in ascending order of `@s`.
+    /// Returns the geometries in ascending order of `@s`.
     pub fn in_order(&self) -> impl DoubleEndedIterator<Item = &Geometry<'a>> {
         self.steps.in_order()
     }
 
-    /// Where the last geometry ends, in metres along s: `@s + @length`.
+    /// Returns the end of the last geometry, in metres along s: `@s + @length`.
     pub fn end(&self) -> Option<f64> {
         let last = self.in_order().next_back()?;
         crate::geometry::finite(last.s()? + last.length()?)
     }
 
-    /// The geometry on which `s` lies: the last that starts at or before it. `None` before the
-    /// first one; beyond the last one's end that one goes on.
+    /// Returns the geometry at `s`: the last one that starts at or before it. Returns `None` before
+    /// the first geometry. The last geometry continues beyond its end.
     pub fn locate(&self, s: impl Into<Station>) -> Option<Located<'_, 'a>> {
         let station = s.into();
         let near_start = |first: &&Geometry<'a>| first.s - station.x() <= END_TOLERANCE;
@@ -302,18 +302,18 @@ impl<'a> PlanView<'a> {
         })
     }
 
-    /// The pose at `s`, on the geometry that [`locate`](PlanView::locate) finds.
+    /// Returns the pose at `s`, on the geometry that [`locate`](PlanView::locate) finds.
     pub fn pose(&self, s: impl Into<Station>) -> Option<Pose> {
         let located = self.locate(s)?;
         located.geometry.pose(located.ds)
     }
 
-    /// The pose at the start of the first geometry.
+    /// Returns the pose at the start of the first geometry.
     pub fn first(&self) -> Option<Pose> {
         self.in_order().next()?.start()
     }
 
-    /// The pose at the end of the last geometry.
+    /// Returns the pose at the end of the last geometry.
     pub fn last(&self) -> Option<Pose> {
         self.in_order().next_back()?.end()
     }

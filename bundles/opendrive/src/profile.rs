@@ -1,5 +1,5 @@
-//! Piecewise cubic profiles along s, t or a section: elevation, superelevation, lane offset,
-//! width, border, the coefficients of a cross section surface.
+//! Piecewise cubic profiles along s, t or a section: elevation, superelevation, lane offset, width,
+//! border and the coefficients of a cross section surface.
 
 use qcbus_document::Node;
 
@@ -23,7 +23,7 @@ impl<'a> Record<'a> {
         Record { node, start, cubic }
     }
 
-    /// As [`Record::read`], where an absent coefficient (not a broken one) means zero.
+    /// Reads like [`Record::read`], but an absent coefficient (not a malformed one) is zero.
     fn read_sparse(node: Node<'a>, start: &str) -> Record<'a> {
         let mut record = Record::read(node, start);
         let Cubic { a, b, c, d } = &mut record.cubic;
@@ -35,19 +35,19 @@ impl<'a> Record<'a> {
         record
     }
 
-    /// The element.
+    /// Returns the element.
     #[inline]
     pub fn node(&self) -> Node<'a> {
         self.node
     }
 
-    /// Where the record starts: `@s` of the road, `@sOffset` in the section.
+    /// Returns the start of the record: `@s` on the road, `@sOffset` in the section.
     #[inline]
     pub fn start(&self) -> Option<f64> {
         known(self.start)
     }
 
-    /// The polynomial, if all four coefficients are there.
+    /// Returns the polynomial if all four coefficients exist.
     #[inline]
     pub fn cubic(&self) -> Option<Cubic> {
         let Cubic { a, b, c, d } = self.cubic;
@@ -57,7 +57,7 @@ impl<'a> Record<'a> {
             .then_some(self.cubic)
     }
 
-    /// The value at `x`, measured like the record's start.
+    /// Returns the value at `x`, which has the same origin as the record's start.
     #[inline]
     pub fn at(&self, x: f64) -> Option<f64> {
         self.cubic()?.eval(x - self.start()?)
@@ -77,58 +77,58 @@ pub struct Profile<'a> {
     steps: Steps<Record<'a>>,
 }
 
-/// The record that is valid at some station, and the way from its start.
+/// The record that is valid at a station, with the distance from its start.
 #[derive(Debug, Clone, Copy)]
 pub struct Valid<'p, 'a> {
     /// The record.
     pub record: &'p Record<'a>,
     /// Distance from the record's start, never negative.
     pub ds: f64,
-    /// Its polynomial.
+    /// Polynomial of the record.
     pub cubic: Cubic,
 }
 
 impl<'a> Profile<'a> {
-    /// The profile made of these elements, whose start is in the attribute `start`.
+    /// Reads the profile from these elements. The attribute `start` contains their starts.
     pub fn read(nodes: impl Iterator<Item = Node<'a>>, start: &str) -> Profile<'a> {
         let records = nodes.map(|node| Record::read(node, start)).collect();
         let steps = Steps::new(records);
         Profile { steps }
     }
 
-    /// As [`Profile::read`], for elements whose absent coefficients are zero.
+    /// Reads a profile like [`Profile::read`], but absent coefficients are zero.
     pub fn read_sparse(nodes: impl Iterator<Item = Node<'a>>, start: &str) -> Profile<'a> {
         let records = nodes.map(|node| Record::read_sparse(node, start)).collect();
         let steps = Steps::new(records);
         Profile { steps }
     }
 
-    /// The records in document order.
+    /// Returns the records in document order.
     #[inline]
     pub fn records(&self) -> &[Record<'a>] {
         self.steps.items()
     }
 
-    /// Whether there is no record.
+    /// Checks whether there are no records.
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.records().is_empty()
     }
 
-    /// The records in ascending order of start (those with equal starts as written); none when a
-    /// record's start is unknown.
+    /// Returns the records in ascending order of start. Records with equal starts keep their order.
+    /// Returns none if the start of a record is unknown.
     #[inline]
     pub fn in_order(&self) -> impl DoubleEndedIterator<Item = &Record<'a>> {
         self.steps.in_order()
     }
 
-    /// The first station where a value is defined.
+    /// Returns the first station with a value.
     pub fn begin(&self) -> Option<f64> {
         self.in_order().next()?.start()
     }
 
-    /// The record that is valid at a station: the last that starts at or before it. `None` before
-    /// the first record, when the valid record is incomplete, or when any start is unknown.
+    /// Returns the valid record at a station: the last one that starts at or before it. Returns
+    /// `None` before the first record, if the record is incomplete, or if any start is unknown.
     #[inline]
     pub fn valid_at(&self, station: impl Into<Station>) -> Option<Valid<'_, 'a>> {
         let station = station.into();
@@ -140,28 +140,28 @@ impl<'a> Profile<'a> {
         })
     }
 
-    /// The value at a station; see [`Profile::valid_at`].
+    /// Returns the value at a station; see [`Profile::valid_at`].
     #[inline]
     pub fn at(&self, station: impl Into<Station>) -> Option<f64> {
         let valid = self.valid_at(station)?;
         valid.cubic.eval(valid.ds)
     }
 
-    /// The slope at a station; see [`Profile::valid_at`].
+    /// Returns the slope at a station; see [`Profile::valid_at`].
     pub fn slope_at(&self, station: impl Into<Station>) -> Option<f64> {
         let valid = self.valid_at(station)?;
         finite(valid.cubic.slope(valid.ds))
     }
 
-    /// The value and the slope at a station; see [`Profile::valid_at`].
+    /// Returns the value and slope at a station; see [`Profile::valid_at`].
     pub(crate) fn both_at(&self, station: Station) -> Option<[f64; 2]> {
         let valid = self.valid_at(station)?;
         let (ds, cubic) = (valid.ds, valid.cubic);
         Some([cubic.eval(ds)?, finite(cubic.slope(ds))?])
     }
 
-    /// The value at a station, and zero where the profile does not say anything: without records
-    /// and before the first one, as for elevation, superelevation and lane offset.
+    /// Returns the value at a station, or zero without records and before the first one. Elevation,
+    /// superelevation and lane offset have this default.
     #[inline]
     pub fn at_or_zero(&self, station: impl Into<Station>) -> Option<f64> {
         let station = station.into();
@@ -172,7 +172,7 @@ impl<'a> Profile<'a> {
         }
     }
 
-    /// The slope at a station, and zero where the profile does not say anything.
+    /// Returns the slope at a station, or zero without records and before the first one.
     pub fn slope_or_zero(&self, station: impl Into<Station>) -> Option<f64> {
         let station = station.into();
         if self.steps.silent_at(station) {
@@ -182,9 +182,9 @@ impl<'a> Profile<'a> {
         }
     }
 
-    /// Each record with the stretch over which it is valid, up to `end`, in ascending order.
-    /// Records that start at or beyond `end` or that the next one replaces at once are left out,
-    /// as are incomplete ones.
+    /// Returns each record with its stretch up to `end`, in ascending order. Incomplete records are
+    /// left out. So are records that start at or beyond `end`, and records with the same start as
+    /// the next one.
     #[inline]
     pub fn stretches(&self, end: f64) -> impl Iterator<Item = Stretch<'_, 'a>> {
         (0..self.steps.ranks()).filter_map(move |rank| {
@@ -204,21 +204,21 @@ impl<'a> Profile<'a> {
     }
 }
 
-/// A record with the stretch over which it is valid.
+/// A record with its stretch of validity.
 #[derive(Debug, Clone, Copy)]
 pub struct Stretch<'p, 'a> {
     /// The record.
     pub record: &'p Record<'a>,
-    /// Where it starts.
+    /// Start of the stretch.
     pub from: f64,
-    /// Where the next record or the end takes over.
+    /// End of the stretch: the start of the next record, or the end.
     pub to: f64,
-    /// Its polynomial, in the distance from `from`.
+    /// Polynomial of the record, in the distance from `from`.
     pub cubic: Cubic,
 }
 
 impl Stretch<'_, '_> {
-    /// The length of the stretch.
+    /// Returns the length of the stretch.
     pub fn length(&self) -> f64 {
         self.to - self.from
     }

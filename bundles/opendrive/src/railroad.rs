@@ -5,12 +5,12 @@ use crate::road::Road;
 use crate::view::{children, view};
 
 impl<'a> Road<'a> {
-    /// The switches of a railroad (15.3).
+    /// Returns the switches of a railroad (15.3).
     pub fn switches(&self) -> impl Iterator<Item = Switch<'a>> + use<'a> {
         listed(self.railroad_node(), "switch").map(Switch::of)
     }
 
-    /// The CRG records of the road's surface (10.6).
+    /// Returns the CRG records of the road's surface (10.6).
     pub fn crgs(&self) -> impl Iterator<Item = Crg<'a>> + use<'a> {
         listed(self.surface_node(), "CRG").map(Crg::of)
     }
@@ -29,17 +29,17 @@ view! {
 }
 
 impl<'a> Switch<'a> {
-    /// `<mainTrack>`.
+    /// Returns `<mainTrack>`.
     pub fn main_track(&self) -> Option<Track<'a>> {
         self.node.child("mainTrack").map(Track::of)
     }
 
-    /// `<sideTrack>`.
+    /// Returns `<sideTrack>`.
     pub fn side_track(&self) -> Option<Track<'a>> {
         self.node.child("sideTrack").map(Track::of)
     }
 
-    /// The `@id` of `<partner>`: the switch at the other end of the side track.
+    /// Returns the `@id` of `<partner>`: the switch at the other end of the side track.
     pub fn partner_id(&self) -> Option<&'a str> {
         self.node.child("partner")?.attr("id")
     }
@@ -88,7 +88,7 @@ view! {
 
 impl<'a> Platform<'a> {
     children! {
-        /// The stretches of road beside which it lies.
+        /// The stretches of road beside the platform.
         segments: PlatformSegment "segment",
     }
 }

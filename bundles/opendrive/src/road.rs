@@ -18,16 +18,16 @@ use crate::touching::TouchingLanes;
 use crate::value::{ContactPoint, LayerKind, known, number};
 use crate::view::view;
 
-/// Which side traffic keeps to (`road@rule`).
+/// Side of the road for traffic (`road@rule`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum TrafficRule {
-    /// Right-hand traffic, also what a missing `@rule` means.
+    /// Right-hand traffic, also the meaning of a missing `@rule`.
     RightHand,
     /// Left-hand traffic.
     LeftHand,
 }
 
-/// One `<road>`: its own attributes at once, everything within it when first asked for.
+/// One `<road>`. Its own attributes are read at once, its content on first use.
 #[derive(Debug)]
 pub struct Road<'a> {
     node: Node<'a>,
@@ -42,14 +42,14 @@ pub struct Road<'a> {
     lateral: OnceLock<LateralProfile<'a>>,
     layers: OnceLock<Box<[LaneLayer<'a>]>>,
     names: Arc<Names>,
-    /// The cross sections at the start and at the end, once somebody has asked.
+    /// Cross sections at the start and at the end, computed on first use.
     end_frames: [OnceLock<Option<Frame>>; 2],
-    /// What the links of its lanes say, and which lanes touch therefore, once somebody has asked.
+    /// Joints from the links of its lanes, then the touching lanes, both computed on first use.
     pub(crate) joints: OnceLock<Box<[LaneJoint<'a>]>>,
     pub(crate) touching: OnceLock<Box<[TouchingLanes<'a>]>>,
 }
 
-/// The elements directly within a road, found in one pass; of several equals the first.
+/// The direct children of a road, found in one pass. The first of several equal ones counts.
 #[derive(Debug, Clone, Copy, Default)]
 struct RoadChildren<'a> {
     link: Option<Node<'a>>,
@@ -108,103 +108,103 @@ impl<'a> Road<'a> {
         }
     }
 
-    /// The `<road>` element.
+    /// Returns the `<road>` element.
     #[inline]
     pub fn node(&self) -> Node<'a> {
         self.node
     }
 
-    /// Its place among the map's roads.
+    /// Returns the place among the roads of the map.
     #[inline]
     pub fn index(&self) -> usize {
         self.index as usize
     }
 
-    /// `@id`, empty when missing.
+    /// Returns `@id`, or an empty string if it is missing.
     #[inline]
     pub fn id(&self) -> &'a str {
         self.id
     }
 
-    /// `@length`, in metres.
+    /// Returns `@length`, in metres.
     #[inline]
     pub fn length(&self) -> Option<f64> {
         known(self.length)
     }
 
-    /// The id of the junction that the road belongs to; `None` when it belongs to none (`-1` or
-    /// no attribute).
+    /// Returns the id of the junction of the road. Returns `None` if it belongs to no junction
+    /// (`-1` or no attribute).
     #[inline]
     pub fn junction(&self) -> Option<&'a str> {
         self.junction.filter(|id| *id != "-1")
     }
 
-    /// `@rule`; `None` when it is a word that the standard does not know.
+    /// Returns `@rule`, or `None` if the standard does not define the word.
     #[inline]
     pub fn traffic_rule(&self) -> Option<TrafficRule> {
         self.rule
     }
 
-    /// The `<link>` element.
+    /// Returns the `<link>` element.
     pub fn link_node(&self) -> Option<Node<'a>> {
         self.children.link
     }
 
-    /// The link at an end: `<predecessor>` at the start, `<successor>` at the end.
+    /// Returns the link at an end: `<predecessor>` at the start, `<successor>` at the end.
     #[inline]
     pub fn link(&self, end: ContactPoint) -> Option<RoadLink<'a>> {
         let node = self.children.link?.child(end.link_name())?;
         Some(RoadLink::of(node))
     }
 
-    /// The `<planView>` element.
+    /// Returns the `<planView>` element.
     pub fn plan_view_node(&self) -> Option<Node<'a>> {
         self.children.plan_view
     }
 
-    /// The `<elevationProfile>` element.
+    /// Returns the `<elevationProfile>` element.
     pub fn elevation_node(&self) -> Option<Node<'a>> {
         self.children.elevation
     }
 
-    /// The `<lateralProfile>` element.
+    /// Returns the `<lateralProfile>` element.
     pub fn lateral_node(&self) -> Option<Node<'a>> {
         self.children.lateral
     }
 
-    /// The `<objects>` element.
+    /// Returns the `<objects>` element.
     pub fn objects_node(&self) -> Option<Node<'a>> {
         self.children.objects
     }
 
-    /// The `<signals>` element.
+    /// Returns the `<signals>` element.
     pub fn signals_node(&self) -> Option<Node<'a>> {
         self.children.signals
     }
 
-    /// The `<surface>` element.
+    /// Returns the `<surface>` element.
     pub fn surface_node(&self) -> Option<Node<'a>> {
         self.children.surface
     }
 
-    /// The `<railroad>` element.
+    /// Returns the `<railroad>` element.
     pub fn railroad_node(&self) -> Option<Node<'a>> {
         self.children.railroad
     }
 
-    /// The `<type>` records.
+    /// Returns the `<type>` records.
     pub fn types(&self) -> impl Iterator<Item = RoadType<'a>> + use<'a> {
         self.node.children_named("type").map(RoadType::of)
     }
 
-    /// The reference line.
+    /// Returns the reference line.
     #[inline]
     pub fn plan_view(&self) -> &PlanView<'a> {
         self.plan_view
             .get_or_init(|| PlanView::read(self.children.plan_view))
     }
 
-    /// The elevation profile (10.5.1): z over s.
+    /// Returns the elevation profile (10.5.1): z over s.
     #[inline]
     pub fn elevation(&self) -> &Profile<'a> {
         self.elevation.get_or_init(|| {
@@ -214,14 +214,14 @@ impl<'a> Road<'a> {
         })
     }
 
-    /// Superelevation, shape and cross section surface (10.5.2 to 10.5.4).
+    /// Returns superelevation, shape and cross section surface (10.5.2 to 10.5.4).
     #[inline]
     pub fn lateral(&self) -> &LateralProfile<'a> {
         self.lateral
             .get_or_init(|| LateralProfile::read(self.children.lateral))
     }
 
-    /// The lane layers, one per `<lanes>` element.
+    /// Returns the lane layers, one per `<lanes>` element.
     #[inline]
     pub fn layers(&self) -> &[LaneLayer<'a>] {
         self.layers.get_or_init(|| {
@@ -232,26 +232,26 @@ impl<'a> Road<'a> {
         })
     }
 
-    /// The first layer of this kind.
+    /// Returns the first layer of this kind.
     #[inline]
     pub fn layer(&self, kind: LayerKind) -> Option<&LaneLayer<'a>> {
         self.layers().iter().find(|layer| layer.kind() == kind)
     }
 
-    /// The permanent lanes.
+    /// Returns the layer of permanent lanes.
     #[inline]
     pub fn permanent(&self) -> Option<&LaneLayer<'a>> {
         self.layer(LayerKind::Permanent)
     }
 
-    /// All lane sections of all layers, in document order.
+    /// Returns all lane sections of all layers, in document order.
     #[inline]
     pub fn sections(&self) -> impl Iterator<Item = SectionRef<'_, 'a>> {
         self.layers().iter().flat_map(|layer| layer.sections(self))
     }
 
-    /// The pose of the reference line at `s`; `None` outside of the road (more than 1 µm before
-    /// the start, or beyond both `@length` and the last geometry's end).
+    /// Returns the pose of the reference line at `s`. Returns `None` outside of the road: more than
+    /// 1 µm before the start, or beyond both `@length` and the last geometry's end.
     pub fn pose(&self, s: impl Into<Station>) -> Option<Pose> {
         let station = s.into();
         let end = match (self.length(), self.plan_view().end()) {
@@ -265,8 +265,8 @@ impl<'a> Road<'a> {
         self.plan_view().pose(station)
     }
 
-    /// The pose of the reference line at one of its ends, in the direction of s: where the first
-    /// geometry starts, where the last one ends.
+    /// Returns the pose of the reference line at one of its ends, in the direction of s. It is the
+    /// start of the first or the end of the last geometry.
     pub fn end_pose(&self, end: ContactPoint) -> Option<Pose> {
         match end {
             ContactPoint::Start => self.plan_view().first(),
@@ -274,7 +274,7 @@ impl<'a> Road<'a> {
         }
     }
 
-    /// The cross section at an end, as `find` finds it when it is asked for the first time.
+    /// Returns the cross section at an end. On first use, `find` computes it.
     pub(crate) fn end_frame_or(
         &self,
         end: ContactPoint,
@@ -287,7 +287,7 @@ impl<'a> Road<'a> {
         *slot.get_or_init(find)
     }
 
-    /// The coordinate of an end: 0 or `@length`.
+    /// Returns the s-coordinate of an end: 0 or `@length`.
     pub fn end_s(&self, end: ContactPoint) -> Option<f64> {
         match end {
             ContactPoint::Start => Some(0.0),
@@ -313,13 +313,13 @@ view! {
 }
 
 impl<'a> RoadLink<'a> {
-    /// The linked road's id, if the link leads to a road.
+    /// Returns the id of the linked road, if the link leads to a road.
     pub fn road_id(&self) -> Option<&'a str> {
         self.element_id()
             .filter(|_| self.element_type() == Some("road"))
     }
 
-    /// The linked junction's id, if the link leads to a junction.
+    /// Returns the id of the linked junction, if the link leads to a junction.
     pub fn junction_id(&self) -> Option<&'a str> {
         self.element_id()
             .filter(|_| self.element_type() == Some("junction"))

@@ -9,7 +9,7 @@ use crate::road::Road;
 use crate::station::Station;
 use crate::value::{ContactPoint, Side};
 
-/// A lane section together with the road and the layer that it belongs to.
+/// A lane section with its road and layer.
 #[derive(Debug, Clone, Copy)]
 pub struct SectionRef<'m, 'a> {
     /// The road.
@@ -42,25 +42,25 @@ impl<'m, 'a> SectionRef<'m, 'a> {
         }
     }
 
-    /// The section itself.
+    /// Returns the section itself.
     #[inline]
     pub fn section(self) -> &'m LaneSection<'a> {
         self.section
     }
 
-    /// The lanes in document order.
+    /// Returns the lanes in document order.
     #[inline]
     pub fn lanes(self) -> impl Iterator<Item = LaneRef<'m, 'a>> {
         (0..self.section.own_lanes().len()).filter_map(move |at| self.lane_at(at))
     }
 
-    /// The lane at a place in document order.
+    /// Returns the lane at a place in document order.
     #[inline]
     pub fn lane_at(self, index: usize) -> Option<LaneRef<'m, 'a>> {
         LaneRef::new(self, index)
     }
 
-    /// The first lane with this id, in whatever group it is written.
+    /// Returns the first lane with this id, in any group.
     pub fn lane(self, id: i64) -> Option<LaneRef<'m, 'a>> {
         let lanes = self.section.own_lanes();
         let distance = id.unsigned_abs();
@@ -78,61 +78,62 @@ impl<'m, 'a> SectionRef<'m, 'a> {
         found.and_then(|at| self.lane_at(at as usize)).or(center)
     }
 
-    /// The lanes of a side, from the center outward.
+    /// Returns the lanes of a side, from the center outward.
     #[inline]
     pub fn side(self, side: Side) -> impl DoubleEndedIterator<Item = LaneRef<'m, 'a>> {
         let places = self.section.outward(side).iter();
         places.filter_map(move |at| self.lane_at(*at as usize))
     }
 
-    /// The lane of a side with this rank, counted from the center outward from zero.
+    /// Returns the lane of a side with this rank, counted from the center outward from zero.
     pub(crate) fn side_lane(self, side: Side, rank: u32) -> Option<LaneRef<'m, 'a>> {
         let place = self.section.outward(side).get(rank as usize)?;
         self.lane_at(*place as usize)
     }
 
-    /// The center lane.
+    /// Returns the center lane.
     pub fn center(self) -> Option<LaneRef<'m, 'a>> {
         self.lanes().find(|lane| lane.group() == LaneGroup::Center)
     }
 
-    /// The next section for a side.
+    /// Returns the next section for a side.
     #[inline]
     pub fn next(self, side: Side) -> Option<SectionRef<'m, 'a>> {
         self.neighbour(side, ContactPoint::End)
     }
 
-    /// The previous section for a side.
+    /// Returns the previous section for a side.
     #[inline]
     pub fn previous(self, side: Side) -> Option<SectionRef<'m, 'a>> {
         self.neighbour(side, ContactPoint::Start)
     }
 
-    /// The section that touches this one at an end, for a side, by order of `@s`.
+    /// Returns the section that touches this one at an end, for a side, by order of `@s`.
     #[inline]
     pub fn neighbour(self, side: Side, end: ContactPoint) -> Option<SectionRef<'m, 'a>> {
         let place = self.section.beside(side, end)?;
         self.layer.section(self.road, place as usize)
     }
 
-    /// t of the center lane at `ds` metres from the section's start: the lane offset (11.5).
+    /// Returns t of the center lane at `ds` metres from the section's start: its offset (11.5).
     #[inline]
     pub fn center_t(self, ds: impl Into<Station>) -> Option<f64> {
         self.layer.offset().at_or_zero(ds.into().shifted(self.s()?))
     }
 
-    /// The slope dt/ds of the center lane at `ds`.
+    /// Returns the slope dt/ds of the center lane at `ds`.
     pub(crate) fn center_slope(self, ds: Station) -> Option<f64> {
         self.layer.offset().slope_or_zero(ds.shifted(self.s()?))
     }
 
-    /// The cross section of a side at `ds` metres from the section's start: each lane with t of
-    /// its inner and its outer border, from the center outward, as far as they are defined.
+    /// Returns the cross section of a side at `ds` metres from the section's start. Each lane has t
+    /// of its inner and outer border. Lanes run from the center outward, as far as they are
+    /// defined.
     pub fn spans(self, side: Side, ds: impl Into<Station>) -> Vec<LaneSpan<'m, 'a>> {
         self.each_span(side, ds).collect()
     }
 
-    /// The same as [`SectionRef::spans`], one after the other.
+    /// Returns the same lanes as [`SectionRef::spans`], one after the other.
     #[inline]
     pub fn each_span(
         self,
@@ -150,7 +151,7 @@ impl<'m, 'a> SectionRef<'m, 'a> {
         })
     }
 
-    /// t of the outermost border of a side at `ds`, the center's where a side has no lanes.
+    /// Returns t of the outermost border of a side at `ds`, or of the center without lanes.
     pub fn edge_t(self, side: Side, ds: impl Into<Station>) -> Option<f64> {
         let ds = ds.into();
         match self.side(side).next_back() {
@@ -159,8 +160,8 @@ impl<'m, 'a> SectionRef<'m, 'a> {
         }
     }
 
-    /// Whether a lane of the side has `<width>` records; then `<border>` records of that side do
-    /// not count (11.7.2).
+    /// Checks whether a lane of the side has `<width>` records. If so, `<border>` records of the
+    /// side do not count (11.7.2).
     pub fn has_widths(self, side: Side) -> bool {
         let any = |side| self.side(side).any(|lane| !lane.widths().is_empty());
         self.section.widths_or(side, any)

@@ -1,4 +1,4 @@
-//! Signals, boards, controllers (OpenDRIVE 1.9, chapter 14).
+//! Signals, boards and controllers (OpenDRIVE 1.9, chapter 14).
 
 use qcbus_document::Node;
 
@@ -7,12 +7,12 @@ use crate::road::Road;
 use crate::view::{children, view};
 
 impl<'a> Road<'a> {
-    /// The signals of the road (14.1).
+    /// Returns the signals of the road (14.1).
     pub fn signals(&self) -> impl Iterator<Item = Signal<'a>> + use<'a> {
         listed(self.signals_node(), "signal").map(Signal::of)
     }
 
-    /// The references to signals of other roads (14.5).
+    /// Returns the references to signals of other roads (14.5).
     pub fn signal_references(&self) -> impl Iterator<Item = SignalReference<'a>> + use<'a> {
         listed(self.signals_node(), "signalReference").map(SignalReference::of)
     }
@@ -58,11 +58,11 @@ view! {
 
 impl<'a> Signal<'a> {
     children! {
-        /// The lanes for which it is valid (14.2).
+        /// The lanes for which the signal is valid (14.2).
         validities: Validity "validity",
-        /// The signals that it controls (14.3).
+        /// The signals that this signal controls (14.3).
         dependencies: SignalDependency "dependency",
-        /// The elements that it is linked with (14.4).
+        /// The elements that the signal is linked with (14.4).
         references: ElementReference "reference",
         /// The boards with fixed signs (14.7).
         static_boards: SignalBoard "staticBoard",
@@ -72,12 +72,12 @@ impl<'a> Signal<'a> {
         multi_boards: SignalBoard "multiBoard",
     }
 
-    /// The `<semantics>` (14.8).
+    /// Returns the `<semantics>` (14.8).
     pub fn semantics(&self) -> Option<Node<'a>> {
         self.node.child("semantics")
     }
 
-    /// `<positionRoad>` or `<positionInertial>` (14.9).
+    /// Returns `<positionRoad>` or `<positionInertial>` (14.9).
     pub fn position_node(&self) -> Option<Node<'a>> {
         let is_position =
             |child: &Node<'a>| child.is("positionRoad") || child.is("positionInertial");
@@ -160,7 +160,7 @@ view! {
 
 impl<'a> SignalReference<'a> {
     children! {
-        /// The lanes for which it is valid.
+        /// The lanes for which the reference is valid.
         validities: Validity "validity",
     }
 }
@@ -214,9 +214,9 @@ view! {
     VmsBoardReference {
         /// `@signalId`.
         signal_id: text "signalId",
-        /// `@vmsIndex`: which board of the signal.
+        /// `@vmsIndex`: the number of the board on the signal.
         vms_index: integer "vmsIndex",
-        /// `@groupIndex`: its place in the group.
+        /// `@groupIndex`: the place of the board in the group.
         group_index: integer "groupIndex",
     }
 }

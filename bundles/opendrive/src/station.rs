@@ -1,11 +1,11 @@
-//! A position along a road, a lane section or across it, and from which side it is looked at.
+//! A position along a road, along a lane section or across it, with the direction of approach.
 
-/// Stations that differ by less than this, in metres, are the same: exporters write `1e-12`
-/// for the start and `24.999999999999996` for 25.
+/// Maximum distance between equal stations, in metres. Exporters write `1e-12` for the start and
+/// `24.999999999999996` for 25.
 const SAME_STATION: f64 = 1e-9;
 
-/// A position along s or t, approached from above (what starts there is already valid) or from
-/// below (what starts there is not valid yet).
+/// A position along s or t, approached from above or from below. From above, elements that start
+/// there are already valid. From below, they are not valid yet.
 ///
 /// A plain number is the usual case: `profile.at(12.5)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,25 +15,25 @@ pub struct Station {
 }
 
 impl Station {
-    /// At `x`: what starts at `x` is valid.
+    /// Returns the station at `x`. Elements that start at `x` are valid.
     #[inline]
     pub fn at(x: f64) -> Station {
         Station { x, below: false }
     }
 
-    /// Just before `x`: what ends at `x` is still valid.
+    /// Returns the station just before `x`. Elements that end at `x` are still valid.
     #[inline]
     pub fn before(x: f64) -> Station {
         Station { x, below: true }
     }
 
-    /// The coordinate.
+    /// Returns the coordinate.
     #[inline]
     pub fn x(self) -> f64 {
         self.x
     }
 
-    /// The same station seen from an origin that lies `by` further back.
+    /// Returns the same station relative to an origin that is `by` further back.
     #[inline]
     pub fn shifted(self, by: f64) -> Station {
         Station {
@@ -42,13 +42,13 @@ impl Station {
         }
     }
 
-    /// Whether something that starts at `start` is valid here.
+    /// Checks whether an element that starts at `start` is valid here.
     #[inline]
     pub fn is_after(self, start: f64) -> bool {
         start <= self.horizon()
     }
 
-    /// Up to which start something is valid here.
+    /// Returns the largest start of an element that is valid here.
     #[inline]
     fn horizon(self) -> f64 {
         if self.below {

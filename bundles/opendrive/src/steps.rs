@@ -1,22 +1,22 @@
-//! Things that are valid from a start up to the next one's start.
+//! Items that are valid from their start to the start of the next item.
 
 use crate::station::Station;
 
-/// Something with a start; NaN when that is missing.
+/// An item with a start. A missing start is NaN.
 pub(crate) trait Starts {
-    /// Where it starts.
+    /// Returns the start of the item.
     fn start(&self) -> f64;
 }
 
-/// Items in document order that are looked up in order of their starts.
+/// Items in document order with a lookup by start.
 #[derive(Debug, Clone)]
 pub(crate) struct Steps<T> {
     items: Box<[T]>,
-    /// Places in `items` in ascending order of start; empty when they are written so.
+    /// Places in `items` in ascending order of start. Empty if the items are already sorted.
     order: Vec<u32>,
-    /// Where the items start, but for rounding; empty when `order` is.
+    /// Starts of the items, corrected for rounding. Empty if `order` is empty.
     starts: Vec<f64>,
-    /// An item has no start: nobody can say where which item is valid.
+    /// Whether an item has no start, so that the valid items are unknown.
     unplaced: bool,
 }
 
@@ -31,11 +31,11 @@ impl<T> Default for Steps<T> {
     }
 }
 
-/// How far before its forerunner, in metres, an item may start and still count as one that starts at the
-/// same place: who rounds differently at two places means one, and of those the item listed later counts.
+/// Tolerance in metres for an item that starts before the item listed ahead. Both count as starting
+/// at the same place, because of different rounding. The item listed later is valid.
 const ROUNDING: f64 = 1e-6;
 
-/// Starts in ascending order, those as equal that are no farther than rounding before the one listed ahead.
+/// Returns the starts. A start slightly before the previous one becomes equal to that one.
 fn rounded<T: Starts>(items: &[T]) -> Vec<f64> {
     let mut starts: Vec<f64> = items.iter().map(Starts::start).collect();
     let mut last = f64::NEG_INFINITY;
@@ -58,7 +58,7 @@ impl<T: Starts> Steps<T> {
             let start = |at: &u32| starts[*at as usize];
             order.sort_by(|one, next| start(one).total_cmp(&start(next)));
         }
-        // Without spare room: a map of 100 MB has a million of them.
+        // The boxed slice has no spare capacity, because a map of 100 MB has a million of them.
         Steps {
             items: items.into_boxed_slice(),
             order,
@@ -67,24 +67,24 @@ impl<T: Starts> Steps<T> {
         }
     }
 
-    /// All items in document order.
+    /// Returns all items in document order.
     #[inline]
     pub(crate) fn items(&self) -> &[T] {
         &self.items
     }
 
-    /// All items in document order, to complete them; their starts must stay.
+    /// Returns all items in document order for completion. Their starts must not change.
     pub(crate) fn items_mut(&mut self) -> &mut [T] {
         &mut self.items
     }
 
-    /// How many items have a rank: all, or none when a start is missing.
+    /// Returns the number of items with a rank: all, or none if a start is missing.
     #[inline]
     pub(crate) fn ranks(&self) -> usize {
         if self.unplaced { 0 } else { self.items.len() }
     }
 
-    /// The place in document order of the item with this rank.
+    /// Returns the place in document order of the item with this rank.
     #[inline]
     pub(crate) fn index(&self, rank: usize) -> Option<usize> {
         if rank >= self.ranks() {
@@ -96,20 +96,20 @@ impl<T: Starts> Steps<T> {
         }
     }
 
-    /// The item with this rank in ascending order of start; those with equal starts as written.
+    /// Returns the item with this rank in order of start. Equal starts keep their order.
     #[inline]
     pub(crate) fn ranked(&self, rank: usize) -> Option<&T> {
         self.items.get(self.index(rank)?)
     }
 
-    /// The items in ascending order of start; none when a start is missing.
+    /// Returns the items in ascending order of start. Returns none if a start is missing.
     #[inline]
     pub(crate) fn in_order(&self) -> impl DoubleEndedIterator<Item = &T> {
         (0..self.ranks()).filter_map(|rank| self.ranked(rank))
     }
 
-    /// The rank of the last item that has started; `None` before the first one, and when a start
-    /// is missing.
+    /// Returns the rank of the last item that has started. Returns `None` before the first item, or
+    /// if a start is missing.
     #[inline]
     pub(crate) fn rank_at(&self, station: Station) -> Option<usize> {
         if self.unplaced || !station.x().is_finite() {
@@ -125,7 +125,7 @@ impl<T: Starts> Steps<T> {
         started.checked_sub(1)
     }
 
-    /// Whether nothing is said about the station: there are no items, or the first starts later.
+    /// Checks whether no item covers the station: there are none, or the first starts later.
     #[inline]
     pub(crate) fn silent_at(&self, station: Station) -> bool {
         !self.unplaced && station.x().is_finite() && self.rank_at(station).is_none()

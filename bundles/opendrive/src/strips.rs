@@ -1,5 +1,4 @@
-//! Cross section surfaces: strips of road surface with coefficients over s (OpenDRIVE 1.9,
-//! 10.5.4).
+//! Cross section surfaces: strips of road surface with coefficients over s (OpenDRIVE 1.9, 10.5.4).
 
 use qcbus_document::Node;
 
@@ -26,17 +25,17 @@ pub struct Strip<'a> {
     pub id: Option<i64>,
     /// The width of an inner strip over s, in metres.
     pub width: Profile<'a>,
-    /// The coefficients of dt to the power of 0, 1, 2 and 3 over s: `<constant>`, `<linear>`,
+    /// The coefficients over s for powers 0, 1, 2 and 3 of dt: `<constant>`, `<linear>`,
     /// `<quadratic>`, `<cubic>`.
     pub coefficients: [Profile<'a>; 4],
 }
 
-/// What the heights of an outer strip are measured from (`e_strip_mode`).
+/// Reference of the heights of an outer strip (`e_strip_mode`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum StripMode {
-    /// The reference line's elevation.
+    /// Elevation of the reference line.
     Independent,
-    /// The outer edge of the inner strip.
+    /// Outer edge of the inner strip.
     Relative,
 }
 
@@ -55,24 +54,24 @@ impl<'a> CrossSectionSurface<'a> {
         }
     }
 
-    /// The element.
+    /// Returns the element.
     pub fn node(&self) -> Node<'a> {
         self.node
     }
 
-    /// The first strip with this id.
+    /// Returns the first strip with this id.
     pub fn strip(&self, id: i64) -> Option<&Strip<'a>> {
         self.strips.iter().find(|strip| strip.id == Some(id))
     }
 
-    /// The height at (s, t) in metres, zero on a side without strips. t counts from `tOffset`;
-    /// an inner strip without width reaches to the edge of the road; an outer strip counts dt
-    /// from the inner strip's edge, and its height from there too when its mode is relative.
-    /// `None` when a strip's mode is missing or unknown, or a width is negative.
+    /// Returns the height at (s, t) in metres. A side without strips has the height zero. t counts
+    /// from `tOffset`. An inner strip without a width reaches the edge of the road. An outer strip
+    /// counts dt from the edge of the inner strip. In relative mode, it also counts its height from
+    /// there. Returns `None` if the mode of a strip is missing or unknown, or a width is negative.
     pub fn height(&self, s: impl Into<Station>, t: f64) -> Option<f64> {
         let s = s.into();
         let t = finite(t - self.t_offset.at_or_zero(s)?)?;
-        // 10.5.4 counts t = 0 to the right side.
+        // By 10.5.4, t = 0 belongs to the right side.
         let sign = if t > 0.0 { 1 } else { -1 };
         let Some(inner) = self.strip(sign) else {
             return if self.strip(2 * sign).is_none() {
@@ -109,12 +108,12 @@ impl<'a> Strip<'a> {
         }
     }
 
-    /// The element.
+    /// Returns the element.
     pub fn node(&self) -> Node<'a> {
         self.node
     }
 
-    /// `@mode`; the standard gives no default.
+    /// Returns `@mode`. The standard defines no default.
     pub fn mode(&self) -> Option<StripMode> {
         match self.node.attr("mode") {
             Some("independent") => Some(StripMode::Independent),
@@ -123,8 +122,8 @@ impl<'a> Strip<'a> {
         }
     }
 
-    /// The polynomial's value at `dt` metres from the strip's inner edge (negative to the
-    /// right); components that are not given are zero.
+    /// Returns the value of the polynomial at `dt` metres from the strip's inner edge (negative to
+    /// the right). Missing components are zero.
     pub fn height(&self, s: impl Into<Station>, dt: f64) -> Option<f64> {
         let s = s.into();
         let mut height = 0.0;
@@ -135,7 +134,7 @@ impl<'a> Strip<'a> {
     }
 }
 
-/// The `<coefficients>` of the child `name`, absent ones being zero.
+/// Reads the `<coefficients>` of the child `name`. Absent ones are zero.
 fn coefficients<'a>(node: Node<'a>, name: &str) -> Profile<'a> {
     let lists = node.child(name).into_iter();
     let records = lists.flat_map(|list| list.children().filter(|child| child.is("coefficients")));

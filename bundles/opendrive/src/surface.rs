@@ -1,4 +1,4 @@
-//! Places in space: the s/t/h system of a road and the surface of its lanes (OpenDRIVE 1.9, 8.3,
+//! Points in space: the s/t/h system of a road and the surface of its lanes (OpenDRIVE 1.9, 8.3,
 //! 10.5, 11.7.3, 11.7.4).
 
 use crate::geometry::{Point, Point3, Pose, finite};
@@ -9,30 +9,30 @@ use crate::road::Road;
 use crate::station::Station;
 use crate::value::ContactPoint;
 
-/// The cross section of a road at some s: where it lies and how it is tilted.
+/// The cross section of a road at a given s, with its place and tilt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
-    /// The reference line's pose in the plan view.
+    /// Pose of the reference line in the plan view.
     pub pose: Pose,
-    /// The elevation in metres.
+    /// Elevation in metres.
     pub z: f64,
-    /// The superelevation in radians, positive when the road falls to the right.
+    /// Superelevation in radians, positive if the road falls to the right.
     pub roll: f64,
-    /// The elevation's slope dz/ds.
+    /// Slope of the elevation, dz/ds.
     pub slope: f64,
-    /// The superelevation's slope in rad/m.
+    /// Slope of the superelevation in rad/m.
     pub roll_slope: f64,
 }
 
 impl Frame {
-    /// How far a place with these t and h lies to the left of the reference line in the plan
-    /// view, and how high above it, in metres: t and h turn with the superelevation (8.3).
+    /// Returns the position of a point with these t and h, in metres: left of the reference line in
+    /// the plan view, and above it. Superelevation rotates t and h (8.3).
     pub fn tilted(&self, t: f64, h: f64) -> (f64, f64) {
         let (sin, cos) = self.tilt();
         (t * cos - h * sin, t * sin + h * cos)
     }
 
-    /// Sine and cosine of the superelevation, which most roads do not have.
+    /// Returns sine and cosine of the superelevation. Most roads have no superelevation.
     fn tilt(&self) -> (f64, f64) {
         if self.roll == 0.0 {
             (0.0, 1.0)
@@ -41,7 +41,7 @@ impl Frame {
         }
     }
 
-    /// The point `lateral` metres to the left in the plan view and `up` metres above the
+    /// Returns the point `lateral` metres to the left in the plan view and `up` metres above the
     /// reference line.
     pub fn place(&self, lateral: f64, up: f64) -> Option<Point3> {
         let Point { x, y } = self.pose.beside(lateral)?;
@@ -50,14 +50,14 @@ impl Frame {
 }
 
 impl<'a> Road<'a> {
-    /// The cross section at `s`.
+    /// Returns the cross section at `s`.
     pub fn frame(&self, s: impl Into<Station>) -> Option<Frame> {
         let s = s.into();
         self.frame_on(self.pose(s)?, s)
     }
 
-    /// The cross section at one of the road's ends, where the reference line really begins or
-    /// ends.
+    /// Returns the cross section at an end of the road, at the true start or end of the reference
+    /// line.
     pub fn end_frame(&self, end: ContactPoint) -> Option<Frame> {
         self.end_frame_or(end, || {
             let station = match end {
@@ -79,16 +79,16 @@ impl<'a> Road<'a> {
         })
     }
 
-    /// The point with the road coordinates (s, t, h): h is measured from the plane that
-    /// superelevation tilts, perpendicular to it. There is no pitch (8.3).
+    /// Returns the point with the road coordinates (s, t, h). h is perpendicular to the plane that
+    /// superelevation tilts. There is no pitch (8.3).
     pub fn point(&self, s: impl Into<Station>, t: f64, h: f64) -> Option<Point3> {
         let frame = self.frame(s)?;
         let (lateral, up) = frame.tilted(t, h);
         frame.place(lateral, up)
     }
 
-    /// The point of the road's surface at (s, t): as [`point`](Road::point), on the height that
-    /// shape or cross section surface give. Lane height and `@level` are left aside.
+    /// Returns the point of the road's surface at (s, t). It is a [`point`](Road::point) at the
+    /// height of the shape or cross section surface. Lane height and `@level` are ignored.
     pub fn surface_point(&self, s: impl Into<Station>, t: f64) -> Option<Point3> {
         let s = s.into();
         self.point(s, t, self.lateral().height(s, t)?)
@@ -98,24 +98,24 @@ impl<'a> Road<'a> {
 /// A place on the border of a lane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BorderPoint {
-    /// t of the border in the road's coordinates, in metres.
+    /// t of the border in road coordinates, in metres.
     pub t: f64,
-    /// The place in space, on the lane's surface.
+    /// Point in space, on the surface of the lane.
     pub point: Point3,
-    /// The border's heading in the plan view with ascending s, in radians, not wrapped; differs
-    /// from the reference line's where the border runs towards or away from it. `None` where the
-    /// border turns back (t reaches the center of the curve).
+    /// Heading of the border in the plan view with ascending s, in radians, not wrapped. It differs
+    /// from the heading of the reference line where the border approaches or leaves that line.
+    /// `None` where the border turns back (t reaches the center of the curve).
     pub hdg: Option<f64>,
-    /// The border's slope dz/ds along the reference line, without what shape, cross section
-    /// surface and lane height contribute.
+    /// Slope dz/ds of the border along the reference line. Shape, cross section surface and lane
+    /// height are not included.
     pub slope: f64,
-    /// The same slope per metre of the border itself, seen in the plan view. `None` where the
-    /// border turns back.
+    /// The same slope per metre of the border itself in the plan view. `None` where the border
+    /// turns back.
     pub grade: Option<f64>,
 }
 
-/// How a lane's border lies in its cross section: to the left and up, in metres, and how both
-/// change with s.
+/// Position of a lane's border in its cross section: to the left and up, in metres, with the change
+/// of both over s.
 #[derive(Debug, Clone, Copy)]
 struct Lay {
     lateral: f64,
@@ -125,15 +125,15 @@ struct Lay {
 }
 
 impl<'m, 'a> LaneRef<'m, 'a> {
-    /// A border at `ds` metres from the section's start.
+    /// Returns a border at `ds` metres from the section's start.
     pub fn border(self, edge: Edge, ds: impl Into<Station>) -> Option<BorderPoint> {
         let ds = ds.into();
         let frame = self.at.road.frame(ds.shifted(self.at.s()?))?;
         self.border_in(frame, edge, ds)
     }
 
-    /// A border at an end of the section. At the ends of the road the reference line's own end
-    /// counts, whatever `@length` says.
+    /// Returns a border at an end of the section. At an end of the road, the end of the reference
+    /// line counts, regardless of `@length`.
     pub fn border_at(self, edge: Edge, end: ContactPoint) -> Option<BorderPoint> {
         let [inner, outer] = self.end_borders(end);
         match edge {
@@ -142,7 +142,7 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         }
     }
 
-    /// Both borders at an end of the section, inner and outer; see [`LaneRef::border_at`].
+    /// Returns both borders at an end of the section, inner and outer; see [`LaneRef::border_at`].
     pub fn borders_at(self, end: ContactPoint) -> Option<[BorderPoint; 2]> {
         let [inner, outer] = *self.end_borders(end);
         Some([inner?, outer?])
@@ -158,7 +158,7 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         self.lane().borders_or(end, find)
     }
 
-    /// The cross section of the road at an end of the section.
+    /// Returns the cross section of the road at an end of the section.
     fn frame_at(self, end: ContactPoint) -> Option<Frame> {
         if self.is_at_road_end(end) {
             return self.at.road.end_frame(end);
@@ -167,7 +167,7 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         self.at.road.frame(ds.shifted(self.at.s()?))
     }
 
-    /// Whether an end of the section is an end of the road.
+    /// Checks whether an end of the section is an end of the road.
     pub fn is_at_road_end(self, end: ContactPoint) -> bool {
         let side = self.side().unwrap_or(crate::value::Side::Right);
         let beside = self.at.neighbour(side, end).is_none();
@@ -175,14 +175,14 @@ impl<'m, 'a> LaneRef<'m, 'a> {
             ContactPoint::Start => self.at.s().map(|s| s <= 1e-9),
             ContactPoint::End => {
                 let ends = self.at.end(side).zip(self.at.road.length());
-                // The end of a temporary section is a sum.
+                // The tolerance is needed because the end of a temporary section is a sum.
                 ends.map(|(one, other)| (one - other).abs() <= END_TOLERANCE)
             }
         };
         beside && place == Some(true)
     }
 
-    /// The place of the lane's surface at a share of its width, 0 at the inner and 1 at the
+    /// Returns the point of the lane's surface at a fraction of its width: 0 is the inner and 1 the
     /// outer border.
     pub fn surface_point(self, ds: impl Into<Station>, share: f64) -> Option<Point3> {
         let ds = ds.into();
@@ -216,8 +216,8 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         })
     }
 
-    /// Where t lies in the cross section. On a lane with `@level` the surface goes on
-    /// horizontally from the outer border of the last lane without it (11.7.4).
+    /// Returns the position of t in the cross section. On a lane with `@level`, the surface is
+    /// horizontal from the outer border of the last lane without it (11.7.4).
     fn lay(self, frame: Frame, t: f64, t_slope: f64, ds: Station) -> Option<Lay> {
         if !self.level()? {
             return self.tilted_lay(frame, t, t_slope, ds);

@@ -1,4 +1,4 @@
-//! Where linked lanes touch: their touching points (OpenDRIVE 1.9, annex D.1.1).
+//! Touching points of linked lanes (OpenDRIVE 1.9, annex D.1.1).
 
 use foldhash::HashSet;
 
@@ -8,45 +8,44 @@ use crate::road::Road;
 use crate::surface::BorderPoint;
 use crate::value::Side;
 
-/// Two linked lanes with the ends of their edges, as somebody sees them who looks along s of the
-/// road of `joint.from`.
+/// Two linked lanes with the ends of their edges, as seen along s of the road of `joint.from`.
 #[derive(Debug, Clone, Copy)]
 pub struct TouchingLanes<'a> {
-    /// The statement that they touch; of two that say the same the first.
+    /// The statement that the lanes touch. The first of two equal statements counts.
     pub joint: LaneJoint<'a>,
-    /// The left edge: of the lane of `joint.from`, and of that of `joint.to`.
+    /// The left edge: of the lane of `joint.from`, then of the lane of `joint.to`.
     pub left: [BorderPoint; 2],
-    /// The right edge.
+    /// The right edge, in the same order.
     pub right: [BorderPoint; 2],
 }
 
 impl TouchingLanes<'_> {
-    /// Both edges, the left one first.
+    /// Returns both edges, the left one first.
     pub fn edges(&self) -> [[BorderPoint; 2]; 2] {
         [self.left, self.right]
     }
 
-    /// The width of the narrower lane where they touch, in metres.
+    /// Returns the width of the narrower lane at the touching point, in metres.
     pub fn narrower(&self) -> f64 {
         let width = |side: usize| (self.left[side].t - self.right[side].t).abs();
         width(0).min(width(1))
     }
 }
 
-/// Links of one lane end that are looked through for one that says the same. No real lane has as
-/// many; of one that has, a pair may be found twice.
+/// Maximum number of links of one lane end that are searched for the same statement. No real lane
+/// has that many. With more links, a pair may be found twice.
 const MOST_LINKS: usize = 64;
 
 impl<'a> RoadMap<'a> {
-    /// Every pair of linked lanes whose edges can be evaluated, once, in document order of the
-    /// statements. Found once and kept.
+    /// Returns every pair of linked lanes with edges that can be evaluated. Each pair occurs once,
+    /// in document order of the statements. The result is cached.
     pub fn touching_lanes(&self) -> impl Iterator<Item = &TouchingLanes<'a>> {
         let roads = self.roads().iter();
         let by_lanes = roads.flat_map(|road| self.touching_by(road));
         by_lanes.chain(self.touching_by_junctions())
     }
 
-    /// The pairs that lanes of one road name first.
+    /// Returns the pairs that the lanes of one road state first.
     pub(crate) fn touching_by<'m>(&'m self, road: &'m Road<'a>) -> &'m [TouchingLanes<'a>] {
         road.touching.get_or_init(|| {
             let (mut from, mut seen) = (None, HashSet::default());
@@ -63,7 +62,7 @@ impl<'a> RoadMap<'a> {
         })
     }
 
-    /// The pairs that only junctions name.
+    /// Returns the pairs that only junctions state.
     pub(crate) fn touching_by_junctions(&self) -> &[TouchingLanes<'a>] {
         self.caches.touching.get_or_init(|| {
             let mut seen = HashSet::default();
@@ -78,7 +77,7 @@ impl<'a> RoadMap<'a> {
         })
     }
 
-    /// Whether a lane itself names another one at an end.
+    /// Checks whether a lane itself links to another one at an end.
     fn says(&self, from: LaneEnd, to: LaneEnd) -> bool {
         let road = self.roads().get(from.lane.road as usize);
         let joints = road.map_or(&[][..], |road| self.joints_of(road));
@@ -107,7 +106,7 @@ impl<'a> RoadMap<'a> {
         })
     }
 
-    /// The edges of a lane as seen along s of its own road.
+    /// Returns the edges of a lane as seen along s of its own road.
     fn left_and_right(&self, at: LaneEnd) -> Option<[BorderPoint; 2]> {
         let lane = self.lane(at.lane)?;
         let [inner, outer] = lane.borders_at(at.end)?;

@@ -1,4 +1,4 @@
-//! Which way traffic runs on a lane (OpenDRIVE 1.9, 11.3.1).
+//! Direction of traffic on a lane (OpenDRIVE 1.9, 11.3.1).
 
 use crate::{ContactPoint, LaneRef, Side, TrafficRule};
 
@@ -7,11 +7,11 @@ use crate::{ContactPoint, LaneRef, Side, TrafficRule};
 pub enum Traffic {
     /// Towards this end of the lane section only.
     Towards(ContactPoint),
-    /// In both directions, in changing ones, or nobody can say.
+    /// In both directions, in changing ones, or unknown.
     Any,
 }
 
-/// Lanes without traffic that runs in one direction.
+/// Lane types without traffic in a single direction.
 const UNDIRECTED: &[&str] = &[
     "bidirectional",
     "border",
@@ -28,7 +28,8 @@ const UNDIRECTED: &[&str] = &[
 ];
 
 impl Traffic {
-    /// The traffic on a lane, by the road's `@rule`, the lane's side and its `@direction`.
+    /// Returns the traffic on a lane from the road's `@rule`, the lane's side, type and
+    /// `@direction`.
     pub fn of(lane: LaneRef<'_, '_>) -> Traffic {
         let undirected = lane.kind().is_none_or(|kind| UNDIRECTED.contains(&kind));
         let (Some(side), Some(rule)) = (lane.side(), lane.at.road.traffic_rule()) else {
@@ -45,7 +46,7 @@ impl Traffic {
         }
     }
 
-    /// Whether traffic may run towards this end.
+    /// Checks whether traffic may run towards this end.
     pub fn may_run_towards(self, end: ContactPoint) -> bool {
         self == Traffic::Any || self == Traffic::Towards(end)
     }

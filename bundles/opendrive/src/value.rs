@@ -1,35 +1,35 @@
-//! Attribute values as the model reads them: present, well-formed, finite and not absurdly large, or `None`.
+//! Attribute values of the model: present, well-formed, finite and within limits, or `None`.
 
 use std::fmt;
 
 use qcbus_document::Node;
 
-/// Whether an element lies within a `<userData>`: what is in there means whatever its author likes,
-/// whatever it is called (7.2).
+/// Checks whether an element lies within a `<userData>`. Elements in there have no defined meaning,
+/// regardless of their names (7.2).
 pub fn is_user_data(node: Node<'_>) -> bool {
     node.ancestors().any(|above| above.is("userData"))
 }
 
-/// The text without white space around it, as XML defines that.
+/// Returns the text without the white space around it, as XML defines white space.
 #[inline]
 fn trim(text: &str) -> &str {
     let is_space = |byte: Option<&u8>| matches!(byte, Some(b' ' | b'\t' | b'\r' | b'\n'));
     let bytes = text.as_bytes();
-    // Hardly anybody writes any, and looking for it costs as much as reading a short number.
+    // White space is rare here, and searching for it costs as much as reading a short number.
     if !is_space(bytes.first()) && !is_space(bytes.last()) {
         return text;
     }
     text.trim_matches([' ', '\t', '\r', '\n'])
 }
 
-/// No geometry survives a number beyond this: squares and cubes of it overflow, and what is computed from
-/// it is rounded by more than the Earth is wide.
+/// Largest accepted absolute value. Squares and cubes of larger numbers overflow. Results from them
+/// have rounding errors larger than the Earth.
 const LARGEST: f64 = 1e30;
 
-/// A finite number that can be computed with, or `None`.
+/// Parses a finite number within the limit, or returns `None`.
 pub(crate) fn parse_number(text: &str) -> Option<f64> {
-    // More than half of the coefficients of real maps are zero: as people write it, and as `%.16e`
-    // of C does.
+    // More than half of the coefficients of real maps are zero. They have the usual spellings or
+    // the one of `%.16e` in C.
     if matches!(text, "0" | "0.0" | "0.0000000000000000e+00") {
         return Some(0.0);
     }
@@ -37,13 +37,12 @@ pub(crate) fn parse_number(text: &str) -> Option<f64> {
     (value.abs() <= LARGEST).then_some(value)
 }
 
-/// An integer of at most 64 bits, or `None`.
+/// Parses an integer of at most 64 bits, or returns `None`.
 pub(crate) fn parse_integer(text: &str) -> Option<i64> {
     trim(text).parse().ok()
 }
 
-/// A boolean in any of the spellings that OpenDRIVE has had: `true`/`false`, `1`/`0`,
-/// `yes`/`no`.
+/// Parses a boolean in all spellings of OpenDRIVE: `true`/`false`, `1`/`0`, `yes`/`no`.
 pub(crate) fn parse_flag(text: &str) -> Option<bool> {
     match trim(text) {
         "true" | "1" | "yes" => Some(true),
@@ -52,32 +51,32 @@ pub(crate) fn parse_flag(text: &str) -> Option<bool> {
     }
 }
 
-/// An attribute as it is written.
+/// Reads an attribute as it is written.
 pub(crate) fn text<'a>(node: Node<'a>, name: &str) -> Option<&'a str> {
     node.attr(name)
 }
 
-/// A finite number.
+/// Reads a finite number.
 pub(crate) fn number(node: Node<'_>, name: &str) -> Option<f64> {
     parse_number(node.attr(name)?)
 }
 
-/// An integer.
+/// Reads an integer.
 pub(crate) fn integer(node: Node<'_>, name: &str) -> Option<i64> {
     parse_integer(node.attr(name)?)
 }
 
-/// A boolean.
+/// Reads a boolean.
 pub(crate) fn flag(node: Node<'_>, name: &str) -> Option<bool> {
     parse_flag(node.attr(name)?)
 }
 
-/// Which end of a road a link touches.
+/// Reads the end of a road that a link touches.
 pub(crate) fn contact(node: Node<'_>, name: &str) -> Option<ContactPoint> {
     ContactPoint::parse(node.attr(name)?)
 }
 
-/// Along or against the s-direction.
+/// Reads a direction along or against s.
 pub(crate) fn direction(node: Node<'_>, name: &str) -> Option<Direction> {
     match node.attr(name)? {
         "+" => Some(Direction::Along),
@@ -86,15 +85,15 @@ pub(crate) fn direction(node: Node<'_>, name: &str) -> Option<Direction> {
     }
 }
 
-/// The lane layer that an element names; [`LayerKind::Permanent`] when it names none.
+/// Reads the lane layer of an element, or [`LayerKind::Permanent`] if the attribute is missing.
 pub(crate) fn layer(node: Node<'_>, name: &str) -> LayerKind {
     LayerKind::of_text(node.attr(name))
 }
 
-/// Several numbers in one pass over the attributes; absent and broken ones are NaN.
+/// Reads several numbers in one pass over the attributes. Absent and malformed ones are NaN.
 pub(crate) fn numbers<const N: usize>(node: Node<'_>, names: [&str; N]) -> [f64; N] {
     let mut found = [f64::NAN; N];
-    // Most files list them in the order of the standard: the next one is looked for first.
+    // Most files list attributes in the order of the standard, so the next name is tried first.
     let mut next = 0;
     for attribute in node.attributes() {
         let is = |slot: &usize| names.get(*slot).is_some_and(|name| attribute.is(name));
@@ -107,7 +106,7 @@ pub(crate) fn numbers<const N: usize>(node: Node<'_>, names: [&str; N]) -> [f64;
     found
 }
 
-/// The number, unless it stands for "absent".
+/// Returns the number, unless it stands for "absent".
 pub(crate) fn known(value: f64) -> Option<f64> {
     (!value.is_nan()).then_some(value)
 }
@@ -125,7 +124,7 @@ impl ContactPoint {
     /// Both ends, in the direction of s.
     pub const BOTH: [ContactPoint; 2] = [ContactPoint::Start, ContactPoint::End];
 
-    /// Reads `start` or `end`.
+    /// Parses `start` or `end`.
     pub fn parse(text: &str) -> Option<ContactPoint> {
         match text {
             "start" => Some(ContactPoint::Start),
@@ -134,7 +133,7 @@ impl ContactPoint {
         }
     }
 
-    /// The standard's word: `start` or `end`.
+    /// Returns the word of the standard: `start` or `end`.
     pub fn as_str(self) -> &'static str {
         match self {
             ContactPoint::Start => "start",
@@ -142,7 +141,7 @@ impl ContactPoint {
         }
     }
 
-    /// The link element for this end: `predecessor` or `successor`.
+    /// Returns the name of the link element for this end: `predecessor` or `successor`.
     pub fn link_name(self) -> &'static str {
         match self {
             ContactPoint::Start => "predecessor",
@@ -150,7 +149,7 @@ impl ContactPoint {
         }
     }
 
-    /// The other end.
+    /// Returns the other end.
     pub fn other(self) -> ContactPoint {
         match self {
             ContactPoint::Start => ContactPoint::End,
@@ -187,7 +186,7 @@ impl Side {
     /// Both sides.
     pub const BOTH: [Side; 2] = [Side::Left, Side::Right];
 
-    /// The sign of t on this side.
+    /// Returns the sign of t on this side.
     pub fn sign(self) -> f64 {
         match self {
             Side::Left => 1.0,
@@ -195,7 +194,7 @@ impl Side {
         }
     }
 
-    /// The side on which a lane of this id belongs; `None` for the center lane.
+    /// Returns the side for a lane with this id, or `None` for the center lane.
     pub fn of_lane_id(id: i64) -> Option<Side> {
         match id {
             0 => None,
@@ -208,11 +207,11 @@ impl Side {
 /// The layer of lanes (OpenDRIVE 1.9, 11.2).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum LayerKind {
-    /// The lanes under normal conditions; also what a missing `@layer` means.
+    /// The lanes under normal conditions, also the meaning of a missing `@layer`.
     Permanent,
-    /// Lanes laid over them, as in roadworks.
+    /// Lanes laid over the permanent ones, for example in roadworks.
     Temporary,
-    /// A word that the standard does not know.
+    /// A word that the standard does not define.
     Unknown,
 }
 
@@ -225,7 +224,7 @@ impl LayerKind {
         }
     }
 
-    /// The standard's word.
+    /// Returns the word of the standard.
     pub fn as_str(self) -> &'static str {
         match self {
             LayerKind::Permanent => "permanent",

@@ -1,8 +1,8 @@
 //! The macro behind the thin views: a node with one accessor per attribute.
 
-/// Declares a view over an element: a `Copy` struct around its node, and one documented accessor
-/// per attribute that reads it when asked. What is written after the colon is the reader (see
-/// the `value` module), what follows it the attribute's name.
+/// Declares a view over an element. The view is a `Copy` struct around the node. It has one
+/// documented accessor per attribute, which reads the attribute on each call. The reader (see the
+/// `value` module) follows the colon, then the attribute's name.
 macro_rules! view {
     (
         $(#[$about:meta])*
@@ -17,12 +17,12 @@ macro_rules! view {
         }
 
         impl<'a> $view<'a> {
-            /// The view over `node`, whatever element that is.
+            /// Creates the view over `node`, regardless of the element.
             pub fn of(node: qcbus_document::Node<'a>) -> $view<'a> {
                 $view { node }
             }
 
-            /// The element itself.
+            /// Returns the element itself.
             pub fn node(&self) -> qcbus_document::Node<'a> {
                 self.node
             }
@@ -37,7 +37,7 @@ macro_rules! view {
     };
 }
 
-/// What a reader returns.
+/// Return type of a reader.
 macro_rules! reading {
     (text) => { Option<&'a str> };
     (number) => { Option<f64> };
@@ -48,7 +48,7 @@ macro_rules! reading {
     (layer) => { $crate::value::LayerKind };
 }
 
-/// Declares a method that lists children of one name as views.
+/// Declares a method that returns the children with one name as views.
 macro_rules! children {
     ( $( $(#[$doc:meta])* $method:ident: $view:ident $element:literal, )* ) => {
         $(

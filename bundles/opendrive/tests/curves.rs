@@ -1,4 +1,4 @@
-//! What must hold for every curve, whatever its numbers.
+//! Properties of every curve, whatever its numbers.
 
 use std::f64::consts::{PI, TAU};
 
@@ -17,7 +17,7 @@ fn placed(curve: Curve, length: f64) -> Placed {
     }
 }
 
-/// Curves of ordinary roads: radii above 5 m, lengths up to 100 m.
+/// Generates curves of ordinary roads: radii above 5 m, lengths up to 100 m.
 fn ordinary() -> impl Strategy<Value = Placed> {
     let curvature = -0.2..0.2_f64;
     let spiral = (curvature.clone(), curvature.clone(), 1.0..100.0_f64);
@@ -149,7 +149,7 @@ proptest! {
     }
 }
 
-/// Numbers that break careless code, beside plain ones.
+/// Generates numbers that break careless code, besides plain ones.
 fn hostile() -> impl Strategy<Value = f64> {
     prop_oneof![
         prop::sample::select(vec![

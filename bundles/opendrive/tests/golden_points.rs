@@ -1,4 +1,4 @@
-//! The points that ASAM's own bundle computes, where its cases are at hand.
+//! Compares points with those of ASAM's own bundle, if its cases are available.
 
 #![expect(
     clippy::expect_used,

@@ -1,5 +1,4 @@
-//! Maps whose numbers and links were written by an enemy: everything may be asked, nothing
-//! panics, everything ends.
+//! Tests of maps with hostile numbers and links. All queries must end and must not panic.
 
 mod common;
 
@@ -79,7 +78,7 @@ fn fill(template: &str, mut values: impl Iterator<Item = String>) -> String {
     text
 }
 
-/// Asks everything that rules may ask; returns how many answers there were.
+/// Calls every query that rules may call. Returns the number of answers.
 fn ask_everything(map: &RoadMap<'_>) -> usize {
     let mut answers =
         map.lane_joints().count() + map.touching_lanes().count() + map.road_contacts().len();

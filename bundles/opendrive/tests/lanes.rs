@@ -1,4 +1,4 @@
-//! Sections, borders and surfaces of hand-written roads whose numbers are known.
+//! Tests of sections, borders and surfaces of hand-written roads with known numbers.
 
 #![expect(clippy::expect_used, reason = "helpers of tests may fail a test")]
 
@@ -338,7 +338,7 @@ fn a_border_on_a_curve_has_its_own_heading() {
     });
     let folded = road.replace("a=\"2\"", "a=\"12\"");
     with_map(&folded, |map| {
-        // The border lies beyond the centre of the curve: it runs backwards.
+        // The border is beyond the centre of the curve, so it runs backwards.
         let lane = map.sections().next().unwrap().lane(1).unwrap();
         assert_eq!(lane.border(Edge::Outer, 5.0).unwrap().hdg, None);
     });

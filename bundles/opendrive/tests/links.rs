@@ -1,4 +1,4 @@
-//! Which road ends and lane ends touch, in a junction with a road that enters it twice.
+//! Tests of connected road ends and lane ends, in a junction with a road that enters it twice.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests may fail a test")]
 
@@ -7,8 +7,8 @@ mod common;
 use common::with_map;
 use qcbus_opendrive::{ContactPoint, RoadEnd, RoadMap};
 
-/// Road `in` meets junction `j` at its end, road `out` at its start; `c` connects them; `loop`
-/// begins and ends at the junction and is named by connection 2 through `d`.
+/// Road `in` meets junction `j` at its end, road `out` at its start. Road `c` connects them. Road
+/// `loop` begins and ends at the junction, and connection 2 names it through `d`.
 const MAP: &str = r#"
 <road id="in" length="10"><link><successor elementType="junction" elementId="j"/></link>
   <planView><geometry s="0" x="0" y="0" hdg="0" length="10"><line/></geometry></planView>LANES</road>
@@ -58,7 +58,7 @@ fn neighbours_come_from_links_and_connections_of_both_sides() {
         assert_eq!(neighbours(map, "c", Start), [("in".to_owned(), End)]);
         assert_eq!(neighbours(map, "c", End), [("out".to_owned(), Start)]);
         assert_eq!(neighbours(map, "out", Start), [("c".to_owned(), End)]);
-        // Both ends of the loop meet the junction: the nearer one counts.
+        // Both ends of the loop meet the junction, and the nearer one is used.
         assert_eq!(neighbours(map, "d", Start), [("loop".to_owned(), End)]);
     });
 }

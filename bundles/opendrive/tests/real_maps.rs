@@ -1,4 +1,4 @@
-//! The maps of other projects, where they are at hand: what they say must be understood.
+//! Checks that the model understands the maps of other projects, if they are available.
 
 #![expect(
     clippy::expect_used,
@@ -13,7 +13,7 @@ use qcbus_ingest::{Limits, prepare_bytes};
 use qcbus_opendrive::geometry::heading_difference;
 use qcbus_opendrive::{Edge, LaneEnd, LaneJoint, RoadMap};
 
-/// All maps below a directory, in a fixed order.
+/// Returns all maps below a directory, in a fixed order.
 fn maps(directory: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(directory) else {
         return Vec::new();
@@ -61,8 +61,8 @@ fn reference_lines_are_continuous_and_linked_lanes_meet() {
         return;
     }
     println!("{seen:?}");
-    // Of the maps' authors some err; a model that misread a curve or a width would be off by far
-    // more.
+    // Some maps have errors of their authors. A model that misreads a curve or a width would exceed
+    // these limits by far.
     assert!(seen.not_evaluated * 100 <= seen.geometries, "{seen:?}");
     assert!(
         seen.gaps * 100 <= seen.geometries && seen.kinks * 50 <= seen.geometries,
@@ -93,7 +93,8 @@ fn look_at_joints(map: &RoadMap<'_>, seen: &mut Seen, path: &Path) {
             let drivable = lane.kind() == Some("driving") && lane.width_at(end.end)? > 0.1;
             lane.border_at(edge, end.end).filter(|_| drivable)
         };
-        // Where s turns round, inner and outer stay what they are: the center lane is shared.
+        // Inner and outer edge stay the same if the direction of s changes, because the center lane
+        // is shared.
         let distances = Edge::BOTH.map(|edge| {
             let (one, other) = (outer(joint.from, edge)?, outer(joint.to, edge)?);
             Some(one.point.plan().distance(other.point.plan()))

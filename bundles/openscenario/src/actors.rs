@@ -1,4 +1,4 @@
-//! Whom an action moves.
+//! Entities that an action controls.
 
 use std::borrow::Cow;
 
@@ -7,15 +7,15 @@ use crate::element::Element;
 /// The actors of an action.
 #[derive(Debug, Clone)]
 pub struct Actors<'m, 'd> {
-    /// The elements that name them: `EntityRef` of the maneuver group, or the `Private` around an
+    /// Elements that name the actors: `EntityRef` of the maneuver group, or the `Private` around an
     /// action of `Init`.
     pub named: Vec<Element<'m, 'd>>,
-    /// Whether those that trigger the event act, too.
+    /// Whether the entities that trigger the event act, too.
     pub triggering: bool,
 }
 
 impl<'m, 'd> Actors<'m, 'd> {
-    /// The actors of whatever lies within a `Private` or a `ManeuverGroup`; `None` elsewhere.
+    /// Returns the actors for elements in a `Private` or a `ManeuverGroup`; `None` elsewhere.
     pub fn of(element: Element<'m, 'd>) -> Option<Actors<'m, 'd>> {
         let around = std::iter::once(element).chain(element.ancestors());
         let holder = around
@@ -35,13 +35,14 @@ impl<'m, 'd> Actors<'m, 'd> {
         };
         Some(Actors {
             named: block.children_named("EntityRef").collect(),
-            // What is not known may be so.
+            // An unknown value may be true.
             triggering: block.has("selectTriggeringEntities")
                 && block.flag("selectTriggeringEntities") != Some(false),
         })
     }
 
-    /// The names of the actors; `None` when one is unknown, or when triggering entities act, too.
+    /// Returns the names of the actors, or `None` if one is unknown or triggering entities act,
+    /// too.
     pub fn names(&self) -> Option<Vec<Cow<'d, str>>> {
         if self.triggering {
             return None;

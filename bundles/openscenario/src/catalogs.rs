@@ -1,4 +1,4 @@
-//! Catalogs: where they are, what is in them, and where a reference leads.
+//! Catalogs: their locations, their entries and the targets of references.
 
 use foldhash::{HashMap, HashMapExt as _};
 use qcbus_document::Node;
@@ -10,7 +10,7 @@ use crate::reading::{Expected, resolve};
 use crate::scenario::Scenario;
 use crate::scope::{Context, ContextId, Declared};
 
-/// What the entries of a catalog are.
+/// Kind of the entries of a catalog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[expect(missing_docs, reason = "the standard's words")]
 pub enum CatalogKind {
@@ -37,7 +37,7 @@ impl CatalogKind {
         CatalogKind::Route,
     ];
 
-    /// The element of such an entry.
+    /// Returns the element name of an entry.
     pub fn element(self) -> &'static str {
         match self {
             CatalogKind::Vehicle => "Vehicle",
@@ -51,7 +51,7 @@ impl CatalogKind {
         }
     }
 
-    /// The element of `CatalogLocations` for it.
+    /// Returns the element name in `CatalogLocations`.
     pub fn location(self) -> &'static str {
         match self {
             CatalogKind::Vehicle => "VehicleCatalog",
@@ -65,8 +65,8 @@ impl CatalogKind {
         }
     }
 
-    /// The kinds that a reference may lead to, by the element around it; empty for an element that
-    /// has no references.
+    /// Returns the kinds that a reference may lead to, by the element around it. The result is
+    /// empty for an element without references.
     pub fn of_reference(parent: &str) -> &'static [CatalogKind] {
         match parent {
             "ScenarioObject" | "Trailer" => &[
@@ -95,32 +95,32 @@ pub struct Entry<'d> {
     pub node: Node<'d>,
 }
 
-/// Where a `CatalogReference` leads.
+/// Target of a `CatalogReference`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Resolution<'d> {
-    /// To this entry.
+    /// The reference leads to this entry.
     Entry(Entry<'d>),
-    /// An entry of this name is there, but nothing that may stand here.
+    /// An entry of this name exists, but its element is not allowed here.
     OtherElement(Entry<'d>),
-    /// To a catalog that is found only where another kind of catalogs is said to be.
+    /// The catalog is found only in the directory of another kind.
     OtherLocation(Entry<'d>),
-    /// The catalog is there, and has no such entry.
+    /// The catalog exists but has no such entry.
     NoEntry {
         /// The catalog.
         catalog: Node<'d>,
     },
-    /// All catalogs of the kind are known, and none has this name.
+    /// All catalogs of the kind are known. None has this name.
     NoCatalog,
-    /// `CatalogLocations` say nothing about the kind.
+    /// `CatalogLocations` has no location for the kind.
     NoLocation,
-    /// Not every catalog of the kind could be read: nobody knows.
+    /// Not all catalogs of the kind could be read, so the target is unknown.
     NotRead,
-    /// The name of the catalog or of the entry is unknown itself, or the reference stands where none
-    /// belongs: said elsewhere.
+    /// The name of the catalog or entry is unknown, or the reference is not allowed here. Other
+    /// rules report both.
     Unknown,
 }
 
-/// A reference, followed.
+/// A followed reference.
 pub(crate) struct Link<'d> {
     pub(crate) resolution: Resolution<'d>,
     pub(crate) context: Option<ContextId>,
@@ -135,25 +135,25 @@ pub(crate) struct AssignmentProblem<'d> {
 /// The catalogs of a scenario.
 #[derive(Debug, Default)]
 pub(crate) struct Catalogs<'d> {
-    /// The `Directory` elements by kind.
+    /// `Directory` elements by kind.
     directories: HashMap<CatalogKind, Node<'d>>,
-    /// Kinds of which not every catalog could be read.
+    /// Kinds with at least one unread catalog.
     incomplete: Vec<CatalogKind>,
-    /// By name, with the kind in whose directory it was found first.
+    /// Catalogs by name, with the kind of the directory where each was found first.
     by_name: HashMap<&'d str, Vec<(Option<CatalogKind>, Node<'d>)>>,
     entries: HashMap<Node2, HashMap<&'d str, Vec<Node<'d>>>>,
 }
 
-/// A node by document and place.
+/// A node, by document and index.
 type Node2 = (usize, u32);
 
 fn place(node: Node<'_>) -> Node2 {
     (node.document().path().as_ptr() as usize, node.index())
 }
 
-/// References that lead from entry to entry are followed this far.
+/// Maximum depth of references from entry to entry.
 const MAX_DEPTH: u32 = 8;
-/// References that are followed at all.
+/// Maximum number of followed references.
 const MAX_REFERENCES: usize = 50_000;
 
 impl<'d> Catalogs<'d> {
@@ -182,8 +182,8 @@ impl<'d> Catalogs<'d> {
             .iter()
             .map(|one| (kind_at(one.referred_at), one.document))
             .collect();
-        // A file that several directories lead to is listed with the first: whose directory has
-        // nothing of its own shares another's.
+        // A file in several directories is listed with the first one only. A kind whose directory
+        // has no files of its own may share those of another.
         catalogs.incomplete = unread;
         for (kind, document) in found {
             let root = document.root();
@@ -254,7 +254,7 @@ impl<'d> Catalogs<'d> {
         }
     }
 
-    /// Whether a catalog that was found for one kind is where another kind's are.
+    /// Checks whether a catalog that was found for one kind lies in the directory of another kind.
     fn shares(&self, kind: CatalogKind, found_for: Option<CatalogKind>) -> bool {
         let Some(found_for) = found_for.filter(|found_for| *found_for != kind) else {
             return true;
@@ -266,7 +266,7 @@ impl<'d> Catalogs<'d> {
                 .map(|path| path.trim_end_matches(['/', '\\']).trim_start_matches("./"))
         };
         match (path(kind), path(found_for)) {
-            // Two parameters may lead to one directory.
+            // Two parameters may resolve to the same directory.
             (Some(one), Some(other)) => one == other || one.contains('$') || other.contains('$'),
             _ => false,
         }
@@ -286,7 +286,7 @@ impl<'d> Catalogs<'d> {
 }
 
 impl<'d> Scenario<'d> {
-    /// Follows every reference to a catalog, those within entries included.
+    /// Follows every reference to a catalog, including references within entries.
     pub(crate) fn follow_references(&mut self) {
         let mut next = 0;
         while next < self.contexts() && self.contexts() < MAX_REFERENCES {
@@ -347,7 +347,7 @@ impl<'d> Scenario<'d> {
         self.push_context(context)
     }
 
-    /// The parameter that an assignment names, and its value as the entry declares it.
+    /// Returns the parameter of an assignment, and its value in the type that the entry declares.
     fn assigned(
         &mut self,
         assignment: Node<'d>,
@@ -387,13 +387,13 @@ impl<'d> Scenario<'d> {
         }
     }
 
-    /// Where a `CatalogReference` leads.
+    /// Returns the target of a `CatalogReference`.
     pub fn resolution(&self, reference: Element<'_, 'd>) -> &Resolution<'d> {
         let link = self.links.get(&(reference.context, reference.node.index()));
         link.map_or(&Resolution::Unknown, |link| &link.resolution)
     }
 
-    /// The entry that a `CatalogReference` leads to, read with what the reference assigns.
+    /// Returns the entry that a `CatalogReference` leads to, with the assigned parameters applied.
     pub fn entry(&self, reference: Element<'_, 'd>) -> Option<Element<'_, 'd>> {
         let context = self
             .links
@@ -406,20 +406,20 @@ impl<'d> Scenario<'d> {
         })
     }
 
-    /// The `Directory` where the catalogs of a kind are said to be.
+    /// Returns the `Directory` element for the catalogs of a kind.
     pub fn catalog_directory(&self, kind: CatalogKind) -> Option<Element<'_, 'd>> {
         self.catalogs.directory(kind).map(|node| self.element(node))
     }
 
-    /// All catalogs that were read, with the kind in whose directory each was found; in no order.
+    /// Returns all catalogs that were read, with the kind of their directory, in no order.
     pub fn catalogs(&self) -> impl Iterator<Item = (Option<CatalogKind>, Node<'d>)> {
         self.catalogs
             .all()
             .flat_map(|(_, found)| found.iter().copied())
     }
 
-    /// Assigned values that do not fit the entry's parameter: the `ParameterAssignment` and what is
-    /// wrong, in document order.
+    /// Returns assigned values that do not fit the parameter of the entry: the
+    /// `ParameterAssignment` and the fault, in document order.
     pub fn assignment_faults(
         &self,
     ) -> impl Iterator<Item = (Element<'_, 'd>, ValueFaultKind, &str)> {
@@ -434,8 +434,8 @@ impl<'d> Scenario<'d> {
 }
 
 impl<'m, 'd> Element<'m, 'd> {
-    /// The child of one of these names, or the entry of one of these names that a `CatalogReference`
-    /// in its place leads to.
+    /// Returns the child with one of these names. Otherwise returns the entry with one of these
+    /// names that a `CatalogReference` in its place leads to.
     pub fn child_or_entry(self, names: &[&str]) -> Option<Element<'m, 'd>> {
         let own = self.children().find(|child| names.contains(&child.name()));
         own.or_else(|| {
@@ -446,7 +446,7 @@ impl<'m, 'd> Element<'m, 'd> {
     }
 }
 
-/// The assignments of a reference.
+/// Returns the assignments of a reference.
 pub(crate) fn assignments(reference: Node<'_>) -> impl Iterator<Item = Node<'_>> {
     let block = reference.child("ParameterAssignments");
     block
@@ -454,7 +454,7 @@ pub(crate) fn assignments(reference: Node<'_>) -> impl Iterator<Item = Node<'_>>
         .flat_map(|block| block.children_named("ParameterAssignment"))
 }
 
-/// The declaration of a parameter by an entry itself.
+/// Returns the declaration of a parameter by the entry itself.
 fn declaration<'d>(entry: Node<'d>, name: &str) -> Option<Node<'d>> {
     let block = entry.child("ParameterDeclarations")?;
     block.children_named("ParameterDeclaration").find(|one| {

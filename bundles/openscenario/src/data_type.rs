@@ -1,4 +1,4 @@
-//! The data types of attributes and parameters, and their values.
+//! Data types of attributes and parameters, and their values.
 
 use std::borrow::Cow;
 
@@ -11,9 +11,9 @@ use crate::text::trim;
 pub enum DataType {
     /// `true`, `false`, `1`, `0`
     Boolean,
-    /// A 64-bit floating point number, `INF`, `-INF` and `NaN` among them.
+    /// A 64-bit floating point number. `INF`, `-INF` and `NaN` are allowed.
     Double,
-    /// A signed 32-bit integer; called `integer` before 1.2.
+    /// A signed 32-bit integer. It is called `integer` before 1.2.
     Int,
     /// An unsigned 32-bit integer.
     UnsignedInt,
@@ -26,7 +26,7 @@ pub enum DataType {
 }
 
 impl DataType {
-    /// The type that a `parameterType` or `variableType` names.
+    /// Returns the type that a `parameterType` or `variableType` names.
     pub fn of_declaration(word: &str) -> Option<DataType> {
         Some(match word {
             "boolean" => DataType::Boolean,
@@ -40,7 +40,7 @@ impl DataType {
         })
     }
 
-    /// The type that the schemas call by this name; `None` for enumerations.
+    /// Returns the type with this name in the schemas, or `None` for enumerations.
     pub fn of_schema(name: &str) -> Option<DataType> {
         Some(match name {
             "Boolean" => DataType::Boolean,
@@ -54,7 +54,7 @@ impl DataType {
         })
     }
 
-    /// What authors call it: the word of `parameterType`.
+    /// Returns the name of the type in `parameterType`.
     pub fn word(self) -> &'static str {
         match self {
             DataType::Boolean => "boolean",
@@ -67,7 +67,7 @@ impl DataType {
         }
     }
 
-    /// Whether values of the type are numbers.
+    /// Checks whether values of the type are numbers.
     pub fn is_numeric(self) -> bool {
         !matches!(
             self,
@@ -75,12 +75,12 @@ impl DataType {
         )
     }
 
-    /// Whether values of the type have an order: numbers and points in time.
+    /// Checks whether values of the type are ordered. This holds for numbers and points in time.
     pub fn is_ordered(self) -> bool {
         self.is_numeric() || self == DataType::DateTime
     }
 
-    /// What may be written, for messages.
+    /// Returns the allowed notation for messages.
     pub fn allowed(self) -> &'static str {
         match self {
             DataType::Boolean => "`true` or `false`",
@@ -93,7 +93,7 @@ impl DataType {
         }
     }
 
-    /// The integers of the type.
+    /// Returns the range of integers of the type.
     pub fn range(self) -> Option<std::ops::RangeInclusive<i64>> {
         match self {
             DataType::Int => Some(i64::from(i32::MIN)..=i64::from(i32::MAX)),
@@ -103,7 +103,7 @@ impl DataType {
         }
     }
 
-    /// Reads a literal of the type; `None` when it is none.
+    /// Parses a literal of the type. Returns `None` if the text is no such literal.
     pub fn parse<'d>(self, text: &'d str) -> Option<Value<'d>> {
         match self {
             DataType::Boolean => parse_boolean(text).map(Value::Boolean),
@@ -122,21 +122,21 @@ impl DataType {
     }
 }
 
-/// A value, resolved.
+/// A resolved value.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value<'d> {
-    /// Of one of the integer types.
+    /// A value of one of the integer types.
     Integer(i64),
-    /// Of type double; any that a double can be.
+    /// A value of type double. It may be infinite or NaN.
     Double(f64),
-    /// Of type boolean.
+    /// A value of type boolean.
     Boolean(bool),
-    /// Of type string or dateTime.
+    /// A value of type string or dateTime.
     Text(Cow<'d, str>),
 }
 
 impl<'d> Value<'d> {
-    /// As a text, the way an author would write it.
+    /// Returns the value as text, in the notation of an author.
     pub fn text(&self) -> Cow<'d, str> {
         match self {
             Value::Integer(value) => Cow::Owned(value.to_string()),
@@ -146,7 +146,7 @@ impl<'d> Value<'d> {
         }
     }
 
-    /// As a number: a text that spells one counts.
+    /// Returns the value as a number. A text that contains a number counts.
     pub fn number(&self) -> Option<f64> {
         match self {
             Value::Integer(value) => Some(*value as f64),
@@ -156,7 +156,8 @@ impl<'d> Value<'d> {
         }
     }
 
-    /// As an integer: a double without a fraction counts, and a text that spells one.
+    /// Returns the value as an integer. A double without a fraction counts, and so does a text that
+    /// contains an integer.
     pub fn integer(&self) -> Option<i64> {
         match self {
             Value::Integer(value) => Some(*value),
@@ -166,7 +167,7 @@ impl<'d> Value<'d> {
         }
     }
 
-    /// As true or false.
+    /// Returns the value as true or false.
     pub fn flag(&self) -> Option<bool> {
         match self {
             Value::Boolean(value) => Some(*value),
@@ -186,9 +187,9 @@ impl From<expr::Value> for Value<'_> {
     }
 }
 
-/// The integer that a double is, if it is one.
+/// Returns the integer that equals the double, if there is one.
 pub(crate) fn integral(value: f64) -> Option<i64> {
-    // Beyond 2^53 a double is whole by lack of digits, and the cast saturates.
+    // Beyond 2^53 every double is whole because it lacks digits. The cast saturates there.
     (value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0).then_some(value as i64)
 }
 
@@ -203,26 +204,26 @@ fn write_double(value: f64) -> String {
     }
 }
 
-/// A double in XML Schema's spelling, white space around it ignored.
+/// Parses a double in the notation of XML Schema. White space around it is ignored.
 pub fn parse_double(text: &str) -> Option<f64> {
     match trim(text) {
         "INF" => Some(f64::INFINITY),
         "-INF" => Some(f64::NEG_INFINITY),
         "NaN" => Some(f64::NAN),
         text => {
-            // Rust also reads `inf`, `infinity` and `nan`, in any case.
+            // Rust also parses `inf`, `infinity` and `nan`, in any case.
             let plain = |byte: u8| byte.is_ascii_digit() || b"+-.eE".contains(&byte);
             text.bytes().all(plain).then(|| text.parse().ok()).flatten()
         }
     }
 }
 
-/// An integer in XML Schema's spelling, white space around it ignored.
+/// Parses an integer in the notation of XML Schema. White space around it is ignored.
 pub(crate) fn parse_integer(text: &str) -> Option<i64> {
     trim(text).parse().ok()
 }
 
-/// A boolean in XML Schema's spelling, white space around it ignored.
+/// Parses a boolean in the notation of XML Schema. White space around it is ignored.
 pub(crate) fn parse_boolean(text: &str) -> Option<bool> {
     match trim(text) {
         "true" | "1" => Some(true),

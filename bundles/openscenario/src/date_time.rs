@@ -1,13 +1,13 @@
-//! Date-times as OpenSCENARIO writes them: the extended format of ISO 8601 (`xsd:dateTime`).
+//! Date-times in the notation of OpenSCENARIO: the extended format of ISO 8601 (`xsd:dateTime`).
 
 use std::fmt;
 
 use crate::text::trim;
 
-/// A point in time. Those with and without a time zone do not compare.
+/// A point in time. Points with and without a time zone do not compare.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DateTime {
-    /// Seconds since 1970-01-01T00:00:00, in UTC when there is a zone.
+    /// Seconds since 1970-01-01T00:00:00. They are in UTC if there is a zone.
     pub seconds: f64,
     /// The year as written.
     pub year: i64,
@@ -15,7 +15,7 @@ pub struct DateTime {
     pub has_zone: bool,
 }
 
-/// Why a text is no date-time: a sentence fragment.
+/// Reason why a text is no date-time, as a sentence fragment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DateTimeError(pub &'static str);
 
@@ -28,10 +28,10 @@ impl fmt::Display for DateTimeError {
 const FORM: DateTimeError = DateTimeError("must be written like 2026-01-31T18:30:00+01:00");
 
 impl DateTime {
-    /// Reads `yyyy-MM-ddThh:mm:ss[.f][Z|±hh:mm]`.
+    /// Parses `yyyy-MM-ddThh:mm:ss[.f][Z|±hh:mm]`.
     ///
     /// # Errors
-    /// When it is written otherwise, or when there is no such day or time.
+    /// Fails if the text has another form, or if the day or time does not exist.
     pub fn parse(text: &str) -> Result<DateTime, DateTimeError> {
         let text = trim(text);
         let (sign, rest) = text.strip_prefix('-').map_or((1, text), |rest| (-1, rest));
@@ -70,7 +70,7 @@ fn digits(text: Option<&str>, len: std::ops::RangeInclusive<usize>) -> Result<i6
     }
 }
 
-/// The clock and the zone in minutes.
+/// Splits a time into the clock and the zone in minutes.
 fn split_zone(time: &str) -> Result<(&str, Option<i64>), DateTimeError> {
     if let Some(clock) = time.strip_suffix('Z') {
         return Ok((clock, Some(0)));
@@ -128,8 +128,8 @@ fn days(year: i64, month: i64) -> i64 {
     }
 }
 
-/// Days in the proleptic Gregorian calendar (Howard Hinnant, "chrono-compatible low-level date
-/// algorithms", `days_from_civil`).
+/// Returns the days in the proleptic Gregorian calendar (Howard Hinnant, "chrono-compatible
+/// low-level date algorithms", `days_from_civil`).
 fn days_since_1970(year: i64, month: i64, day: i64) -> i64 {
     let year = if month <= 2 { year - 1 } else { year };
     let era = year.div_euclid(400);

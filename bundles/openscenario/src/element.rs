@@ -1,4 +1,4 @@
-//! An element of a scenario, with what its attributes mean where it stands.
+//! Element of a scenario, with the meaning that its attributes have in its context.
 
 use std::borrow::Cow;
 
@@ -11,8 +11,8 @@ use crate::scenario::Scenario;
 use crate::scope::{ContextId, Declaration};
 use crate::text::trim;
 
-/// A node together with where it is read: in the document that is checked, or as the entry of a
-/// catalog that a reference leads to, with what that reference assigns.
+/// A node together with the context in which it is read. The context is the checked document, or a
+/// catalog entry with the values that its reference assigns.
 #[derive(Clone, Copy)]
 pub struct Element<'m, 'd> {
     pub(crate) scenario: &'m Scenario<'d>,
@@ -33,45 +33,48 @@ impl std::fmt::Debug for Element<'_, '_> {
 }
 
 impl<'m, 'd> Element<'m, 'd> {
-    /// The node in its document.
+    /// Returns the node in its document.
     pub fn node(self) -> Node<'d> {
         self.node
     }
 
-    /// The scenario that it is read in.
+    /// Returns the scenario that the element is read in.
     pub fn scenario(self) -> &'m Scenario<'d> {
         self.scenario
     }
 
-    /// The local name.
+    /// Returns the local name.
     pub fn name(self) -> &'d str {
         self.node.name()
     }
 
-    /// Whether it has this name.
+    /// Checks whether the element has this name.
     pub fn is(self, name: &str) -> bool {
         self.node.is(name)
     }
 
-    /// The name of its type in the schema of its document's version, `AbsoluteSpeed`.
+    /// Returns the name of its type in the schema of its document's version, for example
+    /// `AbsoluteSpeed`.
     pub fn class(self) -> Option<&'static str> {
         self.scenario.typing(self.context)?.class(self.node)
     }
 
-    /// The version that the header of its own file names: of the catalog for an entry.
+    /// Returns the version in the header of its own file. For a catalog entry this is the version
+    /// of the catalog.
     pub fn stated_version(self) -> Option<crate::Version> {
         let document = self.node.document();
         let stated = qcbus_schema::version_of(&document, self.scenario.kind())?;
         Some((stated.major.try_into().ok()?, stated.minor.try_into().ok()?))
     }
 
-    /// The `CatalogReference` of the document that is checked that leads here; `None` for what is
-    /// written in that document itself.
+    /// Returns the `CatalogReference` of the checked document that leads here. Returns `None` for
+    /// elements of that document itself.
     pub fn reference(self) -> Option<Node<'d>> {
         self.led_to().map(|(reference, _)| reference)
     }
 
-    /// The entry that [`Element::reference`] leads to: this is in it, or in one that it refers to.
+    /// Returns the entry that [`Element::reference`] leads to. This element is in that entry, or in
+    /// one that the entry refers to.
     pub fn entry(self) -> Option<Node<'d>> {
         self.led_to().map(|(_, entry)| entry)
     }
@@ -86,8 +89,8 @@ impl<'m, 'd> Element<'m, 'd> {
         found
     }
 
-    /// The type of an attribute in the schema of its document's version; `None` where the schema
-    /// declares no such attribute, or not even the element.
+    /// Returns the type of an attribute in the schema of its document's version. Returns `None` if
+    /// the schema does not declare the attribute or the element.
     pub fn value_type(self, name: &str) -> Option<ValueType> {
         let attribute = self.node.attribute(name)?;
         self.scenario.typing(self.context)?.value(attribute)
@@ -97,8 +100,8 @@ impl<'m, 'd> Element<'m, 'd> {
         Element { node, ..self }
     }
 
-    /// The element around it. What is around an entry of a catalog is the element with the
-    /// reference to it.
+    /// Returns the parent element. The parent of a catalog entry is the element with the reference
+    /// to it.
     pub fn parent(self) -> Option<Element<'m, 'd>> {
         let context = self.scenario.context(self.context);
         if self.node != context.top {
@@ -113,34 +116,35 @@ impl<'m, 'd> Element<'m, 'd> {
         })
     }
 
-    /// The elements around it, the nearest first.
+    /// Returns the ancestors, the nearest first.
     pub fn ancestors(self) -> impl Iterator<Item = Element<'m, 'd>> {
         std::iter::successors(self.parent(), |element| element.parent())
     }
 
-    /// The nearest element of this name around it.
+    /// Returns the nearest ancestor of this name.
     pub fn ancestor(self, name: &str) -> Option<Element<'m, 'd>> {
         self.ancestors().find(|element| element.is(name))
     }
 
-    /// The elements directly within it.
+    /// Returns the child elements.
     pub fn children(self) -> impl Iterator<Item = Element<'m, 'd>> {
         self.node.children().map(move |node| self.at(node))
     }
 
-    /// The first element of this name directly within it.
+    /// Returns the first child of this name.
     pub fn child(self, name: &str) -> Option<Element<'m, 'd>> {
         self.node.child(name).map(|node| self.at(node))
     }
 
-    /// The element that this path of names leads to, the first of each name.
+    /// Returns the element at this path of names. On each level the first child of the name is
+    /// taken.
     pub fn path(self, names: &[&str]) -> Option<Element<'m, 'd>> {
         names
             .iter()
             .try_fold(self, |element, name| element.child(name))
     }
 
-    /// The elements of this name directly within it.
+    /// Returns the children of this name.
     pub fn children_named<'s>(
         self,
         name: &'s str,
@@ -150,12 +154,12 @@ impl<'m, 'd> Element<'m, 'd> {
             .map(move |node| self.at(node))
     }
 
-    /// All elements within it.
+    /// Returns all descendants.
     pub fn descendants(self) -> impl Iterator<Item = Element<'m, 'd>> {
         self.node.descendants().map(move |node| self.at(node))
     }
 
-    /// All elements of this name within it; does not follow references to catalogs.
+    /// Returns all descendants of this name. Does not follow references to catalogs.
     pub fn descendants_named(
         self,
         name: &str,
@@ -165,22 +169,22 @@ impl<'m, 'd> Element<'m, 'd> {
             .map(move |node| self.at(node))
     }
 
-    /// An attribute as it is written.
+    /// Returns an attribute as it is written.
     pub fn written(self, name: &str) -> Option<&'d str> {
         self.node.attr(name)
     }
 
-    /// An attribute.
+    /// Returns an attribute.
     pub fn attribute(self, name: &str) -> Option<Attribute<'d>> {
         self.node.attribute(name)
     }
 
-    /// Whether an attribute is there, whatever it says.
+    /// Checks whether an attribute exists, with any value.
     pub fn has(self, name: &str) -> bool {
         self.node.attr(name).is_some()
     }
 
-    /// An attribute as it is to be understood.
+    /// Returns an attribute as it is understood.
     pub fn read(self, name: &str) -> Reading<'d> {
         match self.node.attribute(name) {
             None => Reading::Absent,
@@ -188,12 +192,13 @@ impl<'m, 'd> Element<'m, 'd> {
         }
     }
 
-    /// One of its attributes as it is to be understood.
+    /// Returns one of its attributes as it is understood.
     pub fn reading(self, attribute: Attribute<'d>) -> Reading<'d> {
         self.scenario.read(attribute, self.context)
     }
 
-    /// An attribute's text, parameters replaced; `None` when it is missing or unknown.
+    /// Returns an attribute's text with parameters replaced. Returns `None` if it is missing or
+    /// unknown.
     pub fn text(self, name: &str) -> Option<Cow<'d, str>> {
         match self.read(name) {
             Reading::Literal(text) => Some(Cow::Borrowed(text)),
@@ -202,7 +207,7 @@ impl<'m, 'd> Element<'m, 'd> {
         }
     }
 
-    /// Like [`text`](Element::text), without white space around it: for words and numbers.
+    /// Like [`text`](Element::text), but without white space around it. For words and numbers.
     pub fn word(self, name: &str) -> Option<Cow<'d, str>> {
         match self.text(name)? {
             Cow::Borrowed(text) => Some(Cow::Borrowed(trim(text))),
@@ -210,12 +215,12 @@ impl<'m, 'd> Element<'m, 'd> {
         }
     }
 
-    /// A finite number; `None` when it is missing, unknown or broken.
+    /// Returns a finite number. Returns `None` if it is missing, unknown or broken.
     pub fn number(self, name: &str) -> Option<f64> {
         self.double(name).filter(|value| value.is_finite())
     }
 
-    /// A double, `INF` and `NaN` among them.
+    /// Returns a double, which may be `INF` or `NaN`.
     pub fn double(self, name: &str) -> Option<f64> {
         match self.read(name) {
             Reading::Literal(text) => parse_double(text),
@@ -224,7 +229,7 @@ impl<'m, 'd> Element<'m, 'd> {
         }
     }
 
-    /// An integer.
+    /// Returns an integer.
     pub fn integer(self, name: &str) -> Option<i64> {
         match self.read(name) {
             Reading::Literal(text) => parse_integer(text),
@@ -233,7 +238,7 @@ impl<'m, 'd> Element<'m, 'd> {
         }
     }
 
-    /// True or false.
+    /// Returns true or false.
     pub fn flag(self, name: &str) -> Option<bool> {
         match self.read(name) {
             Reading::Literal(text) => parse_boolean(text),
@@ -242,7 +247,7 @@ impl<'m, 'd> Element<'m, 'd> {
         }
     }
 
-    /// The value of a reading; a literal is taken as text.
+    /// Returns the value of a reading. A literal is taken as text.
     pub fn value(self, name: &str) -> Option<Value<'d>> {
         match self.read(name) {
             Reading::Literal(text) => Some(Value::Text(Cow::Borrowed(text))),
@@ -251,17 +256,17 @@ impl<'m, 'd> Element<'m, 'd> {
         }
     }
 
-    /// The parameter that a name means here.
+    /// Returns the parameter that a name means here.
     pub fn parameter(self, name: &str) -> Option<&'m Declaration<'d>> {
         self.scenario.context(self.context).get(self.node, name)
     }
 
-    /// The names of the parameters that hold here, the innermost first.
+    /// Returns the names of the parameters that are in scope here, the innermost first.
     pub fn parameter_names(self) -> impl Iterator<Item = &'d str> {
         self.scenario.context(self.context).names(self.node)
     }
 
-    /// What it declares itself, in its own `ParameterDeclarations`.
+    /// Returns the declarations in its own `ParameterDeclarations`.
     pub fn declarations(self) -> &'m [Declaration<'d>] {
         let frame = self.scenario.context(self.context).frame(self.node);
         frame.map_or(&[], |frame| frame.declarations.as_slice())

@@ -1,4 +1,4 @@
-//! Who takes part: scenario objects, trailers, and selections of them.
+//! Entities: scenario objects, trailers, and selections of them.
 
 use std::borrow::Cow;
 
@@ -9,7 +9,7 @@ use crate::element::Element;
 use crate::scenario::Scenario;
 use crate::scope::ContextId;
 
-/// What an entity is.
+/// Kind of an entity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum EntityKind {
     /// `Vehicle`
@@ -18,14 +18,14 @@ pub enum EntityKind {
     Pedestrian,
     /// `MiscObject`
     MiscObject,
-    /// `ExternalObjectReference`: what it is only the simulator knows.
+    /// `ExternalObjectReference`: only the simulator knows the kind.
     External,
-    /// Nobody knows: its catalog entry was not found, or it has no object.
+    /// Unknown kind: the catalog entry was not found, or the entity has no object.
     Unknown,
 }
 
 impl EntityKind {
-    /// The element.
+    /// Returns the name of the element.
     pub fn element(self) -> &'static str {
         match self {
             EntityKind::Vehicle => "Vehicle",
@@ -48,17 +48,17 @@ pub struct Entity<'d> {
 }
 
 impl<'d> Entity<'d> {
-    /// Its name, parameters replaced.
+    /// Returns its name with parameters replaced.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What it is.
+    /// Returns its kind.
     pub fn kind(&self) -> EntityKind {
         self.kind
     }
 
-    /// The `ScenarioObject`.
+    /// Returns the `ScenarioObject`.
     pub fn element<'m>(&self, scenario: &'m Scenario<'d>) -> Element<'m, 'd> {
         Element {
             scenario,
@@ -67,7 +67,8 @@ impl<'d> Entity<'d> {
         }
     }
 
-    /// The `Vehicle`, `Pedestrian` or `MiscObject`, in the document or as the entry of a catalog.
+    /// Returns the `Vehicle`, `Pedestrian` or `MiscObject`, from the document or from a catalog
+    /// entry.
     pub fn object<'m>(&self, scenario: &'m Scenario<'d>) -> Option<Element<'m, 'd>> {
         let (node, context) = self.object?;
         Some(Element {
@@ -88,22 +89,22 @@ pub struct Selection<'d> {
 }
 
 impl<'d> Selection<'d> {
-    /// Its name, parameters replaced.
+    /// Returns its name with parameters replaced.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The `EntitySelection`.
+    /// Returns the `EntitySelection`.
     pub fn element<'m>(&self, scenario: &'m Scenario<'d>) -> Element<'m, 'd> {
         scenario.element(self.node)
     }
 
-    /// The names of its members, as far as it lists them.
+    /// Returns the names of the members that it lists.
     pub fn members(&self) -> impl Iterator<Item = &str> {
         self.members.iter().map(|name| &**name)
     }
 
-    /// The types of its members (`vehicle`, `pedestrian`, …), as far as it goes by type.
+    /// Returns the types by which it selects members (`vehicle`, `pedestrian`, …).
     pub fn types(&self) -> impl Iterator<Item = &str> {
         self.types.iter().map(|name| &**name)
     }
@@ -118,7 +119,7 @@ pub struct Entities<'d> {
     selection_names: HashMap<String, u32>,
 }
 
-/// What the object of a `ScenarioObject` may be.
+/// Elements that may be the object of a `ScenarioObject`.
 const OBJECTS: [&str; 4] = [
     "Vehicle",
     "Pedestrian",
@@ -160,7 +161,7 @@ impl<'d> Entities<'d> {
                 object: object.map(|object| (object.node, object.context)),
             });
         }
-        // A trailer that is written into its vehicle is an entity of its own (1.3).
+        // A trailer that is defined inside its vehicle is a separate entity (1.3).
         let trailer = object.and_then(|object| object.path(&["Trailer", "Trailer"]));
         if let Some(trailer) = trailer.filter(|_| depth < 16) {
             self.add(trailer, depth + 1);
@@ -189,40 +190,41 @@ impl<'d> Entities<'d> {
         });
     }
 
-    /// The scenario objects in document order.
+    /// Returns the scenario objects in document order.
     pub fn objects(&self) -> &[Entity<'d>] {
         &self.objects
     }
 
-    /// The selections in document order.
+    /// Returns the selections in document order.
     pub fn selections(&self) -> &[Selection<'d>] {
         &self.selections
     }
 
-    /// The first scenario object of this name.
+    /// Returns the first scenario object of this name.
     pub fn object(&self, name: &str) -> Option<&Entity<'d>> {
         self.objects.get(*self.object_names.get(name)? as usize)
     }
 
-    /// The first selection of this name.
+    /// Returns the first selection of this name.
     pub fn selection(&self, name: &str) -> Option<&Selection<'d>> {
         self.selections
             .get(*self.selection_names.get(name)? as usize)
     }
 
-    /// Whether there is a scenario object or a selection of this name.
+    /// Checks whether a scenario object or a selection of this name exists.
     pub fn contains(&self, name: &str) -> bool {
         self.object_names.contains_key(name) || self.selection_names.contains_key(name)
     }
 
-    /// All names.
+    /// Returns all names.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         let objects = self.objects.iter().map(Entity::name);
         objects.chain(self.selections.iter().map(Selection::name))
     }
 
-    /// The scenario objects that a name stands for: itself, or the members of a selection, of
-    /// selections within it, too. `None` when a part of it is not known.
+    /// Returns the scenario objects that a name stands for. This is the object itself, or the
+    /// members of a selection and of the selections within it. Returns `None` if a part of it is
+    /// unknown.
     pub fn expand(&self, name: &str) -> Option<Vec<&Entity<'d>>> {
         let mut found = Vec::new();
         let mut seen: HashSet<&str> = HashSet::new();
@@ -254,12 +256,12 @@ impl<'d> Entities<'d> {
     }
 }
 
-/// Whether an entity is of an `objectType`.
+/// Checks whether an entity is of an `objectType`.
 fn is_of_type(kind: EntityKind, object_type: &str) -> bool {
     match object_type {
         "vehicle" => kind == EntityKind::Vehicle,
         "pedestrian" => kind == EntityKind::Pedestrian,
-        // `miscellaneous` is the standard's word, `misc` that of some of its examples.
+        // The standard uses `miscellaneous`. Some of its examples use `misc`.
         "miscellaneous" | "misc" => kind == EntityKind::MiscObject,
         "external" => kind == EntityKind::External,
         _ => false,

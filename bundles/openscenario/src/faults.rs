@@ -1,33 +1,33 @@
-//! What can be wrong with a value that is not written out.
+//! Faults of values that are not literals.
 
 use qcbus_document::Attribute;
 
 use crate::data_type::Value;
 
-/// A value of the document that cannot be had as it is written, or only against the standard.
+/// A value of the document that cannot be resolved as written, or only against the standard.
 #[derive(Debug, Clone)]
 pub struct ValueFault<'d> {
     /// The attribute.
     pub attribute: Attribute<'d>,
-    /// What is wrong.
+    /// Kind of the fault.
     pub kind: ValueFaultKind,
-    /// The offending part, in bytes from the start of the value.
+    /// Position of the offending part, in bytes from the start of the value.
     pub at: usize,
-    /// The parameter in question; empty when the fault is about none.
+    /// Parameter that the fault is about. Empty if there is none.
     pub name: String,
-    /// What was found and what is allowed: a sentence fragment without the attribute's name.
+    /// The found and the allowed value: a sentence fragment without the attribute's name.
     pub text: String,
-    /// Whether the schema's checker says it as well: what is written is no value of the attribute's
-    /// type, whatever the parameters are.
+    /// Whether the schema checker reports it too. This is so if the written text can never be a
+    /// value of the attribute's type, whatever the parameters are.
     pub said_by_schema: bool,
 }
 
-/// What is wrong with a value. Each kind is one rule's.
+/// Kind of a fault of a value. Each kind belongs to one rule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ValueFaultKind {
     /// No parameter of this name is declared around the element.
     Undeclared,
-    /// No parameter, but a variable has this name.
+    /// A variable, not a parameter, has this name.
     Variable,
     /// A declaration uses a parameter that is declared after it, or itself.
     Order,
@@ -37,37 +37,38 @@ pub enum ValueFaultKind {
     Arguments,
     /// Numbers and booleans are mixed up.
     Types,
-    /// An expression has no value: a division by zero, a bracket too many.
+    /// An expression has no value, for example because of a division by zero or an extra bracket.
     Evaluation,
-    /// An expression is longer or deeper than what is evaluated.
+    /// An expression is too long or too deep to be evaluated.
     Limit,
     /// The result of an expression does not fit its attribute.
     Result,
-    /// The result of an expression has no fraction, but its type is double where an integer is due.
+    /// The result of an expression has no fraction, but its type is double and the attribute
+    /// requires an integer.
     Narrowed,
-    /// The value of a parameter does not fit the attribute that it is used for.
+    /// The value of a parameter does not fit an attribute that uses it.
     Parameter,
-    /// The value of a parameter is none of the words that the attribute may have.
+    /// The value of a parameter is not one of the words that the attribute allows.
     Word,
-    /// A declared value is no literal of the declared type.
+    /// A declared value is not a literal of the declared type.
     Declared,
-    /// An expression where the attribute takes none: text, date-time, words.
+    /// An attribute has an expression but does not allow one: text, date-time, words.
     InText,
-    /// A parameter within a longer text, which the standard does not replace.
+    /// A parameter is inside a longer text, where the standard does not replace it.
     Embedded,
-    /// A substitution that one simulator knows and the standard does not.
+    /// A substitution that one simulator supports and the standard does not define.
     Dialect(Dialect),
 }
 
 /// Substitutions beyond the standard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Dialect {
-    /// `$(find-pkg-share …)`, `$(var …)`: of ROS launch files.
+    /// `$(find-pkg-share …)`, `$(var …)`: from ROS launch files.
     Ros,
 }
 
 impl Dialect {
-    /// What messages call it.
+    /// Returns its name for messages.
     pub fn name(self) -> &'static str {
         match self {
             Dialect::Ros => "a substitution of ROS launch files",
@@ -82,7 +83,7 @@ pub(crate) struct Problem<'d> {
     pub(crate) at: usize,
     pub(crate) name: String,
     pub(crate) text: String,
-    /// What the value is nevertheless, where the fault leaves no doubt about it.
+    /// The value in spite of the fault, where it is still unambiguous.
     pub(crate) value: Option<Value<'d>>,
 }
 

@@ -1,8 +1,8 @@
-//! What kind of document a file of OpenSCENARIO is.
+//! Form of an OpenSCENARIO document.
 
 use qcbus_document::Document;
 
-/// The three forms of a document, told apart by what follows the file header.
+/// The three forms of a document. The elements after the file header distinguish them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     /// Entities and a storyboard.
@@ -16,7 +16,7 @@ pub enum Form {
 }
 
 impl Form {
-    /// The form of a document.
+    /// Returns the form of a document.
     pub fn of(document: &Document<'_>) -> Form {
         let has = |name: &str| {
             document

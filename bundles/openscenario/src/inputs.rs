@@ -1,4 +1,4 @@
-//! What a scenario is read from.
+//! Inputs that a scenario is built from.
 
 use std::sync::Arc;
 
@@ -10,9 +10,9 @@ use crate::network::RoadNetwork;
 /// The documents of one check.
 #[derive(Debug, Clone)]
 pub struct Inputs<'d> {
-    /// The document that is checked.
+    /// The checked document.
     pub document: Document<'d>,
-    /// What its name promises.
+    /// Kind of the file by its name.
     pub kind: FileKind,
     /// The version in its header.
     pub version: Option<Version>,
@@ -20,7 +20,7 @@ pub struct Inputs<'d> {
     pub map: LinkedMap,
     /// The catalogs that could be read, in the order of the references.
     pub catalogs: Vec<LinkedCatalog<'d>>,
-    /// Offsets of the `Directory` elements of whose catalogs not every one could be read.
+    /// Offsets of the `Directory` elements with at least one catalog that could not be read.
     pub incomplete: Vec<u32>,
 }
 
@@ -36,14 +36,14 @@ pub struct LinkedCatalog<'d> {
 /// The map that the document's `LogicFile` leads to.
 #[derive(Debug, Clone)]
 pub enum LinkedMap {
-    /// The document names none.
+    /// The document names no map.
     Unnamed,
-    /// A name that the simulator knows, and no file.
+    /// The document names a map that only the simulator knows, not a file.
     Simulator,
-    /// It leads nowhere, or to a file that could not be read.
+    /// The reference leads nowhere, or to a file that could not be read.
     NotHad,
-    /// It leads to a file that is no OpenDRIVE map.
+    /// The reference leads to a file that is no OpenDRIVE map.
     Foreign,
-    /// Its roads; whoever checks may keep them for the next scenario.
+    /// The roads of the map. The caller may cache them for the next scenario.
     Roads(Arc<RoadNetwork>),
 }

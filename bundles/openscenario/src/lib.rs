@@ -1,10 +1,11 @@
-//! The OpenSCENARIO model: what a scenario says, read once and shared by all rules.
+//! The OpenSCENARIO model: the content of a scenario, read once and shared by all rules.
 //!
-//! [`Scenario`] is made of the document that is checked, the catalogs and the map that it refers to.
-//! Rules walk it by [`Element`]s: a node of a document together with where it is read, so that
-//! `$parameter` and `${expression}` have their value and what a catalog's entry was assigned holds in
-//! it. Whatever rests on a faulty value is `None`: the fault is listed once ([`Scenario::faults`])
-//! and leads to nothing else. `docs/openscenario-model.md` is the guide.
+//! [`Scenario`] is built from the checked document and the catalogs and the map that it refers to.
+//! Rules walk it by [`Element`]s. An element is a node of a document together with the context in
+//! which it is read. The context gives `$parameter` and `${expression}` their value, and applies
+//! the assignments of a reference to a catalog's entry. Everything that depends on a faulty value
+//! is `None`. The fault is listed once ([`Scenario::faults`]) and causes no further findings.
+//! `docs/openscenario-model.md` is the guide.
 
 pub mod expr;
 

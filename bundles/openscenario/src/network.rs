@@ -1,4 +1,4 @@
-//! The road network that a scenario takes place on.
+//! Road network of a scenario.
 
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
@@ -11,23 +11,23 @@ use crate::roads_nearby::RoadsNearby;
 use crate::scenario::Scenario;
 use crate::ways::Ways;
 
-/// What is known of the road network.
+/// State of the road network.
 #[derive(Debug, Clone, Copy)]
 pub enum Network<'m> {
-    /// The scenario names none.
+    /// The scenario names no road network.
     Unnamed,
     /// A map that only the simulator knows.
     Simulator,
-    /// It is named, and could not be read: said elsewhere.
+    /// The map is named but could not be read. This is reported elsewhere.
     NotHad,
-    /// It is no OpenDRIVE map.
+    /// The file is no OpenDRIVE map.
     Foreign,
-    /// Its roads.
+    /// The roads of the map.
     Map(&'m RoadNetwork),
 }
 
 impl<'m> Network<'m> {
-    /// The roads, if they are known.
+    /// Returns the roads, if they are known.
     pub fn map(self) -> Option<&'m RoadNetwork> {
         match self {
             Network::Map(network) => Some(network),
@@ -36,8 +36,8 @@ impl<'m> Network<'m> {
     }
 }
 
-/// A map and what scenarios ask of it. It may be kept for all scenarios on this map: whatever it
-/// has found out about its roads it need not find out again.
+/// A map with data that is derived from it for scenarios. It may be cached for all scenarios on
+/// this map, so that the data is computed only once.
 #[derive(Debug)]
 pub struct RoadNetwork {
     map: OwnedMap,
@@ -48,10 +48,10 @@ pub struct RoadNetwork {
 }
 
 impl RoadNetwork {
-    /// The road network of an image.
+    /// Creates the road network from an image.
     ///
     /// # Errors
-    /// When the bytes are no image.
+    /// Fails if the bytes are no valid image.
     pub fn of(image: Image) -> Result<RoadNetwork, ImageError> {
         Ok(RoadNetwork {
             map: OwnedMap::of(image)?,
@@ -62,22 +62,23 @@ impl RoadNetwork {
         })
     }
 
-    /// Looks at the map. What borrows from it stays inside.
+    /// Calls `look` with the map. Borrows from the map cannot leave the closure.
     pub fn with<T>(&self, look: impl for<'r> FnOnce(&RoadMap<'r>) -> T) -> T {
         self.map.with(look)
     }
 
-    /// Which roads are near a place.
+    /// Returns the index of roads by position.
     pub fn nearby(&self) -> &RoadsNearby {
         self.nearby.get_or_init(|| self.with(RoadsNearby::of))
     }
 
-    /// Where traffic gets from where; `None` where roads are linked in ways that do not join lanes.
+    /// Returns the connections that traffic can take. Returns `None` if roads have links that do
+    /// not join lanes.
     pub fn ways(&self) -> Option<&Ways> {
         self.ways.get_or_init(|| self.with(Ways::of)).as_ref()
     }
 
-    /// The ids of all lanes but the center lanes; `None` when one is not known.
+    /// Returns the ids of all lanes except the center lanes. Returns `None` if one id is unknown.
     pub fn lane_ids(&self) -> Option<&BTreeSet<i64>> {
         let ids = self.lane_ids.get_or_init(|| {
             self.with(|map| {
@@ -88,7 +89,8 @@ impl RoadNetwork {
         ids.as_ref()
     }
 
-    /// The most lanes that a road has on both sides together, in whichever of its lane sections.
+    /// Returns the largest number of lanes of a road. Each side counts with the lane section that
+    /// has the most lanes.
     pub fn most_lanes(&self) -> u64 {
         *self.most_lanes.get_or_init(|| {
             self.with(|map| map.roads().iter().map(lanes_of).max())
@@ -106,19 +108,19 @@ fn lanes_of(road: &Road<'_>) -> u64 {
     most.iter().sum()
 }
 
-/// Whether a road has a lane at a station.
+/// Result of the lookup of a lane at a station of a road.
 #[derive(Debug, Clone, Copy)]
 pub enum LaneAt<'m, 'r> {
-    /// This one.
+    /// The lane exists.
     Lane(LaneRef<'m, 'r>),
     /// The lane section there has no lane of this id.
     None(SectionRef<'m, 'r>),
-    /// The map is broken there.
+    /// The map is broken at this station.
     Unknown,
 }
 
 impl<'m, 'r> LaneAt<'m, 'r> {
-    /// The lane of a road at a station.
+    /// Looks up the lane of a road at a station.
     pub fn of(road: &'m Road<'r>, s: f64, lane: i64) -> LaneAt<'m, 'r> {
         let side = Side::of_lane_id(lane).unwrap_or(Side::Right);
         let Some(layer) = road.permanent() else {
@@ -134,7 +136,7 @@ impl<'m, 'r> LaneAt<'m, 'r> {
 }
 
 impl Scenario<'_> {
-    /// The road network.
+    /// Returns the road network.
     pub fn network(&self) -> Network<'_> {
         match self.map_input() {
             LinkedMap::Unnamed => Network::Unnamed,
@@ -145,7 +147,7 @@ impl Scenario<'_> {
         }
     }
 
-    /// Looks at the map, if it is known. What borrows from it stays inside.
+    /// Calls `look` with the map, if it is known. Borrows from the map cannot leave the closure.
     pub fn on_map<T>(&self, look: impl for<'r> FnOnce(&RoadMap<'r>) -> T) -> Option<T> {
         self.network().map().map(|network| network.with(look))
     }

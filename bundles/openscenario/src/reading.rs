@@ -1,4 +1,4 @@
-//! From what is written to a value: literals, parameters, expressions.
+//! Resolution of written text to a value: literals, parameters, expressions.
 
 use std::borrow::Cow;
 
@@ -10,34 +10,34 @@ use crate::faults::{Dialect, Problem, ValueFaultKind};
 use crate::scope::{Declaration, Declared, operand};
 use crate::text::{identifier, trim};
 
-/// An attribute as it is to be understood.
+/// An attribute as it is understood.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reading<'d> {
-    /// It is not there.
+    /// The attribute is missing.
     Absent,
-    /// It is written out. Whether it is a value of its type is the schema's question.
+    /// The attribute is a literal. The schema checks whether it is a value of its type.
     Literal(&'d str),
     /// The value of a parameter or an expression.
     Value(Value<'d>),
-    /// Nothing is known of it; why is said elsewhere.
+    /// The value is unknown. The reason is reported elsewhere.
     Unknown,
 }
 
-/// What a value is to be.
+/// Expected kind of a value.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Expected {
     /// A value of a basic type.
     Type(DataType),
     /// One of these words.
     Words(&'static [Box<str>]),
-    /// Anything.
+    /// Any value.
     Unknown,
 }
 
-/// How a value is written.
+/// Notation of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Form<'d> {
-    /// Written out.
+    /// A literal.
     Literal,
     /// `$name`
     Parameter(&'d str),
@@ -50,7 +50,7 @@ pub(crate) enum Form<'d> {
 }
 
 impl<'d> Form<'d> {
-    /// The form of an attribute's value.
+    /// Returns the notation of an attribute's value.
     pub(crate) fn of(raw: &'d str) -> Form<'d> {
         let Some(first) = raw.find('$') else {
             return Form::Literal;
@@ -83,7 +83,7 @@ impl<'d> Form<'d> {
     }
 }
 
-/// The value of a text of the expected kind.
+/// Resolves a text to a value of the expected kind.
 pub(crate) fn resolve<'m, 'd: 'm>(
     raw: &'d str,
     expected: Expected,
@@ -166,19 +166,20 @@ fn parameter<'m, 'd: 'm>(
     })
 }
 
-/// Rests on something whose fault is said elsewhere; [`crate::Scenario::faults`] does not list it.
+/// Returns a problem that follows from a fault that is reported elsewhere.
+/// [`crate::Scenario::faults`] does not list it.
 fn unresolved<'d>() -> Problem<'d> {
     Problem::new(ValueFaultKind::Undeclared, 0, String::new())
 }
 
 impl Problem<'_> {
-    /// Whether it only follows from what is said elsewhere.
+    /// Checks whether it only follows from a fault that is reported elsewhere.
     pub(crate) fn is_silent(&self) -> bool {
         self.text.is_empty()
     }
 }
 
-/// The words that are allowed, the likely one as a question.
+/// Lists the allowed words. The most likely one is shown as a question.
 fn one_of(found: &str, words: &[Box<str>]) -> String {
     const MOST: usize = 12;
     let shown = words.iter().take(MOST);

@@ -1,14 +1,14 @@
-//! Which roads are near a place.
+//! Index of the roads by position.
 
 use foldhash::{HashMap, HashMapExt as _};
 use qcbus_opendrive::geometry::Pose;
 use qcbus_opendrive::{Road, RoadMap, Side};
 
-/// The edge of a cell, in metres: larger than most roads are wide.
+/// Edge length of a cell in metres. It is larger than the width of most roads.
 const CELL: f64 = 50.0;
-/// Roads are looked at every so many metres.
+/// Distance between two samples along a road in metres.
 const STEP: f64 = 5.0;
-/// No map is looked at in more places.
+/// Maximum number of samples of a map.
 const MOST: f64 = 1_000_000.0;
 
 /// A cross section of a road.
@@ -21,18 +21,18 @@ struct Sample {
     left: f64,
 }
 
-/// The roads of a map by where they are.
+/// The roads of a map by position.
 #[derive(Debug)]
 pub struct RoadsNearby {
     step: f64,
     samples: Vec<Sample>,
     cells: HashMap<(i64, i64), Vec<u32>>,
-    /// How far from the reference line lanes reach.
+    /// Largest distance of a lane edge from the reference line.
     widest: f64,
 }
 
 impl RoadsNearby {
-    /// Looks along all roads of a map.
+    /// Samples all roads of a map.
     pub fn of(map: &RoadMap<'_>) -> RoadsNearby {
         let length: f64 = map.roads().iter().filter_map(|road| road.length()).sum();
         let mut nearby = RoadsNearby {
@@ -67,12 +67,12 @@ impl RoadsNearby {
         }
     }
 
-    /// Whether nothing is known of where roads are.
+    /// Checks whether the position of every road is unknown.
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
     }
 
-    /// The cross sections within a square around a place, and perhaps some more.
+    /// Returns the cross sections within a square around a place, and possibly some more.
     fn around(&self, x: f64, y: f64, reach: f64) -> impl Iterator<Item = &Sample> {
         const MOST_CELLS: i64 = 100;
         let (low, high) = (cell(x - reach, y - reach), cell(x + reach, y + reach));
@@ -86,7 +86,7 @@ impl RoadsNearby {
         near.chain(everything)
     }
 
-    /// Whether a lane is within this distance.
+    /// Checks whether a lane is within this distance.
     pub fn is_near(&self, x: f64, y: f64, distance: f64) -> bool {
         let reach = distance + self.widest.min(10.0 * CELL) + self.step;
         self.around(x, y, reach).any(|sample| {
@@ -97,8 +97,8 @@ impl RoadsNearby {
         })
     }
 
-    /// The roads on whose lanes a place lies, in the order of the map, which is the one that this was
-    /// made of.
+    /// Returns the roads with lanes at this place, in the order of the map. `map` must be the one
+    /// that this index was built from.
     pub fn roads_at<'m, 'r>(&self, map: &'m RoadMap<'r>, x: f64, y: f64) -> Vec<&'m Road<'r>> {
         let stations = self.stations_at(map, x, y);
         let mut roads: Vec<usize> = stations.map(|(road, _, _)| road).collect();
@@ -108,8 +108,8 @@ impl RoadsNearby {
         roads.filter_map(|at| map.roads().get(at)).collect()
     }
 
-    /// The road of the map on whose lanes a place lies, with the place's s and t on it; `None` where it
-    /// is none, or more than one.
+    /// Returns the only road with lanes at this place, and the s and t of the place. Returns `None`
+    /// if there is no such road, or more than one.
     pub fn only_road_at<'m, 'r>(
         &self,
         map: &'m RoadMap<'r>,
@@ -123,7 +123,7 @@ impl RoadsNearby {
         Some((road, s, t))
     }
 
-    /// Where a place lies on lanes: the road, s and t, perhaps more than once.
+    /// Returns the road, s and t of a place that lies on lanes. An entry may occur more than once.
     fn stations_at(
         &self,
         map: &RoadMap<'_>,
@@ -141,7 +141,7 @@ impl RoadsNearby {
     }
 }
 
-/// The s and t of a place that lies well within the lanes of a road near a station.
+/// Returns the s and t of a place that lies well within the lanes of a road near a station.
 fn on(road: &Road<'_>, near: f64, x: f64, y: f64) -> Option<(f64, f64)> {
     const WITHIN: f64 = 0.25;
     let length = road.length()?;
@@ -175,7 +175,7 @@ fn sample(road: &Road<'_>, s: f64) -> Option<Sample> {
     })
 }
 
-/// A place along and beside a pose.
+/// Returns the coordinates of a place along and beside a pose.
 fn seen_from(pose: Pose, x: f64, y: f64) -> (f64, f64) {
     let (sin, cos) = pose.hdg.sin_cos();
     let (dx, dy) = (x - pose.x, y - pose.y);

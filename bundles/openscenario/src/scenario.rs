@@ -1,4 +1,4 @@
-//! The whole: the document that is checked with its catalogs and its map.
+//! The whole scenario: the checked document with its catalogs and its map.
 
 use std::sync::OnceLock;
 
@@ -19,15 +19,15 @@ use crate::reading::{self, Expected, Reading, resolve};
 use crate::scope::{Context, ContextId, DeclarationProblem, Declared, operand};
 use crate::storyboard::Storyboard;
 
-/// A document of OpenSCENARIO and all that it refers to.
+/// An OpenSCENARIO document and everything that it refers to.
 pub struct Scenario<'d> {
     document: Document<'d>,
     version: Version,
     form: Form,
     map: LinkedMap,
-    /// Never empty: the first is the document.
+    /// Contexts. The list is never empty: the first is the document.
     contexts: Vec<Context<'d>>,
-    /// What stands for a context that is not there.
+    /// Catalogs that references are looked up in.
     pub(crate) catalogs: Catalogs<'d>,
     pub(crate) links: HashMap<(ContextId, u32), Link<'d>>,
     pub(crate) assignment_problems: Vec<AssignmentProblem<'d>>,
@@ -37,24 +37,24 @@ pub struct Scenario<'d> {
     variables: OnceLock<HashSet<&'d str>>,
     with_dollar: OnceLock<Vec<Attribute<'d>>>,
     faults: OnceLock<Vec<ValueFault<'d>>>,
-    /// Each with the context of its entry.
+    /// Faults in catalog entries, each with the context of its entry.
     entry_faults: OnceLock<Vec<(ContextId, ValueFault<'d>)>>,
     entities: OnceLock<Entities<'d>>,
     storyboard: OnceLock<Storyboard<'d>>,
 }
 
-/// Files that name no version are read as the newest.
+/// Version that is assumed for files without a version.
 const NEWEST: Version = (1, 4);
 
 impl<'d> Scenario<'d> {
-    /// Reads declarations and follows references to catalogs; the rest is read when first asked for.
-    /// `None` when the document has no root element.
+    /// Reads declarations and follows references to catalogs. The rest is read on first use.
+    /// Returns `None` if the document has no root element.
     pub fn new(inputs: &Inputs<'d>) -> Option<Scenario<'d>> {
         Scenario::with_values(inputs, &HashMap::new())
     }
 
-    /// Like [`new`](Scenario::new), with values for parameters that the document itself declares, as a
-    /// distribution sets them.
+    /// Like [`new`](Scenario::new), with values for parameters that the document itself declares,
+    /// as a distribution sets them.
     pub fn with_values(
         inputs: &Inputs<'d>,
         values: &HashMap<&'d str, Declared<'d>>,
@@ -82,32 +82,32 @@ impl<'d> Scenario<'d> {
             storyboard: OnceLock::new(),
         };
         scenario.follow_references();
-        // Names that are written as parameters were read before all documents were known.
+        // Names that are written as parameters may have been read before all documents were known.
         scenario.typings = OnceLock::new();
         Some(scenario)
     }
 
-    /// The document that is checked.
+    /// Returns the checked document.
     pub fn document(&self) -> Document<'d> {
         self.document
     }
 
-    /// The version in the file header; the newest when there is none.
+    /// Returns the version in the file header, or the newest version if there is none.
     pub fn version(&self) -> Version {
         self.version
     }
 
-    /// The kind of file.
+    /// Returns the kind of file.
     pub(crate) fn kind(&self) -> FileKind {
         self.kind
     }
 
-    /// What kind of document it is.
+    /// Returns the form of the document.
     pub fn form(&self) -> Form {
         self.form
     }
 
-    /// The root element.
+    /// Returns the root element.
     pub fn root(&self) -> Element<'_, 'd> {
         Element {
             scenario: self,
@@ -116,7 +116,7 @@ impl<'d> Scenario<'d> {
         }
     }
 
-    /// The elements of a name in the document itself, in document order.
+    /// Returns the elements of a name in the document itself, in document order.
     pub fn elements(&self, name: &str) -> impl Iterator<Item = Element<'_, 'd>> {
         self.document.elements(name).map(|node| Element {
             scenario: self,
@@ -125,7 +125,7 @@ impl<'d> Scenario<'d> {
         })
     }
 
-    /// An element of the document itself.
+    /// Returns an element of the document itself.
     pub fn element(&self, node: Node<'d>) -> Element<'_, 'd> {
         Element {
             scenario: self,
@@ -134,10 +134,11 @@ impl<'d> Scenario<'d> {
         }
     }
 
-    /// The elements of a name in the document and in the entries of catalogs that it refers to, an
-    /// entry as often as it is referred to.
+    /// Returns the elements of a name in the document and in the catalog entries that it refers to.
+    /// An entry occurs once per reference.
     pub fn elements_everywhere(&self, name: &str) -> impl Iterator<Item = Element<'_, 'd>> {
-        // Thousands of references may lead to entries of the same few catalogs.
+        // The list is cached per document, because thousands of references may lead to entries of
+        // the same few catalogs.
         let mut known: Vec<(usize, Named<'d>)> = Vec::new();
         self.tops().flat_map(move |top| {
             let document = top.node.document();
@@ -157,7 +158,7 @@ impl<'d> Scenario<'d> {
         })
     }
 
-    /// The root element, and each entry of a catalog as often as it is referred to.
+    /// Returns the root element, and each catalog entry once per reference to it.
     pub fn tops(&self) -> impl Iterator<Item = Element<'_, 'd>> {
         (0..).zip(&self.contexts).map(|(context, one)| Element {
             scenario: self,
@@ -183,17 +184,17 @@ impl<'d> Scenario<'d> {
         &self.map
     }
 
-    /// The entities and selections.
+    /// Returns the entities and selections.
     pub fn entities(&self) -> &Entities<'d> {
         self.entities.get_or_init(|| Entities::of(self))
     }
 
-    /// The storyboard's tree, maneuvers from catalogs included.
+    /// Returns the storyboard's tree, including maneuvers from catalogs.
     pub fn storyboard(&self) -> &Storyboard<'d> {
         self.storyboard.get_or_init(|| Storyboard::of(self))
     }
 
-    /// Types of the elements of the document that a context reads.
+    /// Returns the types of the elements of the document that a context reads.
     pub(crate) fn typing(&self, context: ContextId) -> Option<&Typing> {
         let typings = self.typings.get_or_init(|| self.read_typings());
         typings
@@ -250,11 +251,11 @@ impl<'d> Scenario<'d> {
         resolve(raw, expected, self.version, &|name| read_in.get(node, name))
     }
 
-    /// What the value of an attribute is to be.
+    /// Returns the expected kind of an attribute's value.
     fn expected(&self, attribute: Attribute<'d>, context: ContextId) -> Expected {
         let node = attribute.node();
         if attribute.is("value") {
-            // The schema says text: the true type is that of a declaration.
+            // The schema declares text here. The declaration names the true type.
             let declared = match node.name() {
                 "ParameterDeclaration" => node.attr("parameterType"),
                 "VariableDeclaration" => node.attr("variableType"),
@@ -286,13 +287,13 @@ impl<'d> Scenario<'d> {
         }
     }
 
-    /// Every value of the document that cannot be had as it is written, in document order. What only
-    /// follows from another fault is not among them.
+    /// Returns every value of the document that cannot be resolved as written, in document order.
+    /// Consequences of another fault are left out.
     pub fn faults(&self) -> &[ValueFault<'d>] {
         self.faults.get_or_init(|| self.find_faults())
     }
 
-    /// The faults of some kinds.
+    /// Returns the faults of the given kinds.
     pub fn faults_of(&self, kinds: &[ValueFaultKind]) -> impl Iterator<Item = &ValueFault<'d>> {
         self.faults()
             .iter()
@@ -323,9 +324,9 @@ impl<'d> Scenario<'d> {
         faults
     }
 
-    /// The faults of some kinds that values have in the entries of catalogs that the document refers to.
-    /// What is assigned may cause them anew at every reference; what is wrong with an entry by itself is
-    /// listed once, at the first.
+    /// Returns the faults of the given kinds in the catalog entries that the document refers to.
+    /// Faults caused by assigned values are listed at every reference. Faults of the entry itself
+    /// are listed once, at the first reference.
     pub fn entry_faults_of(
         &self,
         kinds: &[ValueFaultKind],
@@ -377,8 +378,8 @@ impl<'d> Scenario<'d> {
         faults
     }
 
-    /// What is wrong with the defaults of an entry's parameters, but for those that the reference
-    /// assigns.
+    /// Adds the faults in the defaults of an entry's parameters. Parameters that the reference
+    /// assigns are left out.
     fn declared_faults(
         &self,
         id: ContextId,
@@ -402,8 +403,8 @@ impl<'d> Scenario<'d> {
         }
     }
 
-    /// The attributes of the document that are written as expressions, in document order, whatever is
-    /// wrong with them; what is text to the schema is none.
+    /// Returns the attributes of the document that are written as expressions, in document order,
+    /// even if faulty. Attributes that the schema declares as text are left out.
     pub fn written_expressions(&self) -> impl Iterator<Item = Attribute<'d>> {
         self.substituted(0).filter(|attribute| {
             let is_text = || {
@@ -416,8 +417,8 @@ impl<'d> Scenario<'d> {
         })
     }
 
-    /// Every expression of the document that has a value, in document order; what is text to the
-    /// schema is none.
+    /// Returns every expression of the document that has a value, in document order. Attributes
+    /// that the schema declares as text are left out.
     pub fn expressions(&self) -> impl Iterator<Item = (Attribute<'d>, Evaluated)> {
         self.written_expressions().filter_map(|attribute| {
             let context = &self.contexts[0];
@@ -427,7 +428,7 @@ impl<'d> Scenario<'d> {
         })
     }
 
-    /// Every use of a parameter in the document: the attribute and the parameter's name.
+    /// Returns every use of a parameter in the document: the attribute and the parameter's name.
     pub fn parameter_uses(&self) -> impl Iterator<Item = (Attribute<'d>, &'d str)> {
         self.substituted(0).flat_map(|attribute| {
             let raw = attribute.value();
@@ -442,13 +443,13 @@ impl<'d> Scenario<'d> {
         })
     }
 
-    /// The attributes of the document with a `$` in them, in document order.
+    /// Returns the attributes of the document that contain a `$`, in document order.
     pub fn with_dollar(&self) -> &[Attribute<'d>] {
         self.with_dollar
             .get_or_init(|| with_dollar(self.contexts[0].top).collect())
     }
 
-    /// The attributes of the document, or of an entry, that are not written out.
+    /// Returns the attributes of the document, or of an entry, that are not literals.
     fn substituted(&self, context: ContextId) -> impl Iterator<Item = Attribute<'d>> {
         let (document, entry) = match context {
             0 => (self.with_dollar(), None),
@@ -460,7 +461,7 @@ impl<'d> Scenario<'d> {
         })
     }
 
-    /// The fault with what the whole scenario knows about it.
+    /// Adds the knowledge of the whole scenario to a fault.
     fn explained(
         &self,
         attribute: Attribute<'d>,
@@ -481,7 +482,7 @@ impl<'d> Scenario<'d> {
                 node: attribute.node(),
                 context,
             };
-            // An entry of a catalog knows no scenario, and none of its variables.
+            // A catalog entry has no access to the scenario and its variables.
             if element.reference().is_none() && self.declares_variable(&fault.name) {
                 fault.kind = ValueFaultKind::Variable;
                 fault.text = format!(
@@ -490,7 +491,8 @@ impl<'d> Scenario<'d> {
                     fault.name
                 );
             } else {
-                // Enough to find a slip, and bounded where thousands of names meet thousands of faults.
+                // This is enough to find a typo. The limit bounds the work if thousands of names
+                // meet thousands of faults.
                 let names = element.parameter_names().take(500);
                 if let Some(near) = qcbus_schema::closest(&fault.name, names) {
                     fault.text.push_str(&format!("; `${near}` is"));
@@ -500,8 +502,8 @@ impl<'d> Scenario<'d> {
         fault
     }
 
-    /// Whether the attribute's type in the schema admits nothing of the form in which it is written.
-    /// Versions without a schema of their own are judged by no other, except as an information.
+    /// Checks whether the attribute's type in the schema never admits the written notation. A
+    /// version without its own schema is not judged by another one, except as an information.
     fn is_foreign_to_schema(&self, attribute: Attribute<'d>, context: ContextId) -> bool {
         let (major, minor) = (u32::from(self.version.0), u32::from(self.version.1));
         let version = qcbus_schema::Version { major, minor };
@@ -549,12 +551,13 @@ fn with_dollar<'d>(top: Node<'d>) -> impl Iterator<Item = Attribute<'d>> {
         .filter(|attribute| attribute.value().contains('$'))
 }
 
-/// Tells documents apart: where the text of their path lies in memory.
+/// Returns a key for a document: the address of its path text in memory.
 fn key(document: Document<'_>) -> usize {
     document.path().as_ptr() as usize
 }
 
-/// Names of what is declared or assigned are names, also where old files write a `$` before them.
+/// Checks for names of declared or assigned objects. They are plain names, even if old files write
+/// a `$` before them.
 fn is_plain(attribute: Attribute<'_>) -> bool {
     match attribute.name() {
         "name" => matches!(
@@ -566,7 +569,7 @@ fn is_plain(attribute: Attribute<'_>) -> bool {
     }
 }
 
-/// The value of a parameter is read with its declaration.
+/// Checks for the value of a parameter declaration. It is read with its declaration.
 fn is_declared_value(attribute: Attribute<'_>) -> bool {
     attribute.is("value") && attribute.node().is("ParameterDeclaration")
 }

@@ -1,5 +1,6 @@
-//! Parameters and where they hold: a declaration holds in the element around its
-//! `ParameterDeclarations`, the innermost of a name wins, and a catalog's entry sees its own only.
+//! Parameters and their scope. A declaration is in scope in the element around its
+//! `ParameterDeclarations`. The innermost declaration of a name wins. A catalog's entry sees only
+//! its own declarations.
 
 use foldhash::{HashMap, HashMapExt as _};
 use qcbus_document::Node;
@@ -10,29 +11,29 @@ use crate::expr::Operand;
 use crate::faults::{Problem, ValueFaultKind};
 use crate::reading::{Expected, resolve};
 
-/// A parameter as declared.
+/// A declared parameter.
 #[derive(Debug, Clone)]
 pub struct Declaration<'d> {
     /// The `ParameterDeclaration`.
     pub node: Node<'d>,
     /// Its name, without the `$` that old files write before it.
     pub name: &'d str,
-    /// Its type; `None` when `parameterType` is missing or no type.
+    /// Its type, or `None` if `parameterType` is missing or no type.
     pub data_type: Option<DataType>,
     /// Its value.
     pub declared: Declared<'d>,
 }
 
-/// What a declaration gives.
+/// Result of a declaration.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Declared<'d> {
     /// A value of its type.
     Value(Value<'d>),
-    /// Nothing that could be used; why is said about the declaration.
+    /// No usable value. The reason is reported at the declaration.
     Faulty,
 }
 
-/// What a declaration stands for, named by its element.
+/// Kind of a declaration, named by its element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Declares {
     /// `ParameterDeclaration`
@@ -47,7 +48,7 @@ pub enum Declares {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Frame<'d> {
     pub(crate) declarations: Vec<Declaration<'d>>,
-    /// The first of each name.
+    /// Index of the first declaration of each name.
     by_name: HashMap<&'d str, u32>,
 }
 
@@ -63,27 +64,28 @@ impl<'d> Frame<'d> {
     }
 }
 
-/// The number of a context in its scenario; 0 is the document that is checked.
+/// Number of a context in its scenario. 0 is the checked document.
 pub(crate) type ContextId = u32;
 
-/// Where values are read: a document, or an entry of a catalog with what a reference assigned.
+/// Context in which values are read: a document, or a catalog entry with the assigned values of its
+/// reference.
 #[derive(Debug, Clone)]
 pub(crate) struct Context<'d> {
     /// The root of the document, or the entry.
     pub(crate) top: Node<'d>,
-    /// The `CatalogReference` that leads here, and where that is read.
+    /// The `CatalogReference` that leads here, and its context.
     pub(crate) reference: Option<(Node<'d>, ContextId)>,
-    /// How many references lead from the document to here.
+    /// Number of references that lead from the document to here.
     pub(crate) depth: u32,
-    /// By the index of the element that they hold in.
+    /// Frames by the index of the element that they apply to.
     frames: HashMap<u32, Frame<'d>>,
 }
 
-/// What was found wrong with a declaration's value.
+/// A fault in the value of a declaration.
 pub(crate) type DeclarationProblem<'d> = (Node<'d>, Problem<'d>);
 
 impl<'d> Context<'d> {
-    /// Reads the declarations below `top` in document order; `assigned` replaces values of the
+    /// Reads the declarations below `top` in document order. `assigned` replaces values of the
     /// parameters that `top` itself declares.
     pub(crate) fn new(
         top: Node<'d>,
@@ -159,7 +161,7 @@ impl<'d> Context<'d> {
         }
     }
 
-    /// A parameter that is declared, but not before its use.
+    /// Explains that a parameter is declared, but not before its use.
     fn explain_order(&self, node: Node<'d>, problem: &mut Problem<'d>) {
         let block = node.parent();
         let later = block
@@ -182,7 +184,7 @@ impl<'d> Context<'d> {
         }
     }
 
-    /// The declaration that a name means at a node.
+    /// Returns the declaration that a name means at a node.
     pub(crate) fn get(&self, node: Node<'d>, name: &str) -> Option<&Declaration<'d>> {
         if self.frames.is_empty() {
             return None;
@@ -199,12 +201,12 @@ impl<'d> Context<'d> {
         None
     }
 
-    /// What an element declares.
+    /// Returns the declarations of an element.
     pub(crate) fn frame(&self, holder: Node<'d>) -> Option<&Frame<'d>> {
         self.frames.get(&holder.index())
     }
 
-    /// All names that hold at a node, the innermost first.
+    /// Returns all names in scope at a node, the innermost first.
     pub(crate) fn names(&self, node: Node<'d>) -> impl Iterator<Item = &'d str> {
         let around = std::iter::once(node).chain(node.ancestors());
         around
@@ -213,7 +215,7 @@ impl<'d> Context<'d> {
     }
 }
 
-/// What a declaration is in an expression.
+/// Returns the meaning of a declaration in an expression.
 pub(crate) fn operand(declaration: Option<&Declaration<'_>>) -> Operand {
     let Some(declaration) = declaration else {
         return Operand::Undeclared;

@@ -9,7 +9,7 @@ use crate::element::Element;
 use crate::scenario::Scenario;
 use crate::scope::ContextId;
 
-/// What an element of the storyboard is.
+/// Kind of a storyboard element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[expect(missing_docs, reason = "the standard's words")]
 pub enum StoryKind {
@@ -22,7 +22,7 @@ pub enum StoryKind {
 }
 
 impl StoryKind {
-    /// The kind of an element of this name.
+    /// Returns the kind of an element of this name.
     pub fn of_element(name: &str) -> Option<StoryKind> {
         Some(match name {
             "Story" => StoryKind::Story,
@@ -35,12 +35,12 @@ impl StoryKind {
         })
     }
 
-    /// The kind that a `storyboardElementType` names.
+    /// Returns the kind that a `storyboardElementType` names.
     pub fn of_word(word: &str) -> Option<StoryKind> {
         StoryKind::ALL.into_iter().find(|kind| kind.word() == word)
     }
 
-    /// All kinds from the outside in.
+    /// All kinds from the outermost to the innermost.
     pub const ALL: [StoryKind; 6] = [
         StoryKind::Story,
         StoryKind::Act,
@@ -50,7 +50,7 @@ impl StoryKind {
         StoryKind::Action,
     ];
 
-    /// The word of `storyboardElementType`.
+    /// Returns the word of `storyboardElementType`.
     pub fn word(self) -> &'static str {
         match self {
             StoryKind::Story => "story",
@@ -74,22 +74,22 @@ pub struct StoryElement<'d> {
 }
 
 impl<'d> StoryElement<'d> {
-    /// What it is.
+    /// Returns its kind.
     pub fn kind(&self) -> StoryKind {
         self.kind
     }
 
-    /// Its name, parameters replaced; `None` when it has none or it is unknown.
+    /// Returns its name with parameters replaced. Returns `None` if the name is missing or unknown.
     pub fn name(&self) -> Option<&str> {
         self.name.as_deref()
     }
 
-    /// The place of the element around it in [`Storyboard::elements`].
+    /// Returns the index of its parent in [`Storyboard::elements`].
     pub fn parent(&self) -> Option<usize> {
         self.parent.map(|parent| parent as usize)
     }
 
-    /// The element in the document or in a catalog.
+    /// Returns the element in the document or in a catalog.
     pub fn element<'m>(&self, scenario: &'m Scenario<'d>) -> Element<'m, 'd> {
         Element {
             scenario,
@@ -104,7 +104,7 @@ impl<'d> StoryElement<'d> {
 pub struct Storyboard<'d> {
     elements: Vec<StoryElement<'d>>,
     by_name: HashMap<String, Vec<u32>>,
-    /// Whether every name of an element is known.
+    /// Whether the name of every element is known.
     complete: bool,
 }
 
@@ -139,7 +139,7 @@ impl<'d> Storyboard<'d> {
                     self.add_within(child, Some(place));
                 }
             } else if child.class().is_none() && around.class().is_some() {
-                // A misspelt story may have what a reference means.
+                // A misspelt element may contain the target of a reference.
                 self.complete = false;
             }
         }
@@ -166,19 +166,19 @@ impl<'d> Storyboard<'d> {
         place
     }
 
-    /// All elements; an element comes before those within it.
+    /// Returns all elements. An element comes before its descendants.
     pub fn elements(&self) -> &[StoryElement<'d>] {
         &self.elements
     }
 
-    /// Whether every name is known: a catalog's maneuver that was not found, an element that the schema does
-    /// not know, or a name that cannot be resolved may be what a reference means.
+    /// Checks whether every name is known. A reference may mean a maneuver that was not found in a
+    /// catalog, an element that the schema does not know, or a name that cannot be resolved.
     pub fn is_complete(&self) -> bool {
         self.complete
     }
 
-    /// The elements that a reference may mean: `leaf` any of this name, `a::b::leaf` those directly
-    /// within a `b` that is directly within an `a`.
+    /// Returns the elements that a reference may mean. `leaf` means any element of this name.
+    /// `a::b::leaf` means those directly within a `b` that is directly within an `a`.
     pub fn find(&self, reference: &str) -> Vec<&StoryElement<'d>> {
         let mut path = reference.rsplit("::");
         let leaf = path.next().unwrap_or("");
@@ -206,12 +206,12 @@ impl<'d> Storyboard<'d> {
         })
     }
 
-    /// The names of all elements, for suggestions.
+    /// Returns the names of all elements, for suggestions.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.elements.iter().filter_map(StoryElement::name)
     }
 
-    /// The entry for an element of the storyboard.
+    /// Returns the entry for an element of the storyboard.
     pub fn entry(&self, element: Element<'_, 'd>) -> Option<&StoryElement<'d>> {
         let of =
             |one: &&StoryElement<'d>| one.node == element.node && one.context == element.context;

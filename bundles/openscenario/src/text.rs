@@ -1,16 +1,16 @@
-//! Spellings that several parts of the model ask for.
+//! Text helpers that several parts of the model use.
 
-/// The text without XML's white space around it.
+/// Trims XML white space around the text.
 pub(crate) fn trim(text: &str) -> &str {
     text.trim_matches([' ', '\t', '\r', '\n'])
 }
 
-/// Whether the text is a name as parameters have it: `[A-Za-z_][A-Za-z0-9_]*`.
+/// Checks whether the text is a valid parameter name: `[A-Za-z_][A-Za-z0-9_]*`.
 pub fn is_identifier(text: &str) -> bool {
     !text.is_empty() && identifier(text).len() == text.len()
 }
 
-/// The longest name of a parameter that a text begins with; empty when it begins with none.
+/// Returns the longest parameter name at the start of a text, or an empty text.
 pub fn identifier(text: &str) -> &str {
     let starts = |byte: u8| byte.is_ascii_alphabetic() || byte == b'_';
     if !text.as_bytes().first().is_some_and(|byte| starts(*byte)) {

@@ -1,21 +1,21 @@
-//! Whether traffic gets from one place of a map to another.
+//! Reachability of one place of a map from another for traffic.
 
 use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
 use qcbus_opendrive::{ContactPoint, LaneRef, Road, RoadMap, Side, Traffic};
 
-/// A lane section of a road, and whether one goes along it or against it.
+/// A lane section of a road, and whether it is passed along or against the road.
 type Stretch = (usize, usize, bool);
 
-/// Where one gets from each stretch of road.
+/// Connections from each stretch of road.
 #[derive(Debug)]
 pub struct Ways {
-    /// As traffic runs.
+    /// Connections in the direction of traffic.
     driven: HashMap<Stretch, Vec<Stretch>>,
-    /// Whichever way traffic runs.
+    /// Connections in any direction.
     linked: HashMap<Stretch, Vec<Stretch>>,
 }
 
-/// Where a waypoint is: the stretches that it may be on, and the station.
+/// Position of a waypoint: the stretches that it may be on, and the station.
 #[derive(Debug, Clone)]
 pub struct Stop {
     stretches: Vec<Stretch>,
@@ -23,7 +23,7 @@ pub struct Stop {
 }
 
 impl Stop {
-    /// In a lane, whichever ways traffic may run there.
+    /// Returns the stop in a lane, in every direction in which traffic may run there.
     pub fn in_lane(lane: LaneRef<'_, '_>, s: f64) -> Stop {
         let along = [true, false];
         let along = along.into_iter().filter(|along| may_run(lane, *along));
@@ -33,7 +33,8 @@ impl Stop {
         }
     }
 
-    /// On a road, on either side of it and in either direction; `None` where it has no lanes.
+    /// Returns the stop on a road, on both sides and in both directions. Returns `None` if the road
+    /// has no lanes there.
     pub fn on_road(road: &Road<'_>, s: f64) -> Option<Stop> {
         let layer = road.permanent()?;
         let sections = Side::BOTH
@@ -47,21 +48,22 @@ impl Stop {
     }
 }
 
-/// How to get from one waypoint to the next.
+/// Connection from one waypoint to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Way {
-    /// As traffic runs.
+    /// In the direction of traffic.
     Driven,
     /// Against the direction of traffic only.
     Against,
-    /// Not at all.
+    /// No connection.
     None,
-    /// Too much to look at.
+    /// Unknown, because the search exceeds its budget.
     Unknown,
 }
 
 impl Ways {
-    /// The ways of a map; `None` where links are of a kind that does not join lanes.
+    /// Builds the connections of a map. Returns `None` if links are of a kind that does not join
+    /// lanes.
     pub fn of(map: &RoadMap<'_>) -> Option<Ways> {
         let is_simple = map
             .junctions()
@@ -91,7 +93,7 @@ impl Ways {
         Some(ways)
     }
 
-    /// One may leave a lane at an end and enter another at one of its ends.
+    /// Adds a connection from one end of a lane to an end of another lane.
     fn add(
         &mut self,
         (from, leaves): (LaneRef<'_, '_>, ContactPoint),
@@ -108,8 +110,8 @@ impl Ways {
         }
     }
 
-    /// How to get from one stop to another. `budget` is how many stretches may still be looked at: a
-    /// scenario may have as many routes as it likes.
+    /// Returns the connection from one stop to another. `budget` is the number of stretches that
+    /// may still be visited, because the number of routes in a scenario is unlimited.
     pub fn between(&self, from: &Stop, to: &Stop, budget: &mut usize) -> Way {
         if is_ahead(from, to) || reaches(&self.driven, from, to, budget) {
             return Way::Driven;
@@ -136,7 +138,7 @@ fn stretch(lane: LaneRef<'_, '_>, along: bool) -> Stretch {
     (lane.at.road.index(), lane.at.index(), along)
 }
 
-/// Whether the second stop is farther on in the same stretch or a later one of the same road.
+/// Checks whether the second stop is farther on in the same stretch.
 fn is_ahead(from: &Stop, to: &Stop) -> bool {
     from.stretches.iter().any(|(road, section, along)| {
         to.stretches.iter().any(|(other, later, onward)| {
@@ -178,13 +180,14 @@ fn reaches(
     false
 }
 
-/// Lanes that no route takes.
+/// Lane types that no route uses.
 const ASIDE: &[&str] = &[
     "biking", "border", "curb", "median", "none", "parking", "rail", "shoulder", "sidewalk",
     "tram", "walking",
 ];
 
-/// Whether traffic may run on a lane along the road or against it; where that is not known, it may.
+/// Checks whether traffic may run on a lane along the road or against it. If this is unknown, the
+/// answer is yes.
 fn may_run(lane: LaneRef<'_, '_>, along: bool) -> bool {
     let towards = if along {
         ContactPoint::End

@@ -1,4 +1,5 @@
-//! References to catalogs are followed, and an entry is read with what the reference assigns.
+//! Tests that references to catalogs are followed, and that an entry is read with the assigned
+//! parameters of the reference.
 
 mod common;
 
@@ -8,7 +9,7 @@ use qcbus_openscenario::{EntityKind, Resolution, Scenario, StoryKind};
 const VEHICLES: &str = "<CatalogLocations><VehicleCatalog><Directory path=\"v\"/></VehicleCatalog>\
                         <ManeuverCatalog><Directory path=\"m\"/></ManeuverCatalog></CatalogLocations>";
 
-/// A vehicle whose greatest speed is its parameter `fast`, 70 by default.
+/// A vehicle with the parameter `fast` as its maximum speed, 70 by default.
 const CAR: &str = "<Vehicle name=\"car\" vehicleCategory=\"car\"><ParameterDeclarations><ParameterDeclaration \
                    name=\"fast\" parameterType=\"double\" value=\"70\"/></ParameterDeclarations><Performance \
                    maxSpeed=\"$fast\"/></Vehicle>";

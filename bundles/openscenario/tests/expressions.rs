@@ -1,4 +1,4 @@
-//! Expressions: what they are worth, and what is said about those that are worth nothing.
+//! Tests of expressions: their values, and the faults of invalid ones.
 
 use qcbus_openscenario::expr::{
     Evaluated, Fault, FaultKind, Newer, Operand, Value, evaluate, is_expression, names,
@@ -6,7 +6,7 @@ use qcbus_openscenario::expr::{
 
 const DELAY: &str = "${$delay + ((($x1 - $x0)* 2 + ($y1 - $y0)*2 )*0.5 / $speed) + sqrt(9)}";
 
-/// The parameters of all tests.
+/// Returns the parameters of all tests.
 fn parameter(name: &str) -> Operand {
     let value = match name {
         "doubleVal" | "zero" => Value::Double(0.0),
@@ -35,7 +35,7 @@ fn value(inner: &str) -> Result<Value, Fault> {
     in_version(&format!("${{{inner}}}"), 4).map(|evaluated| evaluated.value)
 }
 
-/// The kind of a fault in a word, and where it is.
+/// Returns the kind of a fault as one word, and its position.
 fn fault(text: &str) -> (&'static str, usize) {
     let Err(fault) = in_version(text, 3) else {
         return ("no fault", 0);
@@ -53,7 +53,7 @@ fn fault(text: &str) -> (&'static str, usize) {
     (kind, fault.at)
 }
 
-/// What the reference implementation's own tests expect.
+/// Checks the expected values of the reference implementation's own tests.
 #[test]
 fn the_expressions_of_the_reference_tests() {
     for (text, kind) in [
@@ -81,7 +81,7 @@ fn the_expressions_of_the_reference_tests() {
     let delay = in_version(DELAY, 1).unwrap();
     assert_eq!(delay.value, Value::Double(12.5));
     assert!(delay.uses_parameters && delay.newer.is_empty() && delay.imprecise.is_none());
-    // Whether it fits its attribute is not for the expression to say.
+    // The expression does not check whether the value fits its attribute.
     assert_eq!(value("65535 +1"), Ok(Value::Integer(65536)));
 }
 
@@ -245,21 +245,21 @@ fn what_cannot_be_read_or_computed_is_named_where_it_stands() {
 #[test]
 fn the_gravest_fault_is_told_and_no_other() {
     for (text, kind, at) in [
-        // What cannot be read goes before everything.
+        // Syntax errors come first.
         ("${$none + 1 and 2/0 ^ 2}", "operator", 20),
         ("${$none + }", "evaluation", 10),
-        // Names go before types, types before values.
+        // Unknown names come before types, and types before values.
         ("${1 and $none}", "undeclared", 8),
         ("${not (1 + $none)}", "undeclared", 11),
         ("${2/0 + true}", "types", 8),
         ("${$stringParam and 1}", "types", 19),
-        // A part without a value has a type all the same.
+        // A part without a value still has a type.
         ("${$faulty + true}", "types", 12),
         ("${($faulty + 1) and true}", "types", 2),
         ("${$faulty + 2/0}", "evaluation", 13),
         ("${$faulty + $none}", "undeclared", 12),
         ("${$faulty and $faulty}", "unresolved", 2),
-        // Among equals the first.
+        // Among equal faults, the first one is reported.
         ("${$none + $counter}", "undeclared", 2),
         ("${1/0 + sqrt(-1)}", "evaluation", 3),
         ("${1 and true and 2}", "types", 2),

@@ -1,4 +1,4 @@
-//! Texts that nobody means well: endless, deep, torn and random ones.
+//! Tests of hostile texts: endless, deep, incomplete and random ones.
 
 use qcbus_openscenario::expr::{
     Evaluated, Fault, FaultKind, MAX_LENGTH, Operand, Value, evaluate, names,
@@ -41,7 +41,7 @@ fn long_and_deep_expressions_are_bounded() {
             assert!(is_too_much(&wrapped(left, "", "", times)), "{left}");
         }
     }
-    // Brackets side by side are not deep, and chains of operators are not deep at all.
+    // Adjacent brackets and chains of operators add no depth.
     let wide = format!("${{{}1}}", "(1)+".repeat(4000));
     assert_eq!(evaluated(&wide).unwrap().value, Value::Integer(4001));
     let longest = format!("${{{}1}}", "1-".repeat((MAX_LENGTH - 4) / 2));
@@ -53,7 +53,7 @@ fn long_and_deep_expressions_are_bounded() {
     assert!(evaluated(&digits).unwrap_err().text.len() < 300);
 }
 
-/// Whatever is written, it has a value or a fault, and places lie within the text.
+/// Checks that every text has a value or a fault, and that positions are within the text.
 #[test]
 fn hostile_texts_do_no_harm() {
     const SEEDS: [&str; 6] = [
@@ -99,7 +99,7 @@ fn hostile_texts_do_no_harm() {
     }
 }
 
-/// A cheap source of choices, the same on every machine.
+/// A cheap random generator with the same choices on every machine.
 struct Dice(u64);
 
 impl Dice {

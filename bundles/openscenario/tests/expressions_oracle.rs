@@ -1,5 +1,5 @@
-//! Random expressions, computed a second time in another way: a tree is made up, an oracle computes
-//! it, and its text, with blanks and brackets that nobody needs, is worth the same.
+//! Compares random expressions with an independent computation. A tree is generated, and an oracle
+//! computes its value. Its text, with superfluous blanks and brackets, must have the same value.
 
 use proptest::prelude::*;
 use qcbus_openscenario::expr::{FaultKind, Operand, Value, evaluate};
@@ -37,7 +37,7 @@ proptest! {
     }
 }
 
-/// An expression as the oracle sees it.
+/// An expression in the form of the oracle.
 #[derive(Debug, Clone)]
 enum Tree {
     Whole(i64),
@@ -49,7 +49,7 @@ enum Tree {
     Called(&'static str, Vec<Tree>),
 }
 
-/// A value as the oracle computes it: integers are wide, and checked afterwards.
+/// A value in the form of the oracle. Integers are wide and are checked afterwards.
 #[derive(Debug, Clone, Copy)]
 enum Known {
     Whole(i128),
@@ -104,7 +104,7 @@ fn logic(inner: BoxedStrategy<Tree>, other: BoxedStrategy<Tree>) -> BoxedStrateg
     .boxed()
 }
 
-/// Mostly well typed expressions, and some with a part of the other type.
+/// Generates mostly well-typed expressions, and some with a part of the other type.
 fn tree() -> BoxedStrategy<Tree> {
     let mixed = prop_oneof![
         arithmetic(number(), truth()),
@@ -115,7 +115,7 @@ fn tree() -> BoxedStrategy<Tree> {
     prop_oneof![5 => number(), 2 => truth(), 2 => mixed].boxed()
 }
 
-/// Whether it is a boolean, if its types fit.
+/// Returns whether the tree is a boolean, or `None` if its types do not fit.
 fn is_truth(tree: &Tree) -> Option<bool> {
     let all = |parts: &[Tree], wanted: bool| {
         let fit = parts.iter().all(|part| is_truth(part) == Some(wanted));
@@ -131,7 +131,7 @@ fn is_truth(tree: &Tree) -> Option<bool> {
     }
 }
 
-/// The value of a tree whose types fit.
+/// Returns the value of a tree with correct types.
 fn oracle(tree: &Tree) -> Option<Known> {
     let known = match tree {
         Tree::Whole(value) => Known::Whole(i128::from(*value)),
@@ -157,7 +157,7 @@ fn oracle(tree: &Tree) -> Option<Known> {
     };
     match known {
         Known::Whole(value) => i64::try_from(value).is_ok().then_some(known),
-        // Every way out of the domain of a function ends here.
+        // A result outside the domain of a function is not finite.
         Known::Fraction(value) => value.is_finite().then_some(known),
         Known::Truth(_) => Some(known),
     }
@@ -226,7 +226,7 @@ fn fraction(known: Known) -> f64 {
     }
 }
 
-/// A cheap source of choices, the same on every machine.
+/// A cheap random generator with the same choices on every machine.
 struct Dice(u64);
 
 impl Dice {
@@ -242,7 +242,7 @@ impl Dice {
     }
 }
 
-/// How tightly the parts of a tree are bound.
+/// Returns the binding strength of a tree's operator.
 fn binding(tree: &Tree) -> u8 {
     match tree {
         Tree::Between("or", _) => 1,
@@ -255,8 +255,8 @@ fn binding(tree: &Tree) -> u8 {
     }
 }
 
-/// Writes a tree in a place that takes what is bound by `needed`, with blanks and brackets that
-/// nobody needs.
+/// Writes a tree into a place that requires at least the binding strength `needed`, with
+/// superfluous blanks and brackets.
 fn write(tree: &Tree, needed: u8, dice: &mut Dice, out: &mut String) {
     out.push_str(dice.blank());
     if binding(tree) < needed || dice.below(5) == 0 {

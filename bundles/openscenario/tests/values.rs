@@ -1,11 +1,11 @@
-//! Attributes are read where they stand.
+//! Tests that attributes are read in their context.
 
 mod common;
 
 use common::with_scenario;
 use qcbus_openscenario::{Form, Reading, Scenario, ValueFaultKind};
 
-/// A declaration for each pair of name and `type=value`.
+/// Returns one declaration for each entry of name, type and value.
 fn declare(parameters: &[(&str, &str, &str)]) -> String {
     let each = parameters.iter().map(|(name, kind, value)| {
         format!(
@@ -25,7 +25,7 @@ fn number(scenario: &Scenario<'_>, element: &str, attribute: &str) -> Option<f64
         .and_then(|element| element.number(attribute))
 }
 
-/// The number that `value` of a speed is, where these parameters are declared.
+/// Returns the number that a speed with this `value` has under these declared parameters.
 fn speed(parameters: &[(&str, &str, &str)], value: &str) -> (Option<f64>, Vec<ValueFaultKind>) {
     let body = format!(
         "{}<Entities/><Storyboard><Init><Actions><Private entityRef=\"a\"><PrivateAction><LongitudinalAction>\

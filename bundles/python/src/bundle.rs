@@ -1,4 +1,4 @@
-//! From what a script says to a bundle of the SDK.
+//! Conversion of a script's definitions to a bundle of the SDK.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -18,11 +18,11 @@ use qcbus_sdk::{
 
 use crate::rule::{PyRule, version_of};
 
-/// What was found, each as a dictionary, and which checkers could not look, with the reason.
+/// Issues as dictionaries, and the checkers that could not check the file, each with the reason.
 type Looked<'py> = (Bound<'py, PyList>, Vec<(String, String)>);
 
-/// A bundle that a script describes. It is complete when it runs for the first time, and stays as it is then, as long
-/// as the process.
+/// A bundle that a script describes. It is complete at its first run and does not change after
+/// that.
 #[pyclass(frozen, module = "qcbus")]
 pub(crate) struct Native {
     says: Says,
@@ -30,7 +30,7 @@ pub(crate) struct Native {
     made: OnceLock<&'static Bundle>,
 }
 
-/// What it says about itself.
+/// Metadata of the bundle.
 struct Says {
     name: &'static str,
     alias: &'static str,
@@ -40,7 +40,7 @@ struct Says {
     reads: Reads,
 }
 
-/// Keeps a text as long as the process: the SDK's bundles are constants of their programs.
+/// Leaks a text for the process lifetime, because the SDK expects constant bundles.
 fn leak(text: impl Into<String>) -> &'static str {
     Box::leak(text.into().into_boxed_str())
 }
@@ -153,8 +153,8 @@ impl Native {
         Ok(())
     }
 
-    /// Runs the bundle as its arguments say, without the interpreter's lock, and returns its exit code. `reads` and
-    /// `lists` are what the interpreter may look for while rules run.
+    /// Runs the bundle according to its arguments without the interpreter's lock, and returns its
+    /// exit code. The interpreter may read `reads` and list `lists` while rules run.
     fn run(
         &self,
         py: Python<'_>,
@@ -169,12 +169,13 @@ impl Native {
             lists,
             restricted: false,
         };
-        // One thread at a time may run Python: more of them would only wait for each other.
+        // Only one thread at a time can run Python. More threads would only wait for each other.
         let mode = Mode::parse(arguments).map(|mode| mode.with_threads(1).reading(own));
         py.detach(|| run_or_explain(bundle, mode).code())
     }
 
-    /// What one rule (all without a name) finds in a text: a list of what its issues say, and of what failed.
+    /// Checks a text with one rule, or with all rules if no name is given. Returns the issues and
+    /// the failures.
     #[pyo3(signature = (path, text, rule=None))]
     fn check<'py>(
         &self,
@@ -237,7 +238,7 @@ impl Native {
     }
 }
 
-/// Sends log events to stderr, as the program `qcbus` does: what to tell of is in `QCBUS_LOG`.
+/// Sends log events to stderr, as the program `qcbus` does. `QCBUS_LOG` selects the events.
 fn log() {
     use tracing_subscriber::EnvFilter;
     let filter = EnvFilter::try_from_env("QCBUS_LOG").unwrap_or_else(|_| EnvFilter::new("warn"));
@@ -246,7 +247,7 @@ fn log() {
         .log_internal_errors(false)
         .with_writer(std::io::stderr)
         .with_ansi(std::io::IsTerminal::is_terminal(&std::io::stderr()));
-    // A second one cannot be set: the first stays then.
+    // A second subscriber cannot be set. The first one stays in force.
     let _ = tracing::subscriber::set_global_default(subscriber.finish());
 }
 
@@ -256,7 +257,7 @@ fn param(
     unit: &'static str,
     description: &'static str,
 ) -> PyResult<Param> {
-    // A truth value is a number, too, for Python.
+    // A bool is also a number in Python, so it is tested first.
     if let Ok(flag) = default.cast::<pyo3::types::PyBool>() {
         return Ok(Param::flag(name, flag.is_true(), description));
     }
@@ -271,10 +272,10 @@ fn param(
     }
 }
 
-/// The level of a name, as rules and findings give it.
+/// Returns the level of a name, as used in rules and findings.
 ///
 /// # Errors
-/// `ValueError`, when there is no such level.
+/// `ValueError`, if the level does not exist.
 pub(crate) fn level_of(name: &str) -> PyResult<Level> {
     match name {
         "error" => Ok(Level::Error),

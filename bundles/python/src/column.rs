@@ -1,4 +1,4 @@
-//! Numbers in bulk, as Python's buffers.
+//! Number columns as Python buffers.
 
 use std::ffi::{CStr, c_int, c_void};
 
@@ -6,12 +6,13 @@ use pyo3::exceptions::{PyBufferError, PyIndexError, PyKeyError};
 use pyo3::prelude::*;
 use pyo3::{IntoPyObjectExt as _, ffi};
 
-/// Numbers of one kind, one after the other. `memoryview`, NumPy and whatever else knows Python's buffers read them
-/// where they lie. They were computed for whoever asked and are his: they outlive the job.
+/// A contiguous column of numbers of one type. `memoryview`, NumPy and other users of Python's
+/// buffer protocol read it without a copy. The numbers were computed for the caller and outlive the
+/// job.
 #[pyclass(frozen, module = "qcbus")]
 pub(crate) struct Column {
     values: Values,
-    /// How many there are, as the interface of buffers wants to be pointed at it.
+    /// Number of values. The buffer protocol needs a pointer to it.
     shape: ffi::Py_ssize_t,
     stride: ffi::Py_ssize_t,
 }
@@ -22,12 +23,12 @@ enum Values {
 }
 
 impl Column {
-    /// Doubles; not-a-number stands for what is missing.
+    /// Creates a column of doubles. Missing values are not-a-number.
     pub(crate) fn floats(values: Vec<f64>) -> Column {
         Column::of(values.len(), Values::Floats(values))
     }
 
-    /// Whole numbers.
+    /// Creates a column of integers.
     pub(crate) fn ints(values: Vec<i64>) -> Column {
         Column::of(values.len(), Values::Ints(values))
     }
@@ -71,7 +72,8 @@ impl Column {
         value.unwrap_or_else(|| Err(PyIndexError::new_err("no such row")))
     }
 
-    /// The kind of its numbers, as `array` and `memoryview` call it: `d` for floats, `q` for whole numbers.
+    /// Returns the type of its numbers in the notation of `array` and `memoryview`: `d` for floats,
+    /// `q` for integers.
     #[getter]
     fn format(&self) -> &'static str {
         match &self.values {
@@ -80,7 +82,7 @@ impl Column {
         }
     }
 
-    /// As a NumPy array over the same memory. Needs NumPy.
+    /// Returns a NumPy array over the same memory. Needs NumPy.
     fn numpy<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("numpy")?.call_method1("asarray", (slf,))
     }
@@ -106,8 +108,9 @@ impl Column {
         };
         let (shape, stride) = (&raw const column.shape, &raw const column.stride);
         let refused = wants(ffi::PyBUF_WRITABLE);
-        // SAFETY: `view` points at a buffer to be filled in, as the interpreter promises. What is pointed at lies in
-        // the column, which is frozen (so nothing moves) and is kept alive by `obj` until the buffer is released.
+        // SAFETY: `view` points at a buffer to be filled in, as the interpreter promises. The
+        // fields point into the column. The column is frozen (so nothing moves), and `obj` keeps it
+        // alive until the buffer is released.
         unsafe {
             (*view).obj = std::ptr::null_mut();
             if refused {
@@ -138,7 +141,7 @@ impl Column {
     }
 }
 
-/// Columns of the same length under names.
+/// Named columns of the same length.
 #[pyclass(frozen, module = "qcbus")]
 pub(crate) struct Table {
     columns: Vec<(String, Py<Column>)>,
@@ -160,7 +163,7 @@ impl Table {
 
 #[pymethods]
 impl Table {
-    /// How many rows it has.
+    /// Returns the number of rows.
     fn __len__(&self) -> usize {
         self.rows
     }
@@ -180,7 +183,7 @@ impl Table {
         self.columns.iter().any(|(known, _)| known == name)
     }
 
-    /// The names of its columns.
+    /// Returns the names of its columns.
     fn keys(&self) -> Vec<String> {
         self.columns.iter().map(|(name, _)| name.clone()).collect()
     }

@@ -1,4 +1,4 @@
-//! Elements, as lxml's users know them, read in place.
+//! Elements with the interface of lxml, read in place.
 
 use std::collections::VecDeque;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
@@ -11,9 +11,10 @@ use qcbus_document::{Document, Node};
 
 use crate::lease::Lease;
 
-/// An element of a document, valid until the rule's job is over.
+/// An element of a document. It is valid until the rule's job has ended.
 ///
-/// It feels like lxml's element, without a way to change anything. Names are local names, without prefix or namespace.
+/// It has the interface of lxml's element, but is read-only. Names are local names, without prefix
+/// or namespace.
 #[pyclass(frozen, module = "qcbus")]
 pub(crate) struct Element {
     pub(crate) lease: Arc<Lease>,
@@ -28,9 +29,9 @@ impl Element {
         }
     }
 
-    /// Looks at the node.
+    /// Calls `look` with the node.
     fn node<T>(&self, look: impl FnOnce(Node<'_>) -> T) -> PyResult<T> {
-        // An index comes from this very document, so there is a node.
+        // The index comes from this document, so the node exists.
         let gone = || PyIndexError::new_err("no such element");
         self.lease
             .read(|document| document.node(self.index).map(look))?
@@ -53,7 +54,7 @@ impl Element {
     }
 }
 
-/// What an XPath leads to, by index.
+/// Returns the indexes of the nodes that an XPath selects.
 pub(crate) fn indexes<E: ToString>(found: Result<Vec<Node<'_>>, E>) -> Result<Vec<u32>, String> {
     match found {
         Ok(nodes) => Ok(nodes.iter().map(Node::index).collect()),
@@ -63,14 +64,14 @@ pub(crate) fn indexes<E: ToString>(found: Result<Vec<Node<'_>>, E>) -> Result<Ve
 
 #[pymethods]
 impl Element {
-    /// The local name.
+    /// Returns the local name.
     #[getter]
     fn tag<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyString>> {
         let number = self.node(|node| node.name_number())?;
         Ok(self.lease.name(py, number))
     }
 
-    /// The value of an attribute, entities resolved; `default` when there is none.
+    /// Returns an attribute's value with resolved entities, or `default` if it is missing.
     #[pyo3(signature = (name, default=None))]
     fn get<'py>(
         &self,
@@ -87,21 +88,22 @@ impl Element {
         })
     }
 
-    /// An attribute as a finite number; `None` when it is missing or no such number.
+    /// Returns an attribute as a finite number, or `None` if it is missing or not such a number.
     fn float(&self, name: &str) -> PyResult<Option<f64>> {
         self.node(|node| {
-            // The error borrows the name for longer than we have it.
+            // The error borrows the name longer than it lives here, so it is converted to an
+            // option.
             let value = node.attribute(name)?.f64().ok()?;
             value.is_finite().then_some(value)
         })
     }
 
-    /// An attribute as a whole number of at most 64 bits; `None` when it is missing or no such number.
+    /// Returns an attribute as an integer of at most 64 bits, or `None` if this is impossible.
     fn int(&self, name: &str) -> PyResult<Option<i64>> {
         self.node(|node| node.attribute(name)?.i64().ok())
     }
 
-    /// All attributes in the order in which they are written, as a new dictionary.
+    /// Returns all attributes in document order, as a new dictionary.
     #[getter]
     fn attrib<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
@@ -115,7 +117,7 @@ impl Element {
         Ok(all)
     }
 
-    /// The names of the attributes in the order in which they are written.
+    /// Returns the names of the attributes in document order.
     fn keys<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyString>>> {
         let numbers: Vec<u16> = self.node(|node| {
             let attributes = node.attributes();
@@ -127,7 +129,7 @@ impl Element {
         Ok(numbers.into_iter().map(name).collect())
     }
 
-    /// Names and values of the attributes in the order in which they are written.
+    /// Returns names and values of the attributes in document order.
     fn items(&self) -> PyResult<Vec<(String, String)>> {
         self.node(|node| {
             let attributes = node.attributes();
@@ -136,21 +138,22 @@ impl Element {
         })
     }
 
-    /// The character data directly within it, CDATA included, entities resolved; `None` when there is none.
+    /// Returns the character data directly in it, with CDATA and resolved entities; `None` if it
+    /// has none.
     #[getter]
     fn text(&self) -> PyResult<Option<String>> {
         let text = self.node(|node| node.text().into_owned())?;
         Ok(Some(text).filter(|text| !text.is_empty()))
     }
 
-    /// This element and all within it in document order; with names, those that bear one of them.
+    /// Returns this element and its descendants in document order. Names restrict the result.
     #[pyo3(signature = (*tags))]
     fn iter(&self, tags: &Bound<'_, PyTuple>) -> PyResult<Elements> {
         let end = self.node(|node| node.subtree_end())?;
         Elements::within(&self.lease, self.index..end, &names(tags)?)
     }
 
-    /// The elements directly within it; with names, those that bear one of them.
+    /// Returns the child elements. Names restrict the result to these names.
     #[pyo3(signature = (*tags))]
     fn iterchildren(&self, tags: &Bound<'_, PyTuple>) -> PyResult<Elements> {
         let tags = names(tags)?;
@@ -171,7 +174,7 @@ impl Element {
         self.node(|node| node.children().count())
     }
 
-    /// An element is one, with or without others in it.
+    /// Returns `true`, even for an element without children.
     fn __bool__(&self) -> bool {
         true
     }
@@ -189,18 +192,19 @@ impl Element {
             .ok_or_else(|| PyIndexError::new_err("no such child"))
     }
 
-    /// The first element that a path leads to from here, or `None`: `lanes/laneSection`, `.//signal[@id='5']`.
+    /// Returns the first element that a path selects from here, or `None`: `lanes/laneSection`,
+    /// `.//signal[@id='5']`.
     fn find(&self, path: &str) -> PyResult<Option<Element>> {
         let found = self.evaluate(path)?.first().copied();
         Ok(found.map(|index| Element::new(&self.lease, index)))
     }
 
-    /// All elements that a path leads to from here, in document order.
+    /// Returns all elements that a path selects from here, in document order.
     fn findall(&self, path: &str) -> PyResult<Vec<Element>> {
         Ok(self.all(self.evaluate(path)?))
     }
 
-    /// The text of the first element that a path leads to; `default` when there is none.
+    /// Returns the text of the first element that a path selects, or `default` if there is none.
     #[pyo3(signature = (path, default=None))]
     fn findtext(&self, path: &str, default: Option<String>) -> PyResult<Option<String>> {
         match self.find(path)? {
@@ -209,22 +213,22 @@ impl Element {
         }
     }
 
-    /// All elements that an XPath leads to: as `findall`; with a leading `/` from the document.
+    /// Returns all elements that an XPath selects, as `findall`. A leading `/` is the document.
     fn xpath(&self, path: &str) -> PyResult<Vec<Element>> {
         self.findall(path)
     }
 
-    /// The element it lies in; `None` for the root.
+    /// Returns the parent element, or `None` for the root.
     fn getparent(&self) -> PyResult<Option<Element>> {
         self.other(|node| node.parent())
     }
 
-    /// The next element with the same parent, or `None`.
+    /// Returns the next sibling, or `None`.
     fn getnext(&self) -> PyResult<Option<Element>> {
         self.other(|node| node.next_sibling())
     }
 
-    /// The element before it with the same parent, or `None`.
+    /// Returns the previous sibling, or `None`.
     fn getprevious(&self) -> PyResult<Option<Element>> {
         self.other(|node| {
             let siblings = node.parent()?.children();
@@ -232,31 +236,31 @@ impl Element {
         })
     }
 
-    /// Its parent, that one's parent, and so on up to the root.
+    /// Returns its ancestors from the parent up to the root.
     fn iterancestors(&self) -> PyResult<Elements> {
         let found = self.node(|node| node.ancestors().map(|it| it.index()).collect())?;
         Ok(Elements::of(&self.lease, found))
     }
 
-    /// The row of its `<` in its file, from 1.
+    /// Returns the row of its `<` in its file, from 1.
     #[getter]
     fn sourceline(&self) -> PyResult<u32> {
         self.node(|node| node.position().row)
     }
 
-    /// The column of its `<` in its file in characters, from 1.
+    /// Returns the column of its `<` in its file in characters, from 1.
     #[getter]
     fn sourcecolumn(&self) -> PyResult<u32> {
         self.node(|node| node.position().column)
     }
 
-    /// The file that it is written in: that of the document, or one that is included.
+    /// Returns the file that contains it: the document's file or an included file.
     #[getter]
     fn sourcefile(&self) -> PyResult<String> {
         self.node(|node| node.position().path.to_owned())
     }
 
-    /// The XPath by which findings name it: `/OpenDRIVE/road[@id='5']/lanes`.
+    /// Returns the XPath that is used in findings: `/OpenDRIVE/road[@id='5']/lanes`.
     fn getpath(&self) -> PyResult<String> {
         self.node(|node| node.xpath())
     }
@@ -302,10 +306,10 @@ impl Element {
     }
 }
 
-/// Names given one by one, or as one list.
+/// Returns the names from a tuple of names. The result is empty if all names are accepted.
 pub(crate) fn names(tags: &Bound<'_, PyTuple>) -> PyResult<Vec<String>> {
     let all: Vec<Option<String>> = tags.extract()?;
-    // As lxml has it, `None` and `*` mean every element.
+    // As in lxml, `None` and `*` select every element.
     let every = |tag: &Option<String>| tag.as_deref().is_none_or(|tag| tag == "*");
     Ok(match all.iter().any(every) {
         true => Vec::new(),
@@ -313,22 +317,22 @@ pub(crate) fn names(tags: &Bound<'_, PyTuple>) -> PyResult<Vec<String>> {
     })
 }
 
-/// Elements one after the other.
+/// Iterator over elements.
 #[pyclass(frozen, module = "qcbus")]
 pub(crate) struct Elements {
     lease: Arc<Lease>,
     state: Mutex<Pending>,
 }
 
-/// What is still to come.
+/// State of an iteration.
 struct Pending {
     ready: VecDeque<u32>,
-    /// Nodes that were not looked at.
+    /// Nodes that are not examined yet.
     rest: std::ops::Range<u32>,
     names: Vec<String>,
 }
 
-/// Elements that are looked for at once.
+/// Number of elements that are searched in one step.
 const AT_ONCE: usize = 1024;
 
 impl Elements {
@@ -343,8 +347,8 @@ impl Elements {
         }
     }
 
-    /// The elements of some of these names among the nodes of a subtree, in document order; of all names when there are
-    /// none.
+    /// Returns the elements with one of these names in a subtree, in document order. Without names
+    /// it returns all elements.
     pub(crate) fn within(
         lease: &Arc<Lease>,
         rest: std::ops::Range<u32>,
@@ -352,7 +356,7 @@ impl Elements {
     ) -> PyResult<Elements> {
         let elements = Elements::of(lease, VecDeque::new());
         if let [name] = names {
-            // By the index of names, which costs nothing for all others.
+            // The name index finds these elements without a visit of all others.
             let found = lease.read(|document| {
                 let outer = document.node(rest.start).into_iter();
                 let own = outer.clone().filter(|node| node.is(name));

@@ -1,4 +1,4 @@
-//! What a rule finds: collected while it runs, and told to the SDK when it has come back.
+//! Findings of a rule: collected while it runs, and passed to the SDK after it returns.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -14,10 +14,11 @@ use crate::element::Element;
 use crate::lease::{Closed, Lease};
 use crate::roads::{PyLane, Road, Section};
 
-/// Findings that are kept with their texts; further ones are counted with their level. A result lists fewer.
+/// Maximum number of findings that are stored with their texts. Further ones are only counted by
+/// level. A result lists fewer findings than this.
 const MOST: usize = 100_000;
 
-/// Where a finding points.
+/// Place of a finding.
 #[derive(Clone)]
 struct Spot {
     lease: Arc<Lease>,
@@ -25,10 +26,10 @@ struct Spot {
     attribute: Option<String>,
 }
 
-/// What is said of one place.
+/// Description of one place.
 struct Mark {
     spot: Spot,
-    /// Empty for the first, unless it is described.
+    /// Text of the place. It is empty for the first place, unless it is set explicitly.
     description: String,
     point: Option<(f64, f64, f64)>,
     road: Option<(String, f64, f64)>,
@@ -41,7 +42,7 @@ struct Entry {
     uid: Option<String>,
 }
 
-/// What a rule and its findings share.
+/// State shared by a rule and its findings.
 struct Told {
     collected: Mutex<Collected>,
     /// The documents of the job.
@@ -51,12 +52,12 @@ struct Told {
 #[derive(Default)]
 struct Collected {
     entries: Vec<Entry>,
-    /// Facts about the check: key, value, what it means.
+    /// Facts about the check: key, value and description.
     facts: Vec<(String, String, String)>,
     over: bool,
 }
 
-/// Takes what a rule finds.
+/// Collector for the findings of a rule.
 #[pyclass(frozen, module = "qcbus")]
 pub(crate) struct Found {
     told: Arc<Told>,
@@ -65,7 +66,7 @@ pub(crate) struct Found {
     version: Option<(u16, u16)>,
 }
 
-/// One finding, to be completed.
+/// One finding. More details can be added to it.
 #[pyclass(frozen, module = "qcbus", name = "Finding")]
 pub(crate) struct PyFinding {
     told: Arc<Told>,
@@ -89,8 +90,8 @@ impl Told {
         }
     }
 
-    /// The place of an element, or of a document, for which its root stands. One of another job would lead nowhere,
-    /// and what is found there would be lost.
+    /// Returns the place of an element. A document stands for its root. Places of another job are
+    /// rejected, because the finding would be lost.
     fn spot(&self, at: &Bound<'_, PyAny>, attribute: Option<String>) -> PyResult<Spot> {
         let Element { lease, index } = element_of(at)?;
         lease.hold()?;
@@ -107,7 +108,7 @@ impl Told {
     }
 }
 
-/// The element that is meant by what a rule names as a place.
+/// Returns the element for a place that a rule names.
 fn element_of(at: &Bound<'_, PyAny>) -> PyResult<Element> {
     if let Ok(element) = at.cast::<Element>() {
         let Element { lease, index } = element.get();
@@ -149,7 +150,8 @@ impl Found {
         }
     }
 
-    /// Tells the SDK what was found. `open` gives the document of a lease. Nothing is taken any more afterwards.
+    /// Passes the findings to the SDK. `document_of` returns the document of a lease. Later
+    /// findings are rejected.
     pub(crate) fn tell<'d>(
         &self,
         sink: &mut Sink<'d>,
@@ -185,7 +187,7 @@ fn tell<'d>(
         Some(match (node, &spot.attribute) {
             (Some(node), Some(attribute)) => Place::attribute_or_node(node, attribute),
             (Some(node), None) => Place::Node(node),
-            // The document has no element at all.
+            // The document has no elements.
             (None, _) => Place::Text(document, 0),
         })
     };
@@ -225,8 +227,8 @@ fn positions<'s, 'd>(
 
 #[pymethods]
 impl Found {
-    /// Says that something is wrong with an element, or with one of its attributes. The text names what was found,
-    /// what is allowed, and what to do.
+    /// Reports an issue of an element or one of its attributes. The text names what was found, what
+    /// is allowed, and what to do.
     #[pyo3(signature = (at, text, *, attribute=None, level=None, uid=None))]
     fn issue(
         &self,
@@ -263,7 +265,7 @@ impl Found {
         })
     }
 
-    /// Adds a fact about the check itself, such as what the document was measured by.
+    /// Adds a fact about the check itself, for example the reference used for the document.
     #[pyo3(signature = (key, value, description=""))]
     fn fact(&self, key: String, value: &Bound<'_, PyAny>, description: &str) -> PyResult<()> {
         let value = value.str()?.to_string();
@@ -272,19 +274,19 @@ impl Found {
         Ok(())
     }
 
-    /// The value of a parameter that the rule declares.
+    /// Returns the value of a parameter of the rule.
     fn param<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let value = self.params.bind(py).get_item(name)?;
         value.ok_or_else(|| PyKeyError::new_err(format!("the rule declares no parameter `{name}`")))
     }
 
-    /// All parameters that the rule declares, with their values.
+    /// Returns all parameters of the rule with their values.
     #[getter]
     fn params<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.params.bind(py).copy()
     }
 
-    /// The version of the standard that the document names as two numbers, or `None`.
+    /// Returns the version of the standard in the document's header as two numbers, or `None`.
     #[getter]
     fn version(&self) -> Option<(u16, u16)> {
         self.version
@@ -294,7 +296,7 @@ impl Found {
         self.told.lock().entries.len()
     }
 
-    /// It is there, whether something was found or not.
+    /// Returns `true`, even if there are no findings.
     fn __bool__(&self) -> bool {
         true
     }
@@ -316,7 +318,7 @@ impl PyFinding {
 
 #[pymethods]
 impl PyFinding {
-    /// Adds a further place and what is to be seen there.
+    /// Adds a further place with its description.
     #[pyo3(signature = (place, description, *, attribute=None))]
     fn at<'py>(
         slf: PyRef<'py, Self>,
@@ -334,7 +336,7 @@ impl PyFinding {
         Ok(slf)
     }
 
-    /// Describes the place itself, instead of "element `road`".
+    /// Sets the description of the place itself. It replaces "element `road`".
     fn here<'py>(slf: PyRef<'py, Self>, description: String) -> PyResult<PyRef<'py, Self>> {
         slf.change(|entry| {
             if let Some(first) = entry.marks.first_mut() {
@@ -344,21 +346,21 @@ impl PyFinding {
         Ok(slf)
     }
 
-    /// Adds the point in the inertial coordinate system, in metres, to the place named last.
+    /// Adds a point in the inertial coordinate system, in metres, to the last place.
     #[pyo3(signature = (x, y, z=0.0))]
     fn point(slf: PyRef<'_, Self>, x: f64, y: f64, z: f64) -> PyResult<PyRef<'_, Self>> {
         slf.last(|mark| mark.point = Some((x, y, z)))?;
         Ok(slf)
     }
 
-    /// Adds the position on a road, in metres, to the place named last.
+    /// Adds a position on a road, in metres, to the last place.
     #[pyo3(signature = (road_id, s, t=0.0))]
     fn road(slf: PyRef<'_, Self>, road_id: String, s: f64, t: f64) -> PyResult<PyRef<'_, Self>> {
         slf.last(|mark| mark.road = Some((road_id, s, t)))?;
         Ok(slf)
     }
 
-    /// Another severity than the rule's.
+    /// Sets a severity other than the rule's.
     fn level<'py>(slf: PyRef<'py, Self>, level: &str) -> PyResult<PyRef<'py, Self>> {
         let level = level_of(level)?;
         slf.change(|entry| entry.level = Some(level))?;

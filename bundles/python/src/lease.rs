@@ -1,4 +1,4 @@
-//! A document as long as its job lasts.
+//! Access to a document for the duration of its job.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -25,7 +25,7 @@ pyo3::create_exception!(
     "The job that this belonged to is over, and its document is no longer there."
 );
 
-/// A document that is open for a moment.
+/// Short-lived access to an open document.
 pub(crate) struct Glance(Arc<Opened>);
 
 impl Glance {
@@ -34,13 +34,13 @@ impl Glance {
     }
 }
 
-/// A document that Python objects look into. When the job is over it is closed: whoever kept an element gets an
-/// error, and the shared memory is free, whatever Python still holds.
+/// A document that Python objects read. It is closed at the end of the job. Elements that a script
+/// still holds then raise an error, and the shared memory is released.
 pub(crate) struct Lease {
     opened: Mutex<Option<Arc<Opened>>>,
-    /// The model of its roads, once somebody has asked for it.
+    /// Road model, created on first use.
     map: Mutex<Option<Arc<OwnedMap>>>,
-    /// The distinct names of the document as Python texts, by their number.
+    /// Distinct names of the document as Python strings, indexed by name number.
     names: Vec<Py<PyString>>,
     path: String,
 }
@@ -58,7 +58,8 @@ impl Lease {
         }))
     }
 
-    /// Looks into the document. Nothing that may run Python belongs in there: it would hold the document open.
+    /// Calls `look` with the document. `look` must not run Python code, because that would keep the
+    /// document open.
     ///
     /// # Errors
     /// [`Closed`].
@@ -66,7 +67,7 @@ impl Lease {
         self.hold().map(|held| look(held.document()))
     }
 
-    /// Holds the document open for a moment.
+    /// Holds the document open for a short time.
     ///
     /// # Errors
     /// [`Closed`].
@@ -79,7 +80,7 @@ impl Lease {
         })
     }
 
-    /// The model of its roads, made when it is first asked for.
+    /// Returns the road model. It is created on first use.
     ///
     /// # Errors
     /// [`Closed`].
@@ -95,7 +96,7 @@ impl Lease {
         Ok(map.insert(Arc::new(made)).clone())
     }
 
-    /// The end of the job.
+    /// Closes the document at the end of the job.
     pub(crate) fn close(&self) {
         let opened = self
             .opened
@@ -110,7 +111,7 @@ impl Lease {
         drop((map, opened));
     }
 
-    /// A distinct name by its number, without a new text for every element that bears it.
+    /// Returns a distinct name by its number. All elements with this name share one string.
     pub(crate) fn name<'py>(&self, py: Python<'py>, number: u16) -> Bound<'py, PyString> {
         match self.names.get(usize::from(number)) {
             Some(name) => name.bind(py).clone(),

@@ -1,8 +1,9 @@
-//! Checker bundles in Python: the SDK of `bundles/sdk` under another roof.
+//! Checker bundles in Python: a Python interface to the SDK in `bundles/sdk`.
 //!
-//! Nothing of the bus or the codec is made twice. A bundle that a script describes becomes a [`qcbus_sdk::Bundle`]
-//! whose rules call functions of the script (`bundle`, `rule`); what they get are views into the image of the
-//! document (`lease`, `element`, `document`) that end with the job, and a list for what they find (`found`).
+//! The code of the bus and the codec is not duplicated. A bundle that a script describes becomes a
+//! [`qcbus_sdk::Bundle`]. Its rules call functions of the script (`bundle`, `rule`). They get views
+//! into the image of the document (`lease`, `element`, `document`), which end with the job. A
+//! collector takes their findings (`found`).
 
 mod bundle;
 mod column;
@@ -16,7 +17,7 @@ mod rule;
 
 use pyo3::prelude::*;
 
-/// What `qcbus` is made of; `qcbus/__init__.py` gives it to people.
+/// Native part of `qcbus`. `qcbus/__init__.py` exports it to users.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<document::Document>()?;

@@ -1,6 +1,7 @@
-//! The OpenDRIVE model: roads, sections, lanes, and where they lie.
+//! The OpenDRIVE model: roads, sections, lanes and their positions.
 //!
-//! What rests on a missing or broken number cannot be evaluated, and is `None` (not-a-number in columns).
+//! A value that depends on a missing or broken number cannot be evaluated. It is `None`, or
+//! not-a-number in columns.
 
 use std::sync::Arc;
 
@@ -12,10 +13,10 @@ use crate::column::{Column, Table};
 use crate::element::Element;
 use crate::lease::Lease;
 
-/// Rows that a table of samples may have: more would take gigabytes.
+/// Maximum number of rows in a table of samples. More rows would take gigabytes.
 const MOST_SAMPLES: f64 = 20_000_000.0;
 
-/// A place on a reference line with the line's direction there.
+/// A point on a reference line with the direction of the line.
 #[pyclass(frozen, module = "qcbus", get_all)]
 pub(crate) struct Pose {
     /// East, in metres.
@@ -41,14 +42,14 @@ impl Pose {
     }
 }
 
-/// A road of a map, valid until the rule's job is over.
+/// A road of a map. It is valid until the rule's job has ended.
 #[pyclass(frozen, module = "qcbus")]
 pub(crate) struct Road {
     lease: Arc<Lease>,
     index: usize,
 }
 
-/// All roads of a map in document order.
+/// Returns all roads of a map in document order.
 pub(crate) fn roads(lease: &Arc<Lease>) -> PyResult<Vec<Road>> {
     let count = lease.map()?.with(|map| map.roads().len());
     let road = |index| Road {
@@ -58,7 +59,7 @@ pub(crate) fn roads(lease: &Arc<Lease>) -> PyResult<Vec<Road>> {
     Ok((0..count).map(road).collect())
 }
 
-/// The first road with this id.
+/// Returns the first road with this id, or `None`.
 pub(crate) fn road(lease: &Arc<Lease>, id: &str) -> PyResult<Option<Road>> {
     let index = lease
         .map()?
@@ -79,32 +80,32 @@ impl Road {
 
 #[pymethods]
 impl Road {
-    /// Its `@id`, empty when missing.
+    /// Returns its `@id`, or an empty text if it is missing.
     #[getter]
     fn id(&self) -> PyResult<String> {
         self.look(|road| road.id().to_owned())
     }
 
-    /// Its `@length` in metres, or `None`.
+    /// Returns its `@length` in metres, or `None`.
     #[getter]
     fn length(&self) -> PyResult<Option<f64>> {
         self.look(|road| road.length())
     }
 
-    /// The id of the junction that it belongs to, or `None`.
+    /// Returns the id of the junction that it belongs to, or `None`.
     #[getter]
     fn junction(&self) -> PyResult<Option<String>> {
         self.look(|road| road.junction().map(str::to_owned))
     }
 
-    /// Its element.
+    /// Returns its element.
     #[getter]
     pub(crate) fn element(&self) -> PyResult<Element> {
         let index = self.look(|road| road.node().index())?;
         Ok(Element::new(&self.lease, index))
     }
 
-    /// The pose of the reference line at s, in metres; `None` outside of the road.
+    /// Returns the pose of the reference line at s in metres, or `None` outside the road.
     fn pose(&self, s: f64) -> PyResult<Option<Pose>> {
         let pose = self.look(|road| road.pose(s))?;
         Ok(pose.map(|it| Pose {
@@ -115,19 +116,20 @@ impl Road {
         }))
     }
 
-    /// The point (x, y, z) of the road coordinates s, t and h in metres, with elevation and superelevation, or `None`.
+    /// Returns the point (x, y, z) at s, t and h in metres, or `None`. Elevation and superelevation
+    /// are applied.
     #[pyo3(signature = (s, t=0.0, h=0.0))]
     fn point(&self, s: f64, t: f64, h: f64) -> PyResult<Option<(f64, f64, f64)>> {
         let point = self.look(|road| road.point(s, t, h))?;
         Ok(point.map(|point| (point.x, point.y, point.z)))
     }
 
-    /// The height of the reference line at s, in metres; zero where nothing is said.
+    /// Returns the height of the reference line at s, in metres; zero without an elevation.
     fn elevation(&self, s: f64) -> PyResult<Option<f64>> {
         self.look(|road| road.elevation().at_or_zero(s))
     }
 
-    /// The width of a lane at s, in metres; `None` where there is no such lane, or its width is not defined.
+    /// Returns the width of a lane at s, in metres; `None` if the lane or its width is not defined.
     fn width(&self, lane: i64, s: f64) -> PyResult<Option<f64>> {
         self.look(|road| {
             let side = Side::of_lane_id(lane).unwrap_or(Side::Right);
@@ -136,7 +138,7 @@ impl Road {
         })
     }
 
-    /// Its lane sections in document order.
+    /// Returns its lane sections in document order.
     #[getter]
     fn sections(&self) -> PyResult<Vec<Section>> {
         let keys: Vec<(usize, usize)> = self.look(|road| {
@@ -158,7 +160,7 @@ impl Road {
     }
 }
 
-/// A lane section, valid until the rule's job is over.
+/// A lane section. It is valid until the rule's job has ended.
 #[pyclass(frozen, module = "qcbus")]
 pub(crate) struct Section {
     lease: Arc<Lease>,
@@ -188,33 +190,33 @@ impl Section {
 
 #[pymethods]
 impl Section {
-    /// Where it starts, in metres along the road, or `None`.
+    /// Returns its start in metres along the road, or `None`.
     #[getter]
     fn s(&self) -> PyResult<Option<f64>> {
         self.look(|section| section.s())
     }
 
-    /// Its length in metres, of the shorter side where sides differ, or `None`.
+    /// Returns its length in metres, or `None`. The shorter side counts if the sides differ.
     #[getter]
     fn length(&self) -> PyResult<Option<f64>> {
         self.look(|section| section.shortest_length())
     }
 
-    /// Its element.
+    /// Returns its element.
     #[getter]
     pub(crate) fn element(&self) -> PyResult<Element> {
         let index = self.look(|section| section.node().index())?;
         Ok(Element::new(&self.lease, index))
     }
 
-    /// Its lanes in document order, the center lane among them.
+    /// Returns its lanes in document order, including the center lane.
     #[getter]
     fn lanes(&self) -> PyResult<Vec<PyLane>> {
         let keys: Vec<LaneKey> = self.look(|it| it.lanes().map(LaneRef::key).collect())?;
         Ok(keys.into_iter().map(|key| self.lane_of(key)).collect())
     }
 
-    /// The lane of an id, or `None`.
+    /// Returns the lane with an id, or `None`.
     fn lane(&self, id: i64) -> PyResult<Option<PyLane>> {
         let key = self.look(|section| section.lane(id).map(LaneRef::key))?;
         Ok(key.map(|key| self.lane_of(key)))
@@ -228,7 +230,7 @@ impl Section {
     }
 }
 
-/// A lane of a section, valid until the rule's job is over.
+/// A lane of a section. It is valid until the rule's job has ended.
 #[pyclass(frozen, module = "qcbus", name = "Lane")]
 pub(crate) struct PyLane {
     lease: Arc<Lease>,
@@ -245,26 +247,26 @@ impl PyLane {
 
 #[pymethods]
 impl PyLane {
-    /// Its `@id`; `None` when that is no whole number.
+    /// Returns its `@id`, or `None` if it is not an integer.
     #[getter]
     fn id(&self) -> PyResult<Option<i64>> {
         self.look(|lane| lane.lane().id())
     }
 
-    /// Its `@type`, or `None`.
+    /// Returns its `@type`, or `None`.
     #[getter]
     fn r#type(&self) -> PyResult<Option<String>> {
         self.look(|lane| lane.lane().kind().map(str::to_owned))
     }
 
-    /// Its element.
+    /// Returns its element.
     #[getter]
     pub(crate) fn element(&self) -> PyResult<Element> {
         let index = self.look(|lane| lane.lane().node().index())?;
         Ok(Element::new(&self.lease, index))
     }
 
-    /// Its width `ds` metres from the section's start, or `None`; zero for the center lane.
+    /// Returns its width `ds` metres from the section's start, or `None`; zero for the center lane.
     fn width(&self, ds: f64) -> PyResult<Option<f64>> {
         self.look(|lane| lane.width(ds))
     }
@@ -277,7 +279,7 @@ impl PyLane {
     }
 }
 
-/// Poses of all reference lines, every `step` metres and at the end of each road.
+/// Returns the poses of all reference lines, every `step` metres and at the end of each road.
 pub(crate) fn poses(py: Python<'_>, lease: &Arc<Lease>, step: f64) -> PyResult<Table> {
     let map = lease.map()?;
     let mut roads = Vec::new();
@@ -309,7 +311,7 @@ pub(crate) fn poses(py: Python<'_>, lease: &Arc<Lease>, step: f64) -> PyResult<T
     Table::new(py, columns)
 }
 
-/// What stands in columns for a pose that cannot be evaluated.
+/// Value in the columns for a pose that cannot be evaluated.
 const NOWHERE: qcbus_opendrive::geometry::Pose = qcbus_opendrive::geometry::Pose {
     x: f64::NAN,
     y: f64::NAN,
@@ -321,7 +323,7 @@ fn row_of(road: &qcbus_opendrive::Road<'_>) -> i64 {
     i64::try_from(road.index()).unwrap_or(i64::MAX)
 }
 
-/// Widths of all lanes but the center, every `step` metres of each road.
+/// Returns the widths of all lanes except the center lanes, every `step` metres of each road.
 pub(crate) fn widths(py: Python<'_>, lease: &Arc<Lease>, step: f64) -> PyResult<Table> {
     let map = lease.map()?;
     let (mut roads, mut lanes) = (Vec::new(), Vec::new());
@@ -360,7 +362,7 @@ pub(crate) fn widths(py: Python<'_>, lease: &Arc<Lease>, step: f64) -> PyResult<
     Table::new(py, columns)
 }
 
-/// The roads of a known length with the places along them: 0, `step`, 2 `step`, and the end.
+/// Returns the roads of known length with their sample positions: 0, `step`, 2 `step`, and the end.
 fn stations<'m, 'a>(
     map: &'m RoadMap<'a>,
     step: f64,

@@ -10,8 +10,8 @@ use crate::column::Column;
 use crate::element::Element;
 use crate::lease::Lease;
 
-/// The elements of one name in document order: a row for each, and columns of numbers out of their attributes.
-/// The columns outlive the job, the elements do not.
+/// The elements of one name in document order, one row for each, with columns of numbers from their
+/// attributes. The columns outlive the job, but the elements do not.
 #[pyclass(frozen, module = "qcbus")]
 pub(crate) struct Rows {
     lease: Arc<Lease>,
@@ -48,7 +48,7 @@ impl Rows {
     }
 }
 
-/// Not-a-number stands for what is missing, malformed or infinite.
+/// Returns an attribute's values. Missing, malformed and infinite ones are not-a-number.
 fn numbers(document: &Document<'_>, tag: &str, attribute: &str) -> Vec<f64> {
     let number = |node: Node<'_>| {
         let value = node.attribute(attribute)?.f64().ok()?;
@@ -64,7 +64,7 @@ impl Rows {
         self.indexes.len()
     }
 
-    /// With a text the column of that attribute, with a number the element of that row.
+    /// Returns the column of an attribute for a text, or the element of a row for a number.
     fn __getitem__(&self, py: Python<'_>, which: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
         if let Ok(name) = which.extract::<&str>() {
             let column = self.columns.iter().find(|(known, _)| known == name);
@@ -75,7 +75,7 @@ impl Rows {
                 ))),
             };
         }
-        // Also what NumPy takes for a whole number.
+        // This also accepts NumPy's integers.
         let number = which.call_method0("__index__")?.extract::<isize>()?;
         let at = match usize::try_from(number) {
             Ok(number) => Some(number),
@@ -86,7 +86,8 @@ impl Rows {
         Ok(Py::new(py, Element::new(&self.lease, *index))?.into_any())
     }
 
-    /// For each row the number of the row in `other` whose element it lies in, the innermost; -1 where there is none.
+    /// Returns for each row the row number of the innermost enclosing element in `other`, or -1 if
+    /// there is none.
     fn within(&self, other: &Rows) -> PyResult<Column> {
         let rows = self.lease.read(|document| {
             let outer = |index: &u32| {
@@ -99,7 +100,7 @@ impl Rows {
         Ok(Column::ints(rows))
     }
 
-    /// The names of its columns.
+    /// Returns the names of its columns.
     fn keys(&self) -> Vec<String> {
         self.columns.iter().map(|(name, _)| name.clone()).collect()
     }

@@ -12,19 +12,19 @@ use crate::document;
 use crate::found::Found;
 use crate::lease::Lease;
 
-/// What all rules of scripts look at.
+/// Model of all rules of scripts.
 struct Views;
 
-/// A rule: its data, and the function that looks.
+/// A rule: its metadata and its check function.
 pub(crate) struct PyRule {
     pub(crate) facts: Facts,
     pub(crate) function: Py<PyAny>,
 }
 
-/// The documents of a job, as Python sees them. They end with it.
+/// Documents of a job as Python objects. They are closed at the end of the job.
 struct Shown<'d> {
     subject: &'d Subject<'d>,
-    /// The root and what it refers to, in that order.
+    /// The root first, then the documents that it refers to.
     leases: Vec<Arc<Lease>>,
     root: Py<document::Document>,
 }
@@ -38,7 +38,7 @@ impl Drop for Shown<'_> {
 impl<'d> Shown<'d> {
     fn open(py: Python<'_>, subject: &'d Subject<'d>) -> Result<Shown<'d>, Unbuilt> {
         if !subject.root().is_well_formed() {
-            // A rule that looks at what there is would say that all is well.
+            // A rule that reads only a part of the file would report no issues in the rest.
             let why = "the file is no well-formed XML, so that only a part of it can be seen";
             return Err(Unbuilt::Broken(why.to_owned()));
         }
@@ -91,7 +91,7 @@ impl<'d> Shown<'d> {
         let called = rule
             .function
             .call1(py, (self.root.clone_ref(py), found.clone()));
-        // What was found before an exception is still true.
+        // Findings before an exception are still valid.
         found.get().tell(sink, |lease| self.document_of(lease));
         called.map(drop)
     }
@@ -144,7 +144,7 @@ impl AnyRule for PyRule {
     }
 }
 
-/// What went wrong in a rule, as Python's users know it: the last line first, which is what fits into a list.
+/// Returns a Python traceback with the last line first, because lists show only the first line.
 fn traceback(py: Python<'_>, error: &PyErr) -> String {
     let kind = error.get_type(py).name().map(|it| it.to_string());
     let kind = kind.unwrap_or_else(|_| "an exception".to_owned());
@@ -168,7 +168,7 @@ fn numbers(version: Version) -> (u16, u16) {
     (version.major, version.minor)
 }
 
-/// The version that a document of either standard names.
+/// Returns the version in the header of a document of either standard.
 pub(crate) fn version_of(document: &Document<'_>) -> Option<Version> {
     let root = document.root()?;
     let header = match root.name() {

@@ -1,5 +1,5 @@
-//! The schema rule of a bundle: what [`qcbus_schema`], which knows only documents, says about one, as
-//! issues. What differs between bundles is the rule's name and page:
+//! The schema rule of a bundle: reports the violations that [`qcbus_schema`] finds in a document as
+//! issues. Bundles differ only in the rule's name and page:
 //!
 //! ```text
 //! pub static RULE: Rule<Validated> = Rule {
@@ -20,7 +20,7 @@ use qcbus_document::{Attribute, Document, Node};
 use qcbus_schema::{Checked, Code, Later, Outcome, Severity, Version, Violation};
 use qcbus_sdk::{Level, Place, Rule, Sink, Subject};
 
-/// What the schema rules of all bundles have in common, for the `..` of one.
+/// Common fields of the schema rules of all bundles, for struct update syntax (`..`).
 pub const RULE: Rule<Validated> = Rule {
     params: &[SCHEMA_DIR],
     resource: Some(&SCHEMAS),
@@ -60,8 +60,8 @@ fn run(checked: &Checked<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The groups of a modular scenario that are not in what it is expanded to, because others take their
-/// place: they are looked at as they are written.
+/// Checks the groups of a modular scenario that are replaced by others in its expansion. They are
+/// checked as written.
 fn say_replaced(found: &mut Sink<'_>) {
     let subject = found.subject();
     if !subject.is_expanded() {
@@ -83,10 +83,10 @@ fn say_replaced(found: &mut Sink<'_>) {
     }
 }
 
-/// Places of what is newer than the header that are shown.
+/// Maximum number of shown places with features that are newer than the header.
 const MOST_SHOWN: usize = 3;
 
-/// Says that a file is written for a later version than its header names.
+/// Reports that a file is written for a later version than its header names.
 fn say_later(later: &Later<'_>, stated: Option<Version>, found: &mut Sink<'_>) {
     let Some((newest, stated)) = later.things.first().zip(stated) else {
         return;
@@ -121,32 +121,32 @@ fn say_later(later: &Later<'_>, stated: Option<Version>, found: &mut Sink<'_>) {
     }
 }
 
-/// Something that a document's schema does not allow.
+/// A violation of a document's schema.
 pub struct Breach<'a> {
-    /// The element that it is about.
+    /// Element with the violation.
     pub node: Node<'a>,
-    /// The attribute that it is about.
+    /// Attribute with the violation, if any.
     pub attribute: Option<Attribute<'a>>,
-    /// What is wrong.
+    /// Description of the violation.
     pub text: String,
-    /// What readers make of it.
+    /// Consequence for readers of the document.
     pub weight: Weight,
 }
 
-/// What readers make of something that a schema does not allow.
+/// Consequence of a schema violation for readers of the document.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weight {
-    /// It cannot be read: a value that is none, or nothing where something must be.
+    /// Readers cannot read it: a value is invalid, or something required is missing.
     Unreadable,
-    /// It is only too much, or not where it belongs: many readers pass over it.
+    /// It is superfluous or misplaced. Many readers ignore it.
     Superfluous,
-    /// It came with a later version than the header names: who knows that one reads it.
+    /// It came with a later version than the header names. Readers of that version can read it.
     Later,
 }
 
-/// Where a document that a root refers to breaks its schema, in document order: the user's schema, or the
-/// one that comes with qcbus. Where the schema is known to be wrong, or is not that of the document's
-/// version, nothing is said.
+/// Returns the schema violations of a document that a root refers to, in document order. The schema
+/// is the user's or the one that comes with qcbus. Known defects of the schema are left out. The
+/// result is empty if the schema is for another version than the document's.
 pub fn breaches<'a>(subject: &Subject<'_>, document: &Document<'a>) -> Vec<Breach<'a>> {
     let Outcome::Checked(checked) =
         qcbus_schema::check(document, subject.kind(), &model::options(subject))
@@ -175,7 +175,7 @@ pub fn breaches<'a>(subject: &Subject<'_>, document: &Document<'a>) -> Vec<Breac
     breaches
 }
 
-/// All that a document uses of later versions than its header names.
+/// Returns all uses of features from later versions than the document's header names.
 fn newer_than<'a>(later: &Later<'a>, stated: Version) -> impl Iterator<Item = Breach<'a>> {
     let things = later.things.iter();
     things.flat_map(move |thing| {
@@ -195,7 +195,8 @@ fn newer_than<'a>(later: &Later<'a>, stated: Version) -> impl Iterator<Item = Br
 
 fn is_unreadable(violation: &Violation<'_>) -> bool {
     match violation.code {
-        // Expressions came with a later version, and readers of that take them anywhere.
+        // Expressions came with a later version. Readers of that version accept them in any
+        // attribute.
         Code::InvalidValue => !violation
             .attribute
             .is_some_and(|attribute| attribute.value().contains('$')),

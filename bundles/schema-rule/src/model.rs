@@ -1,4 +1,4 @@
-//! The result of validating the root against its schema, and the schemas that a user brings.
+//! Model of the schema rule: the result of validating the root, and the user's schemas.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use qcbus_schema::{
 };
 use qcbus_sdk::{Model, Param, Resource, ResourceFile, ResourceValue, Subject, Unbuilt};
 
-/// Marks rules about the validated document; they say nothing when no schema applies.
+/// Marker of rules for the validated document. They report nothing if no schema applies.
 #[derive(Debug)]
 pub struct Validated;
 
@@ -27,7 +27,7 @@ impl Model for Validated {
     }
 }
 
-/// The user's schemas come first.
+/// Returns the options. The user's schemas have priority over those that come with qcbus.
 pub(crate) fn options(subject: &Subject<'_>) -> Options {
     let own = subject.resource::<Overrides>();
     Options {
@@ -36,8 +36,9 @@ pub(crate) fn options(subject: &Subject<'_>) -> Options {
     }
 }
 
-/// Old versions have no schema, and the rule does not apply to them. A file that does not say its
-/// version or is not well-formed is broken: that other rules say so is no reason to accept it here.
+/// Converts the reason for a skipped validation. Old versions have no schema, so the rule does not
+/// apply to them. A file without a version or with ill-formed XML is broken. Other rules report
+/// this too, but the file is not accepted here.
 fn unbuilt(reason: &SkipReason) -> Unbuilt {
     let text = reason.to_string();
     match reason {
@@ -47,21 +48,21 @@ fn unbuilt(reason: &SkipReason) -> Unbuilt {
     }
 }
 
-/// Where the user's schemas are.
+/// Directory of the user's schemas.
 pub(crate) const SCHEMA_DIR: Param = Param::text(
     "schemaDir",
     "",
     "directory of schemas (.xsd, .tbl) that are used instead of those that come with qcbus",
 );
 
-/// The user's schemas: read and compiled before anything is checked.
+/// The user's schemas. They are read and compiled before the first check.
 pub(crate) static SCHEMAS: Resource = Resource {
     param: SCHEMA_DIR,
     endings: &["xsd", "tbl"],
     make: compiled,
 };
 
-/// The schemas of the user, those for one version first.
+/// The user's schemas. Those for one version come first.
 struct Overrides(Vec<Override>);
 
 fn compiled(files: &[ResourceFile]) -> Result<ResourceValue, String> {

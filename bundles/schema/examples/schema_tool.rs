@@ -1,4 +1,5 @@
-//! What the scripts under `tests/` drive: compile XSDs, validate files against tables, time both.
+//! A tool for the scripts under `tests/`: compiles XSDs, validates files against tables, and
+//! measures the time of both.
 //!
 //! ```text
 //! schema_tool compile TITLE OUT XSD...   write tables
@@ -101,7 +102,7 @@ fn verdict(schema: &Schema, file: &str) -> Result<String, String> {
     ))
 }
 
-/// The row on which the start tag ends: where libxml2 reports an element.
+/// Returns the row on which the start tag ends. libxml2 reports an element there.
 fn tag_end(document: &Document<'_>, node: Node<'_>) -> u32 {
     let last = node
         .attributes()
@@ -121,7 +122,7 @@ fn time(path: &str, file: &str) -> Result<(), String> {
     let image = image(file)?;
     let document = Document::open(&image).map_err(|error| error.to_string())?;
     let megabytes = f64::from(document.text_len()) / 1e6;
-    // The clock is coarse: small files are validated often enough to be seen by it.
+    // The clock is coarse, so small files are validated often enough to be measurable.
     let turns = (20.0 / megabytes).ceil().clamp(1.0, 10_000.0) as u32;
     let mut best = f64::INFINITY;
     let mut total = 0;
@@ -154,7 +155,8 @@ fn generate_one(path: &str, seed: &str, size: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Seconds this process spent on a CPU (Linux); what others do on the machine does not count.
+/// Returns the seconds that this process spent on a CPU (Linux). Other processes on the machine do
+/// not count.
 fn on_cpu() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/schedstat").unwrap_or_default();
     let nanoseconds: Option<f64> = stat.split(' ').next().and_then(|field| field.parse().ok());

@@ -11,20 +11,20 @@ use crate::validate::Overlay;
 use crate::versions::{SkipReason, Version, select, version_of};
 use crate::violation::{Limits, Report, Rest, Violation};
 
-/// A user schema: used instead of the shipped one.
+/// A user schema that replaces the shipped one.
 #[derive(Clone, Debug)]
 pub struct Override {
-    /// The kind of file it is for.
+    /// Kind of file that it applies to.
     pub kind: FileKind,
-    /// The header version it is for; `None` is any, headers without a version included.
+    /// Header version that it applies to. `None` means every version and headers without a version.
     pub version: Option<Version>,
-    /// The tables.
+    /// Compiled tables.
     pub schema: Arc<Schema>,
-    /// The files that it was made of.
+    /// Files from which it was made.
     pub sources: Arc<[Source]>,
 }
 
-/// A file that a schema was made of.
+/// A source file of a schema.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Source {
     /// Its path.
@@ -33,26 +33,26 @@ pub struct Source {
     pub sha256: String,
 }
 
-/// How to check.
+/// Options of a check.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// How many violations are listed.
+    /// Limits on the number of listed violations.
     pub limits: Limits,
-    /// The user's schemas; the first that fits is used.
+    /// The user's schemas. The first one that applies is used.
     pub overrides: Vec<Override>,
 }
 
-/// How much a violation weighs.
+/// Severity of a violation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
     /// The file breaks its schema.
     Error,
-    /// The file breaks its schema in a point where the schema is known to be wrong, or claims a version that
-    /// no known schema describes.
+    /// The file breaks its schema at a known defect of the schema, or its version has no known
+    /// schema.
     Information,
 }
 
-/// The outcome for one document.
+/// Outcome of a check for one document.
 #[derive(Debug)]
 pub enum Outcome<'a> {
     /// No schema applies.
@@ -64,21 +64,21 @@ pub enum Outcome<'a> {
 /// A validated document.
 #[derive(Debug)]
 pub struct Checked<'a> {
-    /// What the schema is called, e.g. `OpenDRIVE 1.7`.
+    /// Title of the schema, e.g. `OpenDRIVE 1.7`.
     pub schema: String,
-    /// The files of a user schema; empty for a shipped one.
+    /// Files of a user schema. Empty for a shipped schema.
     pub sources: Arc<[Source]>,
-    /// The version the header names.
+    /// Version in the header.
     pub version: Option<Version>,
-    /// Whether that version is newer than the newest known schema, which was used instead.
+    /// Whether that version is newer than the newest known schema. That schema is used then.
     pub newer: bool,
     /// Whether the tags of modular scenarios were allowed.
     pub modular: bool,
-    /// The default namespace of the root, which was disregarded: the published schemas have none,
-    /// or one that no file uses.
+    /// Default namespace of the root. It is ignored, because the published schemas have none, or
+    /// one that no file uses.
     pub namespace: Option<&'a str>,
-    /// What the document uses of later versions than its header names: one cause of many violations,
-    /// of which those are left out that the later version does not know.
+    /// Features of later versions that the document uses. Many violations have this one cause.
+    /// Violations that the later version allows are left out of the list.
     pub later: Option<Later<'a>>,
     /// The violations in order of discovery.
     pub violations: Vec<Violation<'a>>,
@@ -86,19 +86,19 @@ pub struct Checked<'a> {
     pub rest: Vec<Rest>,
 }
 
-/// Something that a result should say about the check itself.
+/// A fact about the check itself for the result.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fact {
-    /// Its name.
+    /// Key of the fact.
     pub key: &'static str,
-    /// What is so.
+    /// Value of the fact.
     pub value: String,
-    /// What it means.
+    /// Description of the fact.
     pub description: &'static str,
 }
 
 impl Checked<'_> {
-    /// Which schema the document was compared with: a shipped one, or the user's files.
+    /// Returns the schema that was used: a shipped one, or the user's files.
     pub fn provenance(&self) -> Vec<Fact> {
         let fact = |value, description| Fact {
             key: "qcbus.schema",
@@ -122,7 +122,7 @@ impl Checked<'_> {
             .collect()
     }
 
-    /// How much the violations of a kind weigh that are only counted.
+    /// Returns the severity of unlisted violations of one kind.
     pub fn severity_of_rest(&self, rest: &Rest) -> Severity {
         match rest.known_schema_defect {
             _ if self.newer => Severity::Information,
@@ -131,7 +131,7 @@ impl Checked<'_> {
         }
     }
 
-    /// How much a violation weighs.
+    /// Returns the severity of a violation.
     pub fn severity(&self, violation: &Violation<'_>) -> Severity {
         match violation.known_schema_defect {
             _ if self.newer => Severity::Information,
@@ -141,7 +141,7 @@ impl Checked<'_> {
     }
 }
 
-/// Validates a document against the schema its header asks for.
+/// Validates a document against the schema for its header.
 pub fn check<'a>(document: &Document<'a>, kind: FileKind, options: &Options) -> Outcome<'a> {
     if !document.is_well_formed() {
         return Outcome::Skipped(SkipReason::IllFormed);
@@ -175,7 +175,7 @@ pub fn check<'a>(document: &Document<'a>, kind: FileKind, options: &Options) -> 
     }
 }
 
-/// Archives of scenarios are judged by the schema of their main file.
+/// Checks whether two kinds use one schema. Archives use the schema of their main file.
 fn same_kind(one: FileKind, other: FileKind) -> bool {
     (one == FileKind::Xodr) == (other == FileKind::Xodr)
 }
@@ -229,8 +229,8 @@ fn checked<'a>(
     }
 }
 
-/// What the version of the header finds fault with beside what came later. Versions of OpenDRIVE change so
-/// much that a file of one is no file of the next: judged by the later one it would have other faults.
+/// Removes the uses of later features from a report for the header's version. Versions of OpenDRIVE
+/// differ so much that a later schema would report other violations.
 fn without<'a>(later: &Later<'a>, mut report: Report<'a>) -> Report<'a> {
     let mut places: HashSet<(u32, Option<&str>)> = HashSet::new();
     let mut subjects: HashSet<String> = HashSet::new();
@@ -253,10 +253,10 @@ fn without<'a>(later: &Later<'a>, mut report: Report<'a>) -> Report<'a> {
     report
 }
 
-/// Of what a later version finds fault with, that with which the version of the header does so, too: the
-/// author may let the header name the one or do without what the other has.
+/// Reduces a report for the later version to violations that the header's version has too. The
+/// author may either change the header or remove the later features.
 fn left_by<'a>(stated: &Report<'a>, mut meant: Report<'a>) -> Report<'a> {
-    // Where not all is listed, nobody knows what is left.
+    // If violations are missing in the list, the comparison is impossible.
     if stated.rest.is_empty() {
         let places: HashSet<u32> = stated.violations.iter().map(Violation::offset).collect();
         meant
@@ -267,8 +267,8 @@ fn left_by<'a>(stated: &Report<'a>, mut meant: Report<'a>) -> Report<'a> {
     meant
 }
 
-/// Whether the document is a modular scenario: it refers to scenarios, or offers attributes to be
-/// replaced by those that refer to it.
+/// Checks whether the document is a modular scenario. Such a scenario refers to other scenarios, or
+/// it has attributes that a referring scenario can replace.
 fn is_modular(document: &Document<'_>) -> bool {
     document.elements("ScenarioReference").next().is_some()
         || document.names().any(|name| name == "parameterAttributes")

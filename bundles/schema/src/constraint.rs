@@ -2,14 +2,14 @@
 
 use crate::names::NameId;
 
-/// What a constraint demands.
+/// Kind of a constraint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConstraintKind {
-    /// Values must be present and differ.
+    /// Values are required and must be unique.
     Key,
-    /// Values, where present, must differ.
+    /// Values are optional and must be unique.
     Unique,
-    /// Values, where present, must be among those of the key at this index.
+    /// Values are optional and must occur in the key with this index.
     Reference(u16),
 }
 
@@ -25,17 +25,17 @@ pub enum Step {
 /// One identity constraint.
 #[derive(Clone, Debug)]
 pub struct Constraint {
-    /// The schema's name for it.
+    /// Name of the constraint in the schema.
     pub name: Box<str>,
     /// Key, unique or reference.
     pub kind: ConstraintKind,
     /// Paths from the scope element to the selected elements.
     pub paths: Vec<Vec<Step>>,
-    /// The attribute that carries the value.
+    /// Attribute with the value.
     pub field: NameId,
 }
 
-/// The constraints of one scope element with their selectors merged into one tree.
+/// Constraints of one scope element. Their selectors are merged into one tree.
 #[derive(Clone, Debug, Default)]
 pub struct Constraints {
     /// The constraints in order of declaration.
@@ -51,7 +51,7 @@ struct Branch {
 }
 
 impl Constraints {
-    /// Merges the selectors of `list`; `None` if there are more than 65,535 steps.
+    /// Merges the selectors of `list`. Returns `None` if there are more than 65,535 steps.
     pub(crate) fn new(list: Vec<Constraint>) -> Option<Self> {
         let mut all = Self {
             list,
@@ -97,7 +97,7 @@ impl Constraints {
         Some(known.unwrap_or(next))
     }
 
-    /// The branches reached from `at` by a child called `name`.
+    /// Returns the branches reached from `at` by a child called `name`.
     pub(crate) fn step(&self, at: u16, name: NameId) -> impl Iterator<Item = u16> + '_ {
         let branch = self.tree.get(usize::from(at));
         let named = branch.and_then(|branch| {
@@ -112,7 +112,7 @@ impl Constraints {
             .chain(branch.and_then(|branch| branch.any))
     }
 
-    /// The constraints that select an element at branch `at`.
+    /// Returns the constraints that select an element at branch `at`.
     pub(crate) fn hits(&self, at: u16) -> &[u16] {
         self.tree
             .get(usize::from(at))

@@ -1,8 +1,8 @@
-//! What is known about single conditions of the published schemas: explanations in words, and
-//! defects that reject what the standard allows.
+//! Notes on single conditions of the published schemas: explanations as text, and schema defects
+//! that reject documents which the standard allows.
 //!
-//! The compiled form of a condition is its name here, so the entries follow the tables and not a
-//! line number; a test makes sure that every entry still occurs in a shipped table.
+//! An entry names a condition by its compiled form and not by a line number. A test checks that
+//! every entry still occurs in a shipped table.
 
 use qcbus_document::{Attribute, Node};
 
@@ -22,7 +22,7 @@ pub(crate) const RADIUS: &str = "(or (not (or @radius @width @length)) (and @rad
 pub(crate) const CROSS_SECTION: &str =
     "(or (not crossSectionSurface) (and (not superelevation) (not shape)))";
 
-/// A condition in words, for the element that breaks it.
+/// Returns the explanation of a condition for the element that breaks it.
 pub(crate) fn explanation(node: Node<'_>, condition: &str) -> Option<String> {
     let fixed = match condition {
         COMPLETE_OUTLINE => {
@@ -43,7 +43,7 @@ pub(crate) fn explanation(node: Node<'_>, condition: &str) -> Option<String> {
     Some(fixed.to_owned())
 }
 
-/// What an object has of the attributes that exclude each other.
+/// Describes which of the mutually exclusive attributes an object has.
 fn radius(object: Node<'_>) -> String {
     let there: Vec<&str> = ["radius", "width", "length"]
         .into_iter()
@@ -55,7 +55,7 @@ fn radius(object: Node<'_>) -> String {
     )
 }
 
-/// What conditions demand of the distance of repeated objects, in words.
+/// Conditions on the distance of repeated objects, with their explanation.
 const DISTANCES: [(&str, &str); 3] = [
     ("(= repeat/@distance 0)", "0, for it goes on without gaps"),
     (
@@ -68,7 +68,7 @@ const DISTANCES: [(&str, &str); 3] = [
     ),
 ];
 
-/// The bans of children by the type of an object.
+/// Explains conditions that forbid children by the type of an object.
 fn by_type(node: Node<'_>, condition: &str) -> Option<String> {
     let ty = node.attr("type")?;
     if !condition.starts_with(&format!("(if (= @type \"{ty}\") (and ")) {
@@ -102,7 +102,7 @@ fn by_type(node: Node<'_>, condition: &str) -> Option<String> {
     ))
 }
 
-/// Why breaking a condition is the schema's fault, if it is.
+/// Returns the schema defect that causes a failed condition, if there is one.
 pub(crate) fn condition(node: Node<'_>, condition: &str) -> Option<&'static str> {
     match condition {
         COMPLETE_OUTLINE => {
@@ -128,7 +128,7 @@ pub(crate) fn condition(node: Node<'_>, condition: &str) -> Option<&'static str>
     }
 }
 
-/// Why a missing child is the fault of the schema of this title, if it is.
+/// Returns the defect of the schema with this title that causes a missing child, if any.
 pub(crate) fn missing_child(
     parent: Node<'_>,
     names: &[String],
@@ -151,7 +151,7 @@ pub(crate) fn missing_child(
         .then_some("it demands both children in a row, where the standard has one or the other")
 }
 
-/// Why a child that has no place is there only by the fault of the schema of this title.
+/// Returns the defect of the schema with this title that causes a misplaced child, if any.
 pub(crate) fn misplaced_child(
     child: Node<'_>,
     parent: Node<'_>,
@@ -166,7 +166,8 @@ pub(crate) fn misplaced_child(
     )
 }
 
-/// Why elements within one that may not have any are there only by the fault of the schema of this title.
+/// Returns the defect of the schema with this title that forbids elements in this parent, if there
+/// is one.
 pub(crate) fn children_of_none(parent: Node<'_>, title: &str) -> Option<&'static str> {
     let is_old = matches!(title, "OpenDRIVE 1.1" | "OpenDRIVE 1.2");
     (is_old && parent.is("userData")).then_some(
@@ -174,7 +175,8 @@ pub(crate) fn children_of_none(parent: Node<'_>, title: &str) -> Option<&'static
     )
 }
 
-/// Elements of OpenSCENARIO 1.2 whose children are alternatives, which its schema lists as a sequence.
+/// Elements of OpenSCENARIO 1.2 with alternative children. Its schema lists these children as a
+/// sequence.
 const ALTERNATIVES: [(&str, [&str; 2]); 3] = [
     ("AppearanceAction", ["LightStateAction", "AnimationAction"]),
     ("LightType", ["VehicleLight", "UserDefinedLight"]),
@@ -184,7 +186,8 @@ const ALTERNATIVES: [(&str, [&str; 2]); 3] = [
     ),
 ];
 
-/// Why an attribute, or its value, is only by the fault of the schema of this title what `code` says.
+/// Returns the defect of the schema with this title that causes the violation `code` of an
+/// attribute, if there is one.
 pub(crate) fn attribute(code: Code, attribute: Attribute<'_>, title: &str) -> Option<&'static str> {
     match (code, title) {
         (Code::InvalidValue, _) => value(attribute, title),
@@ -217,7 +220,7 @@ fn is_in_center(lane: Node<'_>) -> bool {
     lane.is("lane") && lane.parent().is_some_and(|parent| parent.is("center"))
 }
 
-/// The words for the type of a lane that files of version 1.1 have.
+/// Lane type names in files of version 1.1.
 const LANE_TYPES: [&str; 23] = [
     "none",
     "driving",
@@ -283,7 +286,8 @@ fn is_decimal(word: &str) -> bool {
         .is_ok_and(|speed: f64| speed.is_finite() && speed >= 0.0)
 }
 
-/// The conditions that are explained or known to be defective, for the test that they still occur.
+/// Returns the conditions with an explanation or a known defect. A test checks that they still
+/// occur.
 #[doc(hidden)]
 pub fn known_conditions() -> [&'static str; 7] {
     [

@@ -1,4 +1,5 @@
-//! A header that names an older version than the file is written for: what the file uses of later ones.
+//! Detection of files that are written for a later version than their header names, and the later
+//! features they use.
 
 use foldhash::{HashMap, HashSet};
 use qcbus_document::{Attribute, Document, FileKind, Node};
@@ -8,47 +9,47 @@ use crate::typing::{FewTypes, Member, Typing, came_with};
 use crate::versions::{SHIPPED, Version};
 use crate::violation::{Code, Report};
 
-/// What a document uses of versions after the one that its header names.
+/// Features in a document that came after the version in its header.
 #[derive(Clone, Debug)]
 pub struct Later<'a> {
-    /// The `revMinor` of the header, which would have to be another.
+    /// The `revMinor` of the header that would have to change.
     pub header: Attribute<'a>,
-    /// The first version that has all of it.
+    /// The first version that has all of these features.
     pub version: Version,
-    /// One of each kind, where it is first: the newest before the others.
+    /// One entry for each kind of feature at its first use. The newest ones come first.
     pub things: Vec<Thing<'a>>,
-    /// How many there are, those that are said several times included.
+    /// Number of uses, including repeated ones.
     pub count: usize,
 }
 
-/// Something that the version of the header does not have.
+/// A feature that the version of the header does not have.
 #[derive(Clone, Debug)]
 pub struct Thing<'a> {
-    /// The element it is about.
+    /// Element with the feature.
     pub node: Node<'a>,
-    /// The attribute it is about.
+    /// Attribute with the feature, if any.
     pub attribute: Option<Attribute<'a>>,
-    /// What it is: `` `name` of `Element` ``.
+    /// Name of the feature: `` `name` of `Element` ``.
     pub what: String,
-    /// The version that it came with.
+    /// Version that introduced the feature.
     pub since: Version,
-    /// All elements that it is about, in document order.
+    /// All elements with the feature, in document order.
     pub nodes: Vec<Node<'a>>,
 }
 
-/// By the number of the type and what it does not have: the place in the list, when a later version has it.
+/// Index in the list for the number of a type and a missing member, if a later version has it.
 type Known<'a> = HashMap<(u32, Member<'a>), Option<usize>>;
 
-/// Which elements may use something of later versions.
+/// Elements that may use features of later versions.
 enum Suspects<'a> {
     All,
-    /// Those of these names.
+    /// Elements with these names.
     Named(HashSet<&'a str>),
 }
 
 impl<'a> Suspects<'a> {
-    /// `None` when there are none. What a map has of later versions its own version finds fault with; a
-    /// scenario may have expressions where any text is allowed.
+    /// Returns `None` if there are no such elements. In a map, the header's schema reports all
+    /// later features. A scenario may also have expressions in attributes that allow any text.
     fn of(kind: FileKind, report: &'a Report<'_>) -> Option<Suspects<'a>> {
         if kind != FileKind::Xodr {
             return Some(Suspects::All);
@@ -78,7 +79,7 @@ impl<'a> Suspects<'a> {
     }
 }
 
-/// Whether a violation may be something that a later version has.
+/// Checks whether a violation may be a feature of a later version.
 pub(crate) fn is_strange(code: Code) -> bool {
     matches!(
         code,
@@ -91,14 +92,15 @@ struct Search<'a> {
     kind: FileKind,
     version: Version,
     typing: Typing,
-    /// How the later versions type the same document, once that has been asked for.
+    /// Types of the same document in later versions, computed on first use.
     successors: Option<Vec<(Version, FewTypes)>>,
     known: Known<'a>,
     things: Vec<Thing<'a>>,
     count: usize,
 }
 
-/// What a document uses of later versions; `None` when that is nothing. `report` is what its version finds.
+/// Returns the uses of later features, or `None` if there are none. `report` is the result for the
+/// header's version.
 pub(crate) fn later<'a>(
     document: &Document<'a>,
     kind: FileKind,
@@ -141,7 +143,7 @@ pub(crate) fn later<'a>(
 
 impl<'a> Search<'a> {
     fn look(&mut self, node: Node<'a>) {
-        // What is within something unknown is not known to be new.
+        // Content of an unknown element is not necessarily new.
         let unknown = self.typing.number(node).is_none();
         let Some(parent) = node.parent().filter(|_| unknown) else {
             for attribute in node.attributes() {
@@ -213,7 +215,7 @@ impl<'a> Search<'a> {
         self.known.insert((number, member), place);
     }
 
-    /// The first later version that has it, unless its lack is a defect of this version's schema.
+    /// Returns the first later version with the member, unless its lack is a schema defect.
     fn came_with(
         &mut self,
         owner: Node<'a>,
@@ -223,7 +225,8 @@ impl<'a> Search<'a> {
         if self.kind != FileKind::Xodr {
             return came_with(self.kind, self.version, self.typing.class(owner)?, member);
         }
-        // The types of OpenDRIVE have other names in every version: its elements are told by their place.
+        // OpenDRIVE renames its types in every version, so elements are matched by their position
+        // in the document.
         let title = &self.typing.schema().title;
         let code = match member {
             Member::Attribute(_) => Code::UnexpectedAttribute,
@@ -249,7 +252,7 @@ impl<'a> Search<'a> {
                 words.is_empty() || words.iter().any(|known| **known == *word)
             }),
         };
-        // What has gone again is no reason to take a later version for the one that is meant.
+        // A feature that was removed again does not indicate a later version.
         let is_there_still = successors.last().is_some_and(|(_, typing)| has(typing));
         let mut having = successors.iter().filter(|(_, typing)| has(typing));
         having

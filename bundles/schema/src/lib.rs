@@ -1,8 +1,8 @@
 //! XML Schema for the bus: a compiler from XSD to compact tables, and a validator that walks a
 //! document image once.
 //!
-//! The project ships no XSD; the tables of the published OpenDRIVE and OpenSCENARIO schemas are
-//! shipped in a notation of their own, which the compiler writes (`qcbus schema compile`).
+//! The project contains no XSD. It ships the tables of the published OpenDRIVE and OpenSCENARIO
+//! schemas. They use an own notation, which the compiler writes (`qcbus schema compile`).
 
 mod assertion;
 mod check;

@@ -1,31 +1,31 @@
-//! The compiled tables: what a schema says, in the shape the walk needs it.
+//! The compiled tables of a schema, in the form that the validator needs.
 //!
-//! Types refer to each other by number. Every content model is a deterministic automaton over
-//! child names (or, for `all`, a bit per child), so that the walk decides each child with one
-//! lookup and no backtracking.
+//! Types refer to each other by number. Every content model is a deterministic automaton over child
+//! names (or, for `all`, a bit per child). Therefore the validator decides each child with one
+//! lookup and without backtracking.
 
 use crate::assertion::Assertion;
 use crate::constraint::Constraints;
 use crate::names::{NameId, Names};
 use crate::simple::SimpleType;
 
-/// Which edition of XML Schema the tables follow where the two differ.
+/// Edition of XML Schema that the tables follow where the two editions differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Edition {
     /// XML Schema 1.0.
     V1_0,
-    /// XML Schema 1.1: chosen by the compiler as soon as a 1.1 construct appears.
+    /// XML Schema 1.1. The compiler chooses it if the schema has a 1.1 construct.
     V1_1,
 }
 
 /// One compiled schema.
 #[derive(Clone, Debug)]
 pub struct Schema {
-    /// What messages call it, e.g. `OpenDRIVE 1.7`.
+    /// Title used in messages, e.g. `OpenDRIVE 1.7`.
     pub title: Box<str>,
     /// XSD 1.0 or 1.1.
     pub edition: Edition,
-    /// The target namespace of the source schema; matching ignores it, notes mention it.
+    /// Target namespace of the source schema. Validation ignores it, but notes mention it.
     pub namespace: Option<Box<str>>,
     /// All element and attribute names.
     pub names: Names,
@@ -38,7 +38,7 @@ pub struct Schema {
 }
 
 impl Schema {
-    /// An empty schema with a title.
+    /// Creates an empty schema with a title.
     pub(crate) fn new(title: &str) -> Self {
         Self {
             title: title.into(),
@@ -51,13 +51,13 @@ impl Schema {
         }
     }
 
-    /// The declaration of a root element.
+    /// Returns the declaration of a root element.
     pub fn root(&self, name: &str) -> Option<&ElementDecl> {
         let id = self.names.find(name)?;
         self.roots.iter().find(|root| root.name == id)
     }
 
-    /// Whether elements of this name may contain children of that name.
+    /// Checks whether elements named `parent` may contain children named `child`.
     pub(crate) fn knows_child(&self, parent: &str, child: &str) -> bool {
         let (Some(parent), Some(child)) = (self.names.find(parent), self.names.find(child)) else {
             return false;
@@ -66,13 +66,13 @@ impl Schema {
         homes.any(|element| self.is_home(element, child))
     }
 
-    /// All declarations of elements.
+    /// Returns all declarations of elements.
     fn declared(&self) -> impl Iterator<Item = &ElementDecl> {
         let within = self.complex.iter().flat_map(|ty| ty.content.children());
         self.roots.iter().chain(within)
     }
 
-    /// Whether an element may contain children of this name.
+    /// Checks whether an element may contain children of this name.
     fn is_home(&self, element: &ElementDecl, child: NameId) -> bool {
         let holds = |ty: &ComplexType| ty.content.children().iter().any(|one| one.name == child);
         let others = element.alternatives.iter().map(|other| other.ty);
@@ -82,7 +82,7 @@ impl Schema {
         })
     }
 
-    /// Names of elements that may contain a child of this name, at most four, for messages.
+    /// Returns at most four names of elements that may contain this child, for messages.
     pub(crate) fn parents_of(&self, child: NameId) -> Vec<&str> {
         let mut homes = Vec::new();
         let declared = self.declared();
@@ -95,7 +95,7 @@ impl Schema {
         homes
     }
 
-    /// A rough count of the bytes the tables occupy on the heap.
+    /// Returns the approximate heap size of the tables in bytes.
     pub fn heap_bytes(&self) -> usize {
         let complex: usize = self.complex.iter().map(ComplexType::heap_bytes).sum();
         let simple: usize = self.simple.iter().map(SimpleType::heap_bytes).sum();
@@ -107,9 +107,9 @@ impl Schema {
 /// The type of an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TypeRef {
-    /// Anything goes (`xs:anyType`).
+    /// Any content (`xs:anyType`).
     Any,
-    /// Text of a simple type, no attributes.
+    /// Text of a simple type without attributes.
     Simple(u32),
     /// A complex type.
     Complex(u32),
@@ -118,17 +118,17 @@ pub enum TypeRef {
 /// A type with attributes, children or both.
 #[derive(Clone, Debug)]
 pub struct ComplexType {
-    /// The schema's name for it, if it has one.
+    /// Name of the type in the schema, if it has one.
     pub name: Option<Box<str>>,
-    /// The complex type it extends or restricts.
+    /// Complex type that it extends or restricts.
     pub base: Option<u32>,
-    /// Whether elements may only have a type derived from this one.
+    /// Whether elements must have a type derived from this one.
     pub is_abstract: bool,
-    /// Whether text may stand between children.
+    /// Whether text may occur between children.
     pub mixed: bool,
-    /// Attributes that may (or must) appear.
+    /// Allowed and required attributes.
     pub attributes: Vec<AttributeUse>,
-    /// How many of `attributes` are required.
+    /// Number of required `attributes`.
     pub required: u16,
     /// Text or children.
     pub content: Content,
@@ -159,16 +159,16 @@ pub struct AttributeUse {
     pub name: NameId,
     /// The simple type of its value.
     pub value: u32,
-    /// Whether it must be there.
+    /// Whether it is required.
     pub required: bool,
-    /// The only value it may have.
+    /// The only allowed value, if fixed.
     pub fixed: Option<Box<str>>,
 }
 
-/// What stands between the tags.
+/// Content between the tags.
 #[derive(Clone, Debug)]
 pub enum Content {
-    /// Nothing (apart from white space, or text if the type is mixed).
+    /// Only white space, or text if the type is mixed.
     Empty,
     /// Text of a simple type.
     Text(u32),
@@ -179,7 +179,7 @@ pub enum Content {
 }
 
 impl Content {
-    /// The declarations of all children.
+    /// Returns the declarations of all children.
     pub(crate) fn children(&self) -> &[ElementDecl] {
         match self {
             Content::Empty | Content::Text(_) => &[],
@@ -189,19 +189,19 @@ impl Content {
     }
 }
 
-/// A deterministic automaton over child names; state 0 is the start.
+/// A deterministic automaton over child names. State 0 is the start.
 #[derive(Clone, Debug, Default)]
 pub struct Model {
-    /// The declarations of all children of the model, one per name.
+    /// Declarations of all children of the model, one for each name.
     pub children: Vec<ElementDecl>,
     /// The states.
     pub states: Vec<State>,
-    /// The edges of all states, those of one state side by side.
+    /// The edges of all states. The edges of one state are contiguous.
     pub edges: Vec<Edge>,
 }
 
 impl Model {
-    /// The edges that leave a state.
+    /// Returns the edges that leave a state.
     pub(crate) fn edges(&self, state: u16) -> &[Edge] {
         let Some(row) = self.states.get(usize::from(state)) else {
             return &[];
@@ -232,7 +232,7 @@ pub struct State {
     pub count: u16,
     /// Whether the element may end here.
     pub accepts: bool,
-    /// Where any other element leads (`any processContents="skip"`).
+    /// Next state after any other element (`any processContents="skip"`).
     pub wildcard: Option<u16>,
 }
 
@@ -247,18 +247,18 @@ pub struct Edge {
     pub to: u16,
 }
 
-/// An `all` group: a bit per member.
+/// An `all` group with one bit for each member.
 #[derive(Clone, Debug, Default)]
 pub struct AllModel {
     /// The members, at most 64.
     pub members: Vec<ElementDecl>,
-    /// Bits of the members that must appear.
+    /// Bits of the required members.
     pub required: u64,
     /// Whether the whole group may be absent.
     pub optional: bool,
 }
 
-/// An element as declared in a content model or as a root.
+/// An element declaration in a content model or as a root.
 #[derive(Clone, Debug)]
 pub struct ElementDecl {
     /// Its name.
@@ -267,9 +267,9 @@ pub struct ElementDecl {
     pub ty: TypeRef,
     /// Whether `xsi:nil` is allowed.
     pub nillable: bool,
-    /// Types chosen by an attribute's value (XSD 1.1), first match wins.
+    /// Types chosen by an attribute's value (XSD 1.1). The first match applies.
     pub alternatives: Vec<Alternative>,
-    /// Keys and references whose scope this element is.
+    /// Keys and references with this element as their scope.
     pub constraints: Option<Box<Constraints>>,
 }
 
@@ -283,8 +283,8 @@ impl ElementDecl {
 /// A type chosen by a test on the element's attributes.
 #[derive(Clone, Debug)]
 pub struct Alternative {
-    /// The test; `None` is the default.
+    /// The test, or `None` for the default type.
     pub test: Option<Assertion>,
-    /// The type it chooses.
+    /// Type that applies if the test holds.
     pub ty: TypeRef,
 }

@@ -1,17 +1,17 @@
-//! Interned element and attribute names: a schema compares names as small numbers.
+//! Interned element and attribute names. A schema compares names as small numbers.
 
 use std::collections::HashMap;
 
-/// A name inside one [`crate::Schema`].
+/// Number of a name in one [`crate::Schema`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct NameId(pub(crate) u16);
 
 impl NameId {
-    /// A name of the document that the schema never mentions.
+    /// Number of all names that the schema does not contain.
     pub(crate) const UNKNOWN: NameId = NameId(u16::MAX);
 }
 
-/// All names a schema mentions, each once.
+/// All distinct names of a schema.
 #[derive(Clone, Debug, Default)]
 pub struct Names {
     texts: Vec<Box<str>>,
@@ -19,7 +19,7 @@ pub struct Names {
 }
 
 impl Names {
-    /// The number for `name`, given out on first sight; `None` once 65,534 names are taken.
+    /// Returns the number of `name`, assigned on first use; `None` if 65,534 names are in use.
     pub(crate) fn intern(&mut self, name: &str) -> Option<NameId> {
         if let Some(&id) = self.ids.get(name) {
             return Some(NameId(id));
@@ -32,17 +32,17 @@ impl Names {
         Some(NameId(id))
     }
 
-    /// The number of a name the schema mentions.
+    /// Returns the number of a name, if the schema contains it.
     pub(crate) fn find(&self, name: &str) -> Option<NameId> {
         self.ids.get(name).map(|&id| NameId(id))
     }
 
-    /// The text of a name; empty for one that is not of this schema.
+    /// Returns the text of a name. It is empty for a name of another schema.
     pub fn text(&self, id: NameId) -> &str {
         self.texts.get(usize::from(id.0)).map_or("", |text| text)
     }
 
-    /// Bytes held, for the memory figure.
+    /// Returns the approximate heap size in bytes.
     pub(crate) fn heap_bytes(&self) -> usize {
         self.texts.iter().map(|text| 2 * text.len() + 56).sum()
     }

@@ -1,5 +1,6 @@
-//! Conditions over all descendants (`//`) of elements that can contain themselves: each nesting would
-//! walk everything below once more, so that validation would not be linear. They are refused.
+//! Detection of conditions over all descendants (`//`) of elements that can contain themselves.
+//! Each nesting level would walk all descendants again, so validation would not be linear. Such
+//! schemas are rejected.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +8,7 @@ use crate::assertion::Assertion;
 use crate::model::{ComplexType, Schema, TypeRef};
 
 impl Schema {
-    /// A type with such a condition, if there is one: its number.
+    /// Returns the number of a type with such a condition, if there is one.
     pub(crate) fn endless_condition(&self) -> Option<u32> {
         let deep = |ty: &ComplexType| ty.assertions.iter().any(Assertion::is_deep);
         let numbered = (0u32..).zip(&self.complex);
@@ -41,7 +42,7 @@ impl Schema {
         false
     }
 
-    /// A type and those that `xsi:type` may put in its place.
+    /// Returns a type and all types that `xsi:type` may select in its place.
     fn with_derived(&self, id: u32) -> Vec<u32> {
         let numbered = (0u32..).zip(&self.complex);
         let derived = numbered

@@ -1,10 +1,11 @@
-//! Which of several names was probably meant.
+//! Suggestions for misspelt names.
 
-/// Names longer than this are not compared: nobody mistypes them by a letter or two.
+/// Maximum length of compared names. A longer name is unlikely to be a typing error.
 const LONGEST: usize = 64;
 
-/// The candidate closest to `name`, if it is close enough to be a slip: equal but for case, or one
-/// change in every three characters, at most three (insertions, deletions, replacements, swaps).
+/// Returns the candidate closest to `name`, if `name` is probably a typing error. Allowed are a
+/// different case, or one change in every three characters and at most three changes (insertions,
+/// deletions, replacements, swaps).
 pub fn closest<'c>(name: &str, candidates: impl Iterator<Item = &'c str>) -> Option<&'c str> {
     let allowed = (name.chars().count() / 3).clamp(1, 3);
     let mut best: Option<(usize, &str)> = None;

@@ -1,5 +1,5 @@
-//! Which types a schema gives the elements and attributes of a document: for rules about values,
-//! which go by type and not by the place of an element.
+//! Types that a schema gives to the elements and attributes of a document. Rules about values use
+//! the type and not the place of an element.
 
 use foldhash::HashMap;
 use qcbus_document::{Attribute, Document, FileKind, Node};
@@ -14,23 +14,23 @@ use crate::versions::{SHIPPED, Version, select};
 #[derive(Debug, Clone)]
 pub struct Typing {
     schema: &'static Schema,
-    /// By the node's index: the number of its complex type, or [`UNKNOWN`].
+    /// Number of the complex type for each node index, or [`UNKNOWN`].
     types: Vec<u32>,
 }
 
-/// The element is not declared where it stands, or its type is no complex one.
+/// The element is not declared at its place, or its type is not complex.
 const UNKNOWN: u32 = u32::MAX;
 
 impl Typing {
-    /// Walks the document once. Versions without a schema of their own are read by the newest before
-    /// them; `None` where no schema describes such files at all.
+    /// Walks the document once and returns its types. A version without a schema uses the newest
+    /// earlier schema. Returns `None` if no schema exists for such files.
     pub fn of(document: &Document<'_>, kind: FileKind, version: Version) -> Option<Typing> {
         let schema = select(kind, version).ok()?.schema;
         let mut types = vec![UNKNOWN; document.len() as usize];
         let root = document.root()?;
         let declared = schema.root(root.name())?;
         set(&mut types, root, complex(declared.ty));
-        // Which type a name stands for depends on the type around it, and files repeat few pairs.
+        // The type of a name depends on the enclosing type. Files have few distinct pairs of them.
         let mut known: HashMap<(u32, u16), Option<&ElementDecl>> = HashMap::default();
         let names = NameMap::new(document, schema);
         let scope = Scope {
@@ -51,18 +51,18 @@ impl Typing {
         Some(Typing { schema, types })
     }
 
-    /// The name of the element's type, `AbsoluteSpeed`; `None` where the schema declares no such
-    /// element.
+    /// Returns the name of the element's type, such as `AbsoluteSpeed`, or `None` if the schema
+    /// does not declare the element.
     pub fn class(&self, node: Node<'_>) -> Option<&'static str> {
         self.complex(node)?.name.as_deref()
     }
 
-    /// The type of an attribute's value; `None` where the schema declares no such attribute.
+    /// Returns the type of an attribute's value, or `None` if the attribute is not declared.
     pub fn value(&self, attribute: Attribute<'_>) -> Option<ValueType> {
         value_of(self.schema, self.complex(attribute.node())?, attribute)
     }
 
-    /// Whether an element must have the attribute.
+    /// Checks whether an element must have the attribute.
     pub fn demands(&self, node: Node<'_>, attribute: &str) -> bool {
         let name = self.schema.names.find(attribute);
         let declared = name.zip(self.complex(node));
@@ -72,17 +72,17 @@ impl Typing {
         })
     }
 
-    /// The schema that gives the types.
+    /// Returns the schema that defines the types.
     pub(crate) fn schema(&self) -> &'static Schema {
         self.schema
     }
 
-    /// The number of an element's complex type, which tells the types of one schema apart.
+    /// Returns the number of an element's complex type. It is unique in one schema.
     pub(crate) fn number(&self, node: Node<'_>) -> Option<u32> {
         Some(get(&self.types, node)).filter(|number| *number != UNKNOWN)
     }
 
-    /// Whether the type of the element around it has this child, be it of a complex type or not.
+    /// Checks whether the type of the parent element declares this child, with any kind of type.
     pub(crate) fn declares(&self, node: Node<'_>) -> bool {
         let around = node.parent().and_then(|parent| self.complex(parent));
         around.is_some_and(|around| has_child(self.schema, around, node.name()))
@@ -94,14 +94,15 @@ impl Typing {
     }
 }
 
-/// The types that one schema gives to a few elements of a document, each found on the way down from the root.
+/// Types that one schema gives to single elements of a document. Each is found on the path from the
+/// root.
 pub(crate) struct FewTypes {
     schema: &'static Schema,
     names: NameMap,
 }
 
 impl FewTypes {
-    /// `None` where no schema describes such files, or it has another root.
+    /// Returns `None` if no schema exists for such files, or if the document has another root.
     pub(crate) fn of(
         document: &Document<'_>,
         kind: FileKind,
@@ -113,12 +114,12 @@ impl FewTypes {
         Some(FewTypes { schema, names })
     }
 
-    /// As [`Typing::value`].
+    /// Works like [`Typing::value`].
     pub(crate) fn value(&self, attribute: Attribute<'_>) -> Option<ValueType> {
         value_of(self.schema, self.complex(attribute.node())?, attribute)
     }
 
-    /// As [`Typing::declares`].
+    /// Works like [`Typing::declares`].
     pub(crate) fn declares(&self, node: Node<'_>) -> bool {
         let around = node.parent().and_then(|parent| self.complex(parent));
         around.is_some_and(|around| has_child(self.schema, around, node.name()))
@@ -173,7 +174,7 @@ fn complex(ty: TypeRef) -> u32 {
     }
 }
 
-/// What a type says of a child of this name.
+/// Returns a type's declaration of the child with this name.
 fn child<'s>(schema: &'s Schema, around: u32, name: &str) -> Option<&'s ElementDecl> {
     let name = schema.names.find(name)?;
     let content: &Content = &schema.complex.get(around as usize)?.content;
@@ -181,7 +182,8 @@ fn child<'s>(schema: &'s Schema, around: u32, name: &str) -> Option<&'s ElementD
 }
 
 impl ElementDecl {
-    /// The type of an element: the alternative that its attributes choose, the declared one where none does.
+    /// Returns the type of an element: the alternative chosen by its attributes, otherwise the
+    /// declared type.
     fn chosen(&self, node: Node<'_>, scope: &Scope<'_, '_>) -> TypeRef {
         let mut alternatives = self.alternatives.iter();
         let chosen = alternatives.find(|one| {
@@ -192,21 +194,21 @@ impl ElementDecl {
     }
 }
 
-/// Something that a type may have.
+/// A possible member of a type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Member<'a> {
     /// A child of this name.
     Child(&'a str),
     /// An attribute of this name.
     Attribute(&'a str),
-    /// An attribute that may say this word.
+    /// An attribute that allows this word.
     Word(&'a str, &'a str),
     /// An attribute that may be an expression.
     Expression(&'a str),
 }
 
-/// The first version after `version` in which the type of this name has something; `None` when it
-/// never has, as far as is known.
+/// Returns the first version after `version` in which the type of this name has a member. Returns
+/// `None` if no known version has it.
 pub fn came_with(
     kind: FileKind,
     version: Version,
@@ -257,12 +259,12 @@ pub struct ValueType {
 }
 
 impl ValueType {
-    /// The schema's name for it, `Double`.
+    /// Returns the name of the type in the schema, such as `Double`.
     pub fn name(&self) -> Option<&'static str> {
         self.simple.name.as_deref()
     }
 
-    /// Whether a value may be an expression of OpenSCENARIO.
+    /// Checks whether a value may be an expression of OpenSCENARIO.
     pub fn takes_expressions(&self) -> bool {
         let Variety::Union(members) = &self.simple.variety else {
             return false;
@@ -273,8 +275,8 @@ impl ValueType {
         members.any(|member| member.name.as_deref() == Some("expression"))
     }
 
-    /// The words that are allowed, when it is an enumeration: its own, or those of the first of its
-    /// alternatives that is one.
+    /// Returns the allowed words of an enumeration. A union uses the first of its members that is
+    /// an enumeration.
     pub fn words(&self) -> Option<&'static [Box<str>]> {
         let own = self.simple.facets.enumeration.as_deref();
         own.or_else(|| match &self.simple.variety {

@@ -1,4 +1,4 @@
-//! User schemas: which files make one schema, and which files it is for.
+//! User schemas: groups files into schemas and finds the files that each schema is for.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -11,20 +11,20 @@ use crate::model::Schema;
 use crate::notation::NotationError;
 use crate::versions::Version;
 
-/// A file of the user, read by whoever may read files.
+/// A schema file of the user. A process with file access has read it.
 #[derive(Clone, Copy, Debug)]
 pub struct UserSchemaFile<'f> {
-    /// Its path, as messages name it.
+    /// Path for messages.
     pub path: &'f str,
-    /// Its path below the directory that the user named.
+    /// Path relative to the directory that the user named.
     pub below: &'f Path,
     /// SHA-256 of its bytes, in hexadecimal.
     pub sha256: &'f str,
-    /// What it is.
+    /// Content of the file.
     pub content: UserSchemaContent<'f>,
 }
 
-/// An XSD or compiled tables.
+/// Content of a schema file: an XSD or compiled tables.
 #[derive(Clone, Copy, Debug)]
 pub enum UserSchemaContent<'f> {
     /// The image of an `.xsd` file.
@@ -33,29 +33,29 @@ pub enum UserSchemaContent<'f> {
     Tables(&'f [u8]),
 }
 
-/// Why a user's schemas cannot be used; reads well after "failed to ".
+/// Reason why a user's schemas cannot be used, as a continuation of "failed to ".
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UserSchemaError {
-    /// An XSD that the compiler does not take.
+    /// The compiler rejects an XSD.
     #[error(transparent)]
     Compile(#[from] CompileError),
-    /// Tables that cannot be read.
+    /// A table file cannot be read.
     #[error("use the tables {path}: failed to {error}")]
     Tables {
         /// The file.
         path: String,
-        /// Why.
+        /// Reason for the failure.
         error: NotationError,
     },
-    /// An image of our own that cannot be opened.
+    /// An image made by qcbus cannot be opened.
     #[error("open the image of {path}: {error}")]
     Image {
         /// The file.
         path: String,
-        /// Why.
+        /// Reason for the failure.
         error: qcbus_document::ImageError,
     },
-    /// A schema for something else.
+    /// The schema is for neither standard.
     #[error(
         "use the schema {0}: it declares neither <OpenDRIVE> nor <OpenSCENARIO> as a root element; \
          an XSD that belongs to another one is named there by xs:include and lies in the same directory"
@@ -67,25 +67,25 @@ pub enum UserSchemaError {
          names of file and directory, such as 1.7/map.xsd"
     )]
     Ambiguous {
-        /// One.
+        /// First schema.
         first: String,
-        /// The other.
+        /// Second schema.
         second: String,
-        /// What both are for.
+        /// Files that both schemas are for.
         what: String,
     },
 }
 
-/// Makes schemas of a user's files, those for one version before those for every version.
+/// Builds schemas from a user's files. Those for one version come before those for every version.
 ///
-/// Each `.tbl` is one schema. XSDs are one schema if they lie in one directory and include each
-/// other. The root element tells the kind of file that a schema is for. The version is the first
-/// number of the form `1.7` in the title of tables, else in the name of the file that declares the
-/// root (there also `_17_`, as ASAM names its files), else in those of its directories below the one
-/// that the user named, innermost first; without one it is for all versions.
+/// Each `.tbl` is one schema. XSDs form one schema if they are in one directory and include each
+/// other. The root element determines the kind of file. The version of tables is the first number
+/// of the form `1.7` in their title. Otherwise the name of the file that declares the root gives it
+/// (also as `_17_`, as in ASAM's names). Otherwise the directories below the user's directory give
+/// it, innermost first. A schema without a version is for all versions.
 ///
 /// # Errors
-/// [`UserSchemaError`] for the first file that is of no use: nothing is passed over in silence.
+/// [`UserSchemaError`] for the first unusable file. No file is skipped silently.
 pub fn user_schemas(files: &[UserSchemaFile<'_>]) -> Result<Vec<Override>, UserSchemaError> {
     let mut all: Vec<(String, Override)> = Vec::new();
     for file in files {
@@ -110,7 +110,7 @@ pub fn user_schemas(files: &[UserSchemaFile<'_>]) -> Result<Vec<Override>, UserS
     Ok(overrides)
 }
 
-/// The root elements and the kinds of files they stand for.
+/// Root elements, each with its kind of file.
 const ROOTS: [(&str, FileKind); 2] = [
     ("OpenDRIVE", FileKind::Xodr),
     ("OpenSCENARIO", FileKind::Xosc),
@@ -184,7 +184,7 @@ fn tables(file: &UserSchemaFile<'_>, bytes: &[u8]) -> Result<Schema, UserSchemaE
 
 type Member<'f> = (&'f UserSchemaFile<'f>, Document<'f>);
 
-/// XSDs by directory, those that include each other together, in the order of their paths.
+/// Groups the XSDs of each directory that include each other, in the order of their paths.
 fn groups<'f>(files: &'f [UserSchemaFile<'f>]) -> Result<Vec<Vec<Member<'f>>>, UserSchemaError> {
     let mut groups: Vec<Vec<Member<'f>>> = Vec::new();
     for file in files {
@@ -213,7 +213,7 @@ fn belong_together(one: &Member<'_>, other: &Member<'_>) -> bool {
         && (includes(&one.1, other.0.below) || includes(&other.1, one.0.below))
 }
 
-/// Whether a schema document includes the file of this name.
+/// Checks whether a schema document includes a file with this name.
 fn includes(document: &Document<'_>, path: &Path) -> bool {
     let name = path.file_name().and_then(|name| name.to_str());
     document.root().is_some_and(|root| {
@@ -231,7 +231,7 @@ fn declares_root(document: &Document<'_>) -> bool {
     })
 }
 
-/// The version in the name of a file, else in those of its directories, innermost first.
+/// Returns the version in the name of a file, or else of its directories, innermost first.
 fn version_of_path(below: &Path) -> Option<Version> {
     let stem = below.file_stem().and_then(|stem| stem.to_str());
     let of_file = stem.and_then(|stem| version_in(stem).or_else(|| two_digits(stem)));
@@ -240,7 +240,7 @@ fn version_of_path(below: &Path) -> Option<Version> {
     of_file.or_else(|| names.filter_map(version_in).next())
 }
 
-/// The first `1.7` in a name.
+/// Returns the first number such as `1.7` in a name.
 fn version_in(name: &str) -> Option<Version> {
     let mut numbers = name.split(|c: char| !c.is_ascii_digit() && c != '.');
     numbers.find_map(|word| {
@@ -253,7 +253,7 @@ fn version_in(name: &str) -> Option<Version> {
     })
 }
 
-/// `_17` or `_17_` in a name, as ASAM names the files of OpenDRIVE 1.6 and 1.7.
+/// Reads `_17` or `_17_` in a name. ASAM names the files of OpenDRIVE 1.6 and 1.7 in this way.
 fn two_digits(name: &str) -> Option<Version> {
     name.split('_').skip(1).find_map(|word| {
         let [major @ b'1'..=b'9', minor @ b'0'..=b'9'] = word.as_bytes() else {

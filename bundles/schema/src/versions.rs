@@ -1,4 +1,4 @@
-//! Which schema a file is checked against: the shipped tables and how a header chooses among them.
+//! Selection of the schema for a file: the shipped tables and the choice among them by the header.
 
 use std::sync::OnceLock;
 
@@ -22,14 +22,14 @@ impl std::fmt::Display for Version {
     }
 }
 
-/// The tables of one published schema, read when first needed.
+/// The tables of one published schema, parsed when first needed.
 #[derive(Debug)]
 pub struct Shipped {
-    /// The kind of file it describes.
+    /// The kind of file that the schema describes.
     pub kind: FileKind,
-    /// The header version it is for.
+    /// The header version that the schema applies to.
     pub version: Version,
-    /// The tables in their notation.
+    /// The tables in text notation.
     pub notation: &'static str,
     loaded: OnceLock<Result<Schema, NotationError>>,
 }
@@ -46,9 +46,9 @@ macro_rules! shipped {
     };
 }
 
-// OpenDRIVE 1.8 means 1.8.1, and OpenSCENARIO 1.1 means 1.1.1: headers do not tell the patch
-// releases apart, and the later ones correct the earlier. The tables of OpenDRIVE 1.9 are written by hand: those
-// of 1.8.1 with the elements, attributes and words that the text of 1.9.0 adds.
+// OpenDRIVE 1.8 means 1.8.1, and OpenSCENARIO 1.1 means 1.1.1. Headers do not distinguish patch
+// releases, and the later ones correct the earlier. The tables of OpenDRIVE 1.9 are written by
+// hand: those of 1.8.1 with the elements, attributes and words that the text of 1.9.0 adds.
 shipped! {
     Xodr 1 1 "xodr-1.1.tbl"
     Xodr 1 2 "xodr-1.2.tbl"
@@ -66,10 +66,10 @@ shipped! {
 }
 
 impl Shipped {
-    /// The tables.
+    /// Returns the parsed tables.
     ///
     /// # Errors
-    /// When the shipped file is broken, which a test rules out.
+    /// Returns an error if the shipped file is invalid. A test ensures that it is valid.
     pub fn schema(&self) -> Result<&Schema, &NotationError> {
         self.loaded
             .get_or_init(|| Schema::from_notation(self.notation))
@@ -77,7 +77,7 @@ impl Shipped {
     }
 }
 
-/// The header's version, leniently read: blanks around the numbers and leading zeros are allowed.
+/// Returns the version in the header. Blanks around the numbers and leading zeros are allowed.
 pub fn version_of(document: &Document<'_>, kind: FileKind) -> Option<Version> {
     let header = if kind == FileKind::Xodr {
         "header"
@@ -92,13 +92,14 @@ pub fn version_of(document: &Document<'_>, kind: FileKind) -> Option<Version> {
     })
 }
 
-/// Whether another version than that of this schema knows such a child: then it is no slip of the pen.
+/// Checks whether another version than that of this schema declares such a child. Then the name is
+/// not a typing error.
 pub(crate) fn is_known_elsewhere(schema: &Schema, parent: &str, child: &str) -> bool {
     let is_own = |one: &&Shipped| {
         let loaded = one.loaded.get().and_then(|loaded| loaded.as_ref().ok());
         loaded.is_some_and(|loaded| std::ptr::eq(loaded, schema))
     };
-    // To the user's own schemas there are no others.
+    // A user's own schema has no other versions.
     let Some(own) = SHIPPED.iter().find(is_own) else {
         return false;
     };
@@ -110,10 +111,10 @@ pub(crate) fn is_known_elsewhere(schema: &Schema, parent: &str, child: &str) -> 
     })
 }
 
-/// Why no schema applies.
+/// Reasons why no schema applies.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SkipReason {
-    /// The header or its version is missing or no number.
+    /// The header or its version is missing, or the version is not a number.
     #[error("the file header names no version, so no schema can be chosen")]
     NoVersion,
     /// Versions before 1.0 have no published schema.
@@ -122,7 +123,7 @@ pub enum SkipReason {
     /// An old version without a schema.
     #[error("version {0} has no published schema")]
     NoSchema(Version),
-    /// The tables are unusable.
+    /// The tables cannot be used.
     #[error("the tables could not be used: failed to {0}")]
     Tables(NotationError),
     /// The file is not well-formed, so the tree is partial.
@@ -130,13 +131,13 @@ pub enum SkipReason {
     IllFormed,
 }
 
-/// A schema and whether the file claims to be newer than it.
+/// A schema, and whether the file declares a newer version.
 pub(crate) struct Selection {
     pub(crate) schema: &'static Schema,
     pub(crate) newer: bool,
 }
 
-/// The shipped schema for a version.
+/// Returns the shipped schema for a version.
 pub(crate) fn select(kind: FileKind, version: Version) -> Result<Selection, SkipReason> {
     if version.major == 0 {
         return Err(SkipReason::MajorZero(version));

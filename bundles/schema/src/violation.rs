@@ -1,44 +1,45 @@
-//! What the validator reports, as data and as text.
+//! Violations that the validator reports, as data and as text.
 
 use qcbus_document::{Attribute, Node};
 
-/// What is wrong.
+/// Kind of violation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Code {
-    /// The root element is none the schema declares.
+    /// The schema does not declare the root element.
     UnknownRoot,
-    /// An element that its parent does not know.
+    /// An element that its parent does not declare.
     UnexpectedElement,
-    /// An element that its parent knows, but at another place.
+    /// An element that its parent declares, but at another place.
     MisplacedElement,
-    /// An element that its parent knows, but not that often.
+    /// An element that occurs more often than its parent allows.
     RepeatedElement,
-    /// A child that must be there.
+    /// A missing required child.
     MissingElement,
-    /// An attribute that its element does not know.
+    /// An attribute that its element does not declare.
     UnexpectedAttribute,
-    /// An attribute that must be there.
+    /// A missing required attribute.
     MissingAttribute,
     /// An attribute value that is not of the attribute's type.
     InvalidValue,
     /// Text of an element that is not of the element's type.
     InvalidText,
-    /// Text where only elements may stand.
+    /// Text where only elements are allowed.
     UnexpectedText,
-    /// No type can be told for the element.
+    /// The type of the element cannot be determined.
     UnknownType,
     /// A condition of the schema does not hold.
     ConditionFailed,
     /// A key value that occurs twice.
     DuplicateKey,
-    /// A selected element without its key value.
+    /// A selected element without a key value.
     MissingKey,
-    /// A reference to a key value that does not occur.
+    /// A reference to a key value that does not exist.
     DanglingReference,
 }
 
 impl Code {
-    /// What is so with an element or, after its name and `/@`, an attribute, in words.
+    /// Describes the violations of an element, or of an attribute (its element's name, `/@` and its
+    /// own name), in words.
     pub fn about(self, subject: &str) -> String {
         match self {
             Code::UnknownRoot => format!("`{subject}` as the root element"),
@@ -59,7 +60,7 @@ impl Code {
         }
     }
 
-    /// The name used in results and in the recorded verdicts.
+    /// Returns the name used in results and in the recorded verdicts.
     pub fn as_str(self) -> &'static str {
         match self {
             Code::UnknownRoot => "unknown-root",
@@ -84,26 +85,26 @@ impl Code {
 /// One violation of a schema.
 #[derive(Clone, Debug)]
 pub struct Violation<'a> {
-    /// What is wrong.
+    /// Kind of violation.
     pub code: Code,
-    /// The element it is about.
+    /// The element concerned.
     pub node: Node<'a>,
-    /// The attribute it is about.
+    /// The attribute concerned.
     pub attribute: Option<Attribute<'a>>,
-    /// What was found: a name or a value; empty if the violation is that something is missing.
+    /// Name or value that was found; empty if something is missing.
     pub found: String,
-    /// What would have been right: names or values.
+    /// Names or values that are valid here.
     pub expected: Vec<String>,
-    /// The name or value probably meant.
+    /// The name or value that was probably meant.
     pub suggestion: Option<String>,
-    /// Why this is the schema's fault and not the file's, if it is known to be.
+    /// Reason why the schema is wrong and not the file, if that is known.
     pub known_schema_defect: Option<&'static str>,
     /// The whole message.
     pub text: String,
 }
 
 impl<'a> Violation<'a> {
-    /// Offset, in the image's text, of the attribute or element it is about.
+    /// Returns the offset, in the image's text, of the attribute or element concerned.
     pub fn offset(&self) -> u32 {
         self.attribute
             .as_ref()
@@ -114,42 +115,42 @@ impl<'a> Violation<'a> {
 /// Violations of one kind that were counted but not listed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rest {
-    /// Their code.
+    /// Kind of violation.
     pub code: Code,
-    /// What they are about, e.g. `width/@a`.
+    /// Element or attribute concerned, e.g. `width/@a`.
     pub subject: String,
-    /// How many more there are.
+    /// Number of unlisted violations.
     pub count: u64,
-    /// Whether all of this kind are the schema's fault and not the file's.
+    /// Whether the schema is wrong in all violations of this kind, and not the file.
     pub known_schema_defect: bool,
 }
 
 /// The result of validating one document.
 #[derive(Clone, Debug, Default)]
 pub struct Report<'a> {
-    /// The violations in the order of their discovery: an element's own first, then those of its
-    /// children, what it lacks and which references dangle when it ends.
+    /// The violations in the order of discovery. An element's own violations come first, then those
+    /// of its children. Missing children and dangling references follow at its end.
     pub violations: Vec<Violation<'a>>,
-    /// How many more there were, by kind.
+    /// Number of unlisted violations, by kind.
     pub rest: Vec<Rest>,
 }
 
 impl Report<'_> {
-    /// The subject of what is counted together because there are too many kinds of it.
+    /// Subject of violations that are counted together because there are too many kinds.
     pub(crate) const VARIOUS: &'static str = "various";
 
-    /// Whether the document is valid.
+    /// Checks whether the document is valid.
     pub fn is_valid(&self) -> bool {
         self.violations.is_empty() && self.rest.is_empty()
     }
 
-    /// How many violations there are, listed or not.
+    /// Returns the number of violations, listed or not.
     pub fn total(&self) -> u64 {
         self.violations.len() as u64 + self.rest.iter().map(|rest| rest.count).sum::<u64>()
     }
 }
 
-/// How much is listed.
+/// Limits on the number of listed violations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Violations listed per kind (code, element and attribute or child).

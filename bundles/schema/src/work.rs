@@ -1,12 +1,12 @@
-//! Counts what validation does, so that a test can prove it linear without a clock. Outside of this
-//! crate's own tests it is nothing.
+//! Counts the steps of validation, so that a test can prove linear cost without a clock. It does
+//! nothing outside of this crate's own tests.
 
 #[cfg(test)]
 thread_local! {
     static STEPS: std::cell::Cell<u64> = const { std::cell::Cell::new(0) };
 }
 
-/// So many things were looked at.
+/// Adds a number of steps.
 #[inline(always)]
 pub(crate) fn steps(count: usize) {
     #[cfg(test)]
@@ -15,7 +15,7 @@ pub(crate) fn steps(count: usize) {
     let _ = count;
 }
 
-/// The steps of a piece of work on this thread.
+/// Returns the number of steps of some work on this thread.
 #[cfg(test)]
 pub(crate) fn counted(work: impl FnOnce()) -> u64 {
     let before = STEPS.with(std::cell::Cell::get);

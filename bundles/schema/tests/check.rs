@@ -1,4 +1,4 @@
-//! Which schema a file is checked against, and what is allowed beside it.
+//! Tests of the choice of the schema for a file, and of the deviations that are allowed.
 
 mod support;
 
@@ -17,7 +17,7 @@ fn map(header: &str, namespace: &str) -> String {
     )
 }
 
-/// What the check says about a text: the schema used, or why none was.
+/// Returns the result of the check of a text: the schema that was used, or the reason why none was.
 fn said(
     name: &str,
     kind: FileKind,
@@ -253,7 +253,7 @@ fn messages_say_where_a_late_child_belongs_and_what_a_short_attribute_meant() {
     clippy::panic,
     reason = "a test fails where its data is not as expected"
 )]
-/// The violations of a map: how much they weigh, where, and their texts.
+/// Returns the violations of a map: their severities, rows and texts.
 fn weighed(version: &str, text: &str) -> Vec<(Severity, u32, String)> {
     let header = format!("<OpenDRIVE><header revMajor=\"1\" revMinor=\"{version}\"/>");
     let bytes = image("t.xodr", &(header + text + "</OpenDRIVE>"));
@@ -298,7 +298,7 @@ fn words_for_the_numbers_of_the_first_schema_weigh_less_and_slips_do_not() {
             .all(|(severity, ..)| *severity == Severity::Information),
         "{said:?}"
     );
-    // Of each kind one stands for all.
+    // One violation of each kind is listed for all.
     assert_eq!(said.len(), 3, "{said:?}");
     let said = weighed("1", &map("driving", "sidewlak"));
     let errors = said
@@ -351,7 +351,7 @@ fn what_came_later_is_no_slip_of_the_pen() {
     let texts = checked.violations.iter().map(|one| &one.text);
     let texts: Vec<_> = texts.filter(|text| text.contains("outline")).collect();
     assert!(texts.is_empty(), "{texts:?}");
-    // What no version knows may be one.
+    // A name that no version contains may be a spelling mistake.
     let slip = text.replace("outlines>", "outlin>");
     let bytes = image("t.xodr", &slip);
     let Outcome::Checked(checked) = check(&open(&bytes), FileKind::Xodr, &Options::default())
@@ -386,7 +386,7 @@ fn lights_of_openscenario_1_2_are_alternatives() {
     let excused = excused.filter(|one| one.known_schema_defect.is_some());
     assert_eq!(excused.count(), 2, "{:?}", report.violations);
     assert_eq!(report.violations.len(), 2, "{:?}", report.violations);
-    // Neither of them is a fault of the file.
+    // These violations are not faults of the file.
     let bytes = image("t.xosc", &scenario(""));
     let report = schema.validate(&open(&bytes), qcbus_schema::Limits::default());
     let faults = report.violations.iter();
@@ -399,7 +399,7 @@ fn words_that_a_later_version_has_are_of_that_version() {
     let junction = |kind: &str| {
         format!("<junction name=\"\" id=\"1\" type=\"{kind}\"><connection id=\"0\"/></junction>")
     };
-    // In 1.8 the type of the element depends on the word.
+    // In 1.8 the type of the element depends on the value of the attribute.
     let told = |version: &str, kind: &str| {
         let said = weighed(version, &junction(kind));
         let texts = said.into_iter().map(|(_, _, text)| text);

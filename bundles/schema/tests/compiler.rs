@@ -1,4 +1,5 @@
-//! The compiler over small schemas: what it understands, and what it refuses by name and line.
+//! Tests of the compiler with small schemas: constructs that it accepts, and constructs that it
+//! rejects with name and line.
 
 mod support;
 
@@ -135,7 +136,7 @@ fn children_that_do_not_fit_are_told_apart() {
             "<c/><c/><c/><c/><c/>",
             Some("<c> occurs 5 times in <a>, but may occur at most 3 times"),
         ),
-        // However often it may occur, it may not come here.
+        // Its number is unlimited, but it must not occur here.
         (
             "<b/><c/><b/>",
             Some("<b> in <a> comes too late: it must come before <c>"),
@@ -162,7 +163,7 @@ fn children_that_do_not_fit_are_told_apart() {
         let texts: Vec<&str> = found.iter().map(|one| one.1.as_str()).collect();
         assert_eq!(texts, said.into_iter().collect::<Vec<_>>(), "{children}");
     }
-    // What was expected before a sibling counts as if it had been there.
+    // A missing element before a sibling counts as present.
     let found = violations(&schema, "t.xml", "<a><d/><b/></a>");
     assert_eq!(
         found[1].1,
@@ -303,7 +304,7 @@ fn known_defects_of_published_schemas_say_so() {
     );
 }
 
-/// Bounded random XSDs: an answer, never a panic.
+/// Compiles bounded random XSDs. Each gets an answer, and none may panic.
 #[test]
 fn arbitrary_schemas_are_judged() {
     use qcbus_schema::generate::Dice;

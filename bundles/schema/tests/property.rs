@@ -1,4 +1,4 @@
-//! Documents made from the tables are valid, and one violating edit is always found.
+//! Checks that documents made from the tables are valid, and that a violating edit is always found.
 
 mod support;
 
@@ -29,7 +29,7 @@ proptest! {
     }
 }
 
-/// Breaks the document in one place: an edit that no schema of ours allows.
+/// Breaks the document in one place with an edit that no shipped schema allows.
 fn violate(document: &Document<'_>, text: &str, dice: &mut Dice) -> (String, String) {
     let nodes: Vec<Node<'_>> = (0..document.len())
         .filter_map(|index| document.node(index))
@@ -82,12 +82,12 @@ fn violate(document: &Document<'_>, text: &str, dice: &mut Dice) -> (String, Str
     }
 }
 
-/// Whether the schema looks into an element: `any` lets everything pass below `userData`.
+/// Returns whether the schema checks an element. `any` allows everything below `userData`.
 fn checked(node: &Node<'_>) -> bool {
     node.is_element() && !node.ancestors().any(|above| above.is("userData")) && !node.is("userData")
 }
 
-/// An empty element opened to hold something.
+/// Opens an empty element and inserts content.
 fn opened(text: &str, end: usize, node: Node<'_>, what: &str) -> String {
     format!(
         "{}>{what}</{}>{}",
@@ -97,7 +97,7 @@ fn opened(text: &str, end: usize, node: Node<'_>, what: &str) -> String {
     )
 }
 
-/// Fuzz bodies, run over seeds: whatever comes, there is an answer.
+/// Runs fuzz bodies over seeds. Every input gets an answer.
 #[test]
 fn arbitrary_documents_are_judged() {
     let mut dice = Dice::new(7);
@@ -117,7 +117,7 @@ fn arbitrary_documents_are_judged() {
     }
 }
 
-/// Elements and attributes of a schema in no order at all.
+/// Returns elements and attributes of a schema in random order.
 fn soup(schema: &Schema, dice: &mut Dice) -> String {
     let words: Vec<&str> = schema
         .to_notation()

@@ -1,4 +1,5 @@
-//! The shipped tables: sound, small, quickly read, and the same after a round trip.
+//! Tests of the shipped tables: they are valid, small, fast to read, and the same after a round
+//! trip.
 
 mod support;
 

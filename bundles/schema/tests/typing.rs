@@ -1,4 +1,4 @@
-//! Elements and attributes have the types that the schema of their version gives them.
+//! Tests that elements and attributes have the types of the schema of their version.
 
 #![expect(clippy::unwrap_used, reason = "in a test it is a finding")]
 

@@ -1,5 +1,5 @@
-//! Schemas that a user brings: which files make one schema, which files it is for, and what is said
-//! when they are of no use.
+//! Tests of user schemas: the files that make one schema, the files that it is for, and the errors
+//! for unusable ones.
 
 mod support;
 
@@ -12,7 +12,7 @@ use qcbus_schema::{
 };
 use support::{image, open};
 
-/// Makes schemas of files given by path below the directory and text.
+/// Makes schemas from files, given as path below the directory and text.
 fn made(files: &[(&str, &str)]) -> Result<Vec<Override>, String> {
     let images: Vec<Vec<u8>> = files
         .iter()

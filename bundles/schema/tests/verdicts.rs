@@ -1,6 +1,6 @@
-//! Verdicts of lxml and xmlschema over mutants of our own documents, recorded by
-//! `tests/schema/differential.py`: each line names a document, a splice, and whether the other
-//! validators find the result valid.
+//! Compares verdicts with those of lxml and xmlschema on mutants of documents of this project.
+//! `tests/schema/differential.py` recorded them: each line names a document, a splice, and whether
+//! the other validators accept the result.
 
 #![expect(
     clippy::expect_used,

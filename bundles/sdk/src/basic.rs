@@ -1,12 +1,12 @@
-//! What both standards demand of a file before anything else: four algorithms, used by the rules
-//! of each bundle under their own names.
+//! Basic requirements of both standards: four algorithms that the rules of each bundle use under
+//! their own names.
 
 use qcbus_document::{Document, FaultCode, Node};
 use qcbus_formats::xqar::Level;
 
 use crate::{Place, Sink, Version};
 
-/// Reports what ingest found wrong with the file itself.
+/// Reports the faults that ingest found in the file itself.
 pub fn report_faults(document: &Document<'_>, found: &mut Sink<'_>) {
     for fault in document.faults() {
         found
@@ -16,8 +16,9 @@ pub fn report_faults(document: &Document<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What makes the tree unreliable is an error. A wrong encoding declaration is a warning: readers
-/// that trust it see other characters. A right one that is not UTF-8 is worth knowing.
+/// Returns the level of a fault. A fault that makes the tree unreliable is an error. A wrong
+/// encoding declaration is a warning, because readers that trust it see other characters. A correct
+/// encoding other than UTF-8 is information.
 fn fault_level(code: FaultCode) -> Level {
     match code {
         _ if code.makes_partial() => Level::Error,
@@ -26,7 +27,7 @@ fn fault_level(code: FaultCode) -> Level {
     }
 }
 
-/// Demands that the root element has this name, whatever its namespace.
+/// Checks that the root element has this name, whatever its namespace.
 pub fn root_is(document: &Document<'_>, name: &str, found: &mut Sink<'_>) {
     match document.root() {
         Some(root) if root.is(name) => {}
@@ -46,7 +47,7 @@ pub fn root_is(document: &Document<'_>, name: &str, found: &mut Sink<'_>) {
     }
 }
 
-/// Demands that the root has a child of this name.
+/// Checks that the root has a child of this name.
 pub fn has_header(document: &Document<'_>, header: &str, found: &mut Sink<'_>) {
     if let Some(root) = document.root()
         && root.child(header).is_none()
@@ -61,7 +62,7 @@ pub fn has_header(document: &Document<'_>, header: &str, found: &mut Sink<'_>) {
     }
 }
 
-/// Demands that the header says `revMajor` and `revMinor`, each a whole number from 0 to 65535.
+/// Checks that the header has `revMajor` and `revMinor`, each a whole number from 0 to 65535.
 pub fn version_is_defined(document: &Document<'_>, header: &str, found: &mut Sink<'_>) {
     let Some(header) = document.root().and_then(|root| root.child(header)) else {
         return;
@@ -84,7 +85,7 @@ pub fn version_is_defined(document: &Document<'_>, header: &str, found: &mut Sin
     }
 }
 
-/// The version that the header of this name states; `None` when it states none.
+/// Returns the version in the header of this name, or `None` if it is missing.
 pub fn version_of(document: &Document<'_>, header: &str) -> Option<Version> {
     let header: Node<'_> = document.root()?.child(header)?;
     Some(Version::new(
@@ -93,7 +94,8 @@ pub fn version_of(document: &Document<'_>, header: &str) -> Option<Version> {
     ))
 }
 
-/// A revision number as XML Schema's `unsignedShort` spells it: `7`, `07`, `+7`, white space around.
+/// Parses a revision number as XML Schema's `unsignedShort`: `7`, `07`, `+7`, with white space
+/// around it.
 fn revision(text: &str) -> Option<u16> {
     let text = text.trim_matches([' ', '\t', '\r', '\n']);
     let digits = text.strip_prefix('+').unwrap_or(text);

@@ -1,4 +1,4 @@
-//! A bundle: rules under one name, and the checkers that follow from them.
+//! A bundle: rules under one name, and the checkers built from them.
 
 use std::any::TypeId;
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use crate::pages::{Page, Template};
 use crate::rule::Facts;
 use crate::{AnyRule, Backport, Version, VersionRange};
 
-/// A checker bundle: its names, what it takes, and its rules.
+/// A checker bundle: its names, its input files and its rules.
 pub struct Bundle {
     /// Name in results and configurations, such as `xodrBundle`.
     pub name: &'static str,
@@ -20,38 +20,38 @@ pub struct Bundle {
     pub alias: &'static str,
     /// Version of the bundle.
     pub version: &'static str,
-    /// What it checks, in a sentence.
+    /// Description of its checks in one sentence.
     pub description: &'static str,
-    /// The standard, as texts name it: `OpenDRIVE`.
+    /// Name of the standard in texts: `OpenDRIVE`.
     pub standard: &'static str,
-    /// Root files that it takes.
+    /// Kinds of root files that it checks.
     pub kinds: &'static [FileKind],
     /// Published versions of the standard, ascending.
     pub versions: &'static [Version],
-    /// What it looks at where the root is a modular scenario.
+    /// Form in which it reads a modular scenario.
     pub reads: Reads,
-    /// Reads the version that a document names; `None` when it names none.
+    /// Reads the version of a document; `None` if it is missing.
     pub version_of: fn(&Document<'_>) -> Option<Version>,
-    /// The rules in the order of the result. A rule comes after those it depends on.
+    /// The rules in the order of the result. A rule comes after its preconditions.
     pub rules: &'static [&'static dyn AnyRule],
-    /// What the short examples of the pages are put into.
+    /// Templates for the short examples of the pages.
     pub templates: &'static [Template],
 }
 
-/// Checkers by where the list of their rules lies, and how long it is.
+/// Checkers by address and length of their list of rules.
 type KnownCheckers = BTreeMap<(usize, usize), Arc<[Checker]>>;
 
-/// What a bundle looks at where the root is a modular scenario.
+/// Form in which a bundle reads a modular scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reads {
     /// The file as it is written.
     Written,
-    /// What it is expanded to, where that can be had: the root of the subject is the expanded scenario
-    /// then, and what is found in it is shown in the files that it was made of.
+    /// The expanded scenario, if it can be built. It is then the root of the subject. Findings in
+    /// it are shown in its source files.
     Expanded,
 }
 
-/// One checker as results list it. A rule with a separate backport makes two.
+/// One checker of a result. A rule with a separate backport has two.
 #[derive(Clone)]
 pub struct Checker {
     /// Identifier.
@@ -62,24 +62,25 @@ pub struct Checker {
     pub facts: Facts,
     /// Whether this is the `…_backport` of the rule.
     pub is_backport: bool,
-    /// Versions that the rule applies to; the error says why they cannot be read.
+    /// Versions that the rule applies to, or the reason why they cannot be parsed.
     pub range: Result<VersionRange, String>,
-    /// What it checks, in a sentence.
+    /// Description of its check in one sentence.
     pub description: String,
 }
 
 impl Bundle {
-    /// The checkers in the order of the result.
+    /// Returns the checkers in the order of the result.
     pub fn checkers(&self) -> Vec<Checker> {
         self.known_checkers().to_vec()
     }
 
-    /// They are made out of the pages of all rules, and asked for several times in every start of a bundle: made
-    /// once for each list of rules, which stays where it is as long as the process.
+    /// Returns the checkers, built once for each list of rules. They are built from the pages of
+    /// all rules, and each start of a bundle needs them several times. The key is the address of
+    /// the list, which never changes within a process.
     fn known_checkers(&self) -> Arc<[Checker]> {
         static KNOWN: Mutex<KnownCheckers> = Mutex::new(BTreeMap::new());
         let rules = (self.rules.as_ptr().addr(), self.rules.len());
-        // What a panic left there is whole: it is put in when it is made.
+        // The map is valid after a panic, because only complete entries are inserted.
         let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(checkers) = known.get(&rules) {
             return checkers.clone();
@@ -90,7 +91,7 @@ impl Bundle {
         checkers
     }
 
-    /// What the bundle tells the broker.
+    /// Returns the catalogue that the bundle sends to the broker.
     pub fn catalogue(&self) -> Catalogue {
         Catalogue {
             alias: self.alias.to_owned(),
@@ -105,7 +106,7 @@ impl Bundle {
         }
     }
 
-    /// The rules that go by this checker id, UID, or the last part of either.
+    /// Returns the rules with this checker id, UID, or last part of either.
     pub fn find(&self, name: &str) -> Vec<&'static dyn AnyRule> {
         let exact = |rule: &&&dyn AnyRule| {
             let facts = rule.facts();
@@ -148,7 +149,7 @@ impl Bundle {
 }
 
 impl Checker {
-    /// Severity of its issues when it leaves nothing else to say.
+    /// Returns the level of its issues, unless an issue sets another one.
     pub fn level(&self) -> Level {
         let lowered = self.is_backport && !matches!(self.facts.backport, Backport::Alike { .. });
         match (lowered, self.facts.level) {
@@ -159,7 +160,7 @@ impl Checker {
     }
 }
 
-/// Ends the id of a checker that looks at documents older than its rule.
+/// Suffix of the id of a checker for documents older than its rule.
 pub const BACKPORT_SUFFIX: &str = "_backport";
 
 fn checkers_of(rule: &'static dyn AnyRule) -> Vec<Checker> {
@@ -190,7 +191,8 @@ fn checkers_of(rule: &'static dyn AnyRule) -> Vec<Checker> {
     vec![plain, backport]
 }
 
-/// Checkers by model, in the order of each model's first rule: so every model is built once.
+/// Groups checkers by model, in the order of each model's first rule, so that every model is built
+/// once.
 pub(crate) fn groups(checkers: &[Checker]) -> Vec<Vec<usize>> {
     let mut groups: Vec<(TypeId, Vec<usize>)> = Vec::new();
     for (index, checker) in checkers.iter().enumerate() {

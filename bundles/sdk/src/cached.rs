@@ -1,5 +1,5 @@
-//! Models of linked documents that are kept from job to job: a hundred scenarios on one map read
-//! its roads once.
+//! Cache of models of linked documents between jobs. A hundred scenarios on one map read its roads
+//! once.
 
 use std::any::{Any, TypeId};
 use std::fmt;
@@ -7,54 +7,54 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use qcbus_document::Image;
 
-/// A model of a document that others refer to, such as the road network of a scenario's map.
-/// Rules get it by [`crate::Linked::cached`].
+/// A model of a document that others refer to, such as the road network of a scenario's map. Rules
+/// get it from [`crate::Linked::cached`].
 ///
-/// It outlives the check for which it was built, so it owns the image that it was made of. A model
-/// that borrows from a document is put beside its image in one value, as `self_cell` does.
+/// The model outlives the check that built it, so it owns its image. A model that borrows from a
+/// document needs a self-referential type, such as `self_cell` provides.
 ///
-/// Whatever a rule finds must not depend on whether a model was built for it or was there: it is
-/// the same for the same image, and may only remember what it has found out about that image.
+/// The findings of a rule must not depend on whether a model was built or cached. The model is the
+/// same for the same image. It may only store facts about that image.
 pub trait LinkedModel: Send + Sync + Sized + 'static {
-    /// Builds the model. Does no I/O; `None` when nothing can be made of the image.
+    /// Builds the model. Does no I/O; returns `None` if the image cannot be used.
     fn build(image: Image) -> Option<Self>;
 }
 
-/// Models that are kept between two jobs at most. Each holds its image, and with it a slot of the
-/// bus's large class, of which the jobs under way need their share.
+/// Maximum number of models cached between two jobs. Each holds its image and thus a slot of the
+/// bus's large class, which running jobs need, too.
 const MOST: usize = 2;
-/// Bytes of their images at most.
+/// Maximum size of their images in bytes.
 const MOST_BYTES: usize = 256 << 20;
-/// The model of an image of fewer bytes is made anew in less time than it takes to send a result.
+/// Minimum size in bytes of an image with a cached model. A smaller model is rebuilt faster than a
+/// result is sent.
 const WORTH_KEEPING: usize = 512 << 10;
 
-/// Tells images apart: no two that are given to the same [`CachedModels`] have the same one, whatever
-/// lies between them.
+/// Identifier of an image. Two different images in the same [`CachedModels`] never have the same
+/// one, at any time.
 pub(crate) type ImageId = (u64, u64);
 
-/// The models of one process, or of one check where there is no next.
+/// The models of one process, or of a single check.
 #[derive(Clone, Default)]
 pub(crate) struct CachedModels(Arc<Mutex<Vec<Arc<Cached>>>>);
 
-/// The models of one job: those that it has asked for, as long as it lasts, whatever other jobs do
-/// meanwhile.
+/// The models that one job has requested. They live as long as the job, independent of other jobs.
 #[derive(Clone, Default)]
 pub(crate) struct JobModels {
     cached: CachedModels,
     own: Arc<Mutex<Vec<Arc<Cached>>>>,
 }
 
-/// One model, for which those that ask for it at the same time have one place.
+/// One model. Concurrent requests share it.
 struct Cached {
     of: ImageId,
     kind: TypeId,
     bytes: usize,
-    /// Built by the first who asks; `None` inside when nothing can be made of the image.
+    /// Built by the first request; `None` inside if the image cannot be used.
     model: OnceLock<Option<Arc<dyn Any + Send + Sync>>>,
 }
 
 impl JobModels {
-    /// The model of an image, built if nobody has.
+    /// Returns the model of an image, and builds it if it is missing.
     pub(crate) fn get<M: LinkedModel>(&self, of: ImageId, image: &Image) -> Option<Arc<M>> {
         let place = {
             let mut own = lock(&self.own);
@@ -67,19 +67,20 @@ impl JobModels {
                 }
             }
         };
-        // Unlocked: a model may ask for another one, and may panic. Then the next who asks builds it.
+        // The lock is released: building a model may request another one, and may panic. After a
+        // panic the next request builds it.
         let build = || Some(Arc::new(M::build(image.clone())?) as Arc<dyn Any + Send + Sync>);
         place.model.get_or_init(build).clone()?.downcast().ok()
     }
 
-    /// The job is over: what is worth its memory until the next one is kept.
+    /// Ends the job. Only models that are worth their memory stay cached.
     pub(crate) fn keep(&self) {
         self.cached.tidy();
     }
 }
 
 impl CachedModels {
-    /// For one job.
+    /// Returns the models for one job.
     pub(crate) fn for_job(&self) -> JobModels {
         JobModels {
             cached: self.clone(),
@@ -87,7 +88,8 @@ impl CachedModels {
         }
     }
 
-    /// The place of a model, and puts it last: the first were not used for longest.
+    /// Returns the entry of a model and moves it to the end. The first entries are the least
+    /// recently used.
     fn place<M: LinkedModel>(&self, of: ImageId, image: &Image) -> Arc<Cached> {
         let mut models = lock(&self.0);
         let place = match find::<M>(&models, of) {
@@ -103,7 +105,7 @@ impl CachedModels {
         place
     }
 
-    /// What is not worth its memory until the next job goes.
+    /// Removes models that are not worth their memory until the next job.
     fn tidy(&self) {
         let mut models = lock(&self.0);
         models.retain(|cached| {
@@ -116,12 +118,12 @@ impl CachedModels {
         }
     }
 
-    /// Drops all models, and with them its hold on images. Jobs that are under way have theirs.
+    /// Drops all models, and with them their images. Running jobs keep theirs.
     pub(crate) fn clear(&self) {
         lock(&self.0).clear();
     }
 
-    /// How many there are.
+    /// Returns the number of cached models.
     #[cfg(test)]
     pub(crate) fn len(&self) -> usize {
         lock(&self.0).len()
@@ -139,7 +141,7 @@ fn lock(models: &Mutex<Vec<Arc<Cached>>>) -> MutexGuard<'_, Vec<Arc<Cached>>> {
 
 impl fmt::Debug for CachedModels {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("KeptModels").finish_non_exhaustive()
+        f.debug_struct("CachedModels").finish_non_exhaustive()
     }
 }
 
@@ -153,7 +155,7 @@ impl fmt::Debug for JobModels {
 pub(crate) mod tests {
     use super::*;
 
-    /// The first byte of an image, and which of several models of it this is.
+    /// The first byte of an image; also one of several model types of an image.
     #[derive(Debug, PartialEq)]
     pub(crate) struct First(u8);
 
@@ -175,7 +177,7 @@ pub(crate) mod tests {
 
     impl LinkedModel for Slow {
         fn build(_: Image) -> Option<Slow> {
-            // So that the others ask meanwhile.
+            // The loop gives the other threads time to request the model.
             for _ in 0..1000 {
                 std::thread::yield_now();
             }
@@ -191,7 +193,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// Memory that nobody writes to costs nothing.
+    /// Returns an image. Zeroed memory that is not written to costs nothing.
     pub(crate) fn image(first: u8, bytes: usize) -> Image {
         let mut all = vec![0; bytes];
         all.iter_mut().take(1).for_each(|byte| *byte = first);
@@ -207,7 +209,7 @@ pub(crate) mod tests {
         let models = CachedModels::default();
         let one = models.for_job().get::<First>((1, 1), &large(1)).unwrap();
         models.tidy();
-        // Another generation has another document of that number.
+        // In another generation the same number belongs to another document.
         let two = models.for_job().get::<First>((2, 1), &large(2)).unwrap();
         models.tidy();
         assert_eq!((&*one, &*two), (&First(1), &First(2)));
@@ -246,7 +248,7 @@ pub(crate) mod tests {
             let image = image(1, bytes);
             let job = models.for_job();
             let one = job.get::<First>((1, 1), &image).unwrap();
-            // Another job ends meanwhile.
+            // Another job ends while this one runs.
             models.for_job().keep();
             assert_eq!(models.len(), 0, "{bytes}");
             let again = job.get::<First>((1, 1), &image).unwrap();

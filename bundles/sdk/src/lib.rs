@@ -1,7 +1,7 @@
-//! What a checker bundle is made of, and how one runs.
+//! Parts of a checker bundle, and ways to run it.
 //!
-//! A bundle is a list of [`Rule`]s. A rule is data and one function that looks at a [`Model`] of a
-//! document and tells a [`Sink`] what it found. The same bundle runs on the bus, on a single file,
+//! A bundle is a list of [`Rule`]s. A rule is data and one function that examines a [`Model`] of a
+//! document and reports findings to a [`Sink`]. The same bundle runs on the bus, on a single file,
 //! and as a module of ASAM's framework; see [`run`]. `docs/writing-a-rule.md` shows the way from
 //! nothing to a tested rule.
 

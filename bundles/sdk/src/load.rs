@@ -1,4 +1,4 @@
-//! From files to a subject, without a broker: for one-shot runs and for the examples of pages.
+//! Loads a subject from files without a broker, for single runs and for the examples of pages.
 
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use crate::cached::JobModels;
 use crate::subject::LinkedImage;
 use crate::{Bundle, Subject};
 
-/// A root document and what it refers to, as images in memory.
+/// A root document and the documents it refers to, as images in memory.
 pub struct Loaded {
     kind: FileKind,
     path: PathBuf,
@@ -25,21 +25,21 @@ pub struct Loaded {
     missing: Vec<MissingDocument>,
 }
 
-/// Why a file could not be loaded; reads well after "failed to ".
+/// Reasons why a file cannot be loaded; the text follows "failed to ".
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
-    /// Its name promises nothing that can be checked.
+    /// The name does not belong to any kind of file that can be checked.
     #[error("check {}: its name ends in none of {}", to_text(.0), Suffix::list())]
     UnknownKind(PathBuf),
-    /// No byte of it could be had.
+    /// The file cannot be read at all.
     #[error("{error}")]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         error: String,
     },
-    /// An image was built that cannot be opened, which is our fault.
+    /// A built image cannot be opened. This is an internal error.
     #[error("open the image of a document: {0}")]
     Image(#[from] ImageError),
 }
@@ -48,14 +48,14 @@ impl Loaded {
     /// Reads a file and everything that it refers to. Includes and archives stay inside `boundary`.
     ///
     /// # Errors
-    /// [`LoadError`] when nothing can be checked. An ill-formed file is no error: its faults are
+    /// [`LoadError`] if nothing can be checked. An ill-formed file is not an error: its faults are
     /// in the image.
     pub fn from_path(path: &Path, boundary: &Path) -> Result<Loaded, LoadError> {
         Loaded::searching(path, boundary, &SearchPath::of_environment())
     }
 
-    /// The same as [`Loaded::from_path`], with another search path for scenarios than that of the
-    /// environment.
+    /// Reads a file as [`Loaded::from_path`] does, with a given search path for scenarios instead
+    /// of that of the environment.
     ///
     /// # Errors
     /// As [`Loaded::from_path`].
@@ -78,7 +78,7 @@ impl Loaded {
         Ok(loaded)
     }
 
-    /// A file whose content is at hand and that refers to nothing.
+    /// Creates a subject from the content of a file, without following references.
     ///
     /// # Errors
     /// [`LoadError::UnknownKind`].
@@ -88,12 +88,12 @@ impl Loaded {
         Ok(Loaded::of(kind, path, &prepared))
     }
 
-    /// The documents, ready to be checked by a bundle.
+    /// Opens the documents for a check by a bundle.
     ///
     /// # Errors
     /// [`LoadError::Image`].
     pub fn subject(&self, bundle: &Bundle) -> Result<Subject<'_>, LoadError> {
-        // There is no next job: what is kept is for the rules of this one.
+        // There is no next job, so the models serve the rules of this one only.
         let models = JobModels::default();
         let linked = self.linked.iter().map(|linked| linked.open(&models));
         let linked = linked.collect::<Result<_, ImageError>>()?;
@@ -102,8 +102,8 @@ impl Loaded {
         Ok(subject.with_links(self.links.clone()).read(bundle.reads))
     }
 
-    /// What qcbus itself has to say about the file: references that lead nowhere, and what is wrong
-    /// with the file when no bundle says so.
+    /// Returns the findings of qcbus itself: references without a target, and faults of the file
+    /// that no bundle reports.
     ///
     /// # Errors
     /// [`LoadError::Image`].
@@ -115,17 +115,17 @@ impl Loaded {
         ))
     }
 
-    /// What the file's name promises.
+    /// Returns the kind of file according to its name.
     pub fn kind(&self) -> FileKind {
         self.kind
     }
 
-    /// The file, as it was named.
+    /// Returns the path of the file as given.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Digest of the file's bytes on disk.
+    /// Returns the digest of the file's bytes on disk.
     pub fn digest(&self) -> Digest {
         self.digest
     }
@@ -172,10 +172,11 @@ impl Loaded {
     }
 }
 
-/// Most documents that may belong to a file: their images lie in this process, not on the bus.
+/// Maximum number of documents that may belong to a file. Their images are in this process, not on
+/// the bus.
 const MAX_DOCUMENTS: usize = 2048;
 
-/// Fetches documents from disk into memory.
+/// Source that reads documents from disk into memory.
 struct SourceStore<'b> {
     reader: Reader,
     boundary: &'b Path,
@@ -187,7 +188,7 @@ impl Source for SourceStore<'_> {
     type Halt = Infallible;
 
     fn fetch(&mut self, path: &Path) -> Result<Result<Vec<u8>, Absence>, Infallible> {
-        // Maps and catalogs may lie anywhere; what they include stays around them.
+        // Maps and catalogs may lie anywhere. Their includes must stay in their own directory.
         let boundary = path.parent().unwrap_or(self.boundary);
         let prepared = self.reader.prepare(path, boundary);
         Ok(prepared

@@ -1,9 +1,10 @@
-//! Parameters of rules: declared beside the rule, set in a configuration, shown in the result.
+//! Parameters of rules: they are declared beside the rule, set in a configuration and shown in the
+//! result.
 
 use qcbus_formats::config::{ParamType, ParamValue};
 use qcbus_formats::xqar;
 
-/// A parameter that a rule reads, with the value it has unless a configuration says otherwise.
+/// A parameter of a rule, with its default value.
 ///
 /// ```
 /// use qcbus_sdk::Param;
@@ -12,17 +13,17 @@ use qcbus_formats::xqar;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Param {
-    /// Name, as configurations write it.
+    /// Name in configurations.
     pub name: &'static str,
-    /// Value unless the configuration says otherwise.
+    /// Value if the configuration does not set another one.
     pub default: Default,
-    /// Unit of a number; empty when it has none.
+    /// Unit of a number; may be empty.
     pub unit: &'static str,
-    /// What it decides.
+    /// Effect of the parameter.
     pub description: &'static str,
 }
 
-/// The default of a [`Param`], which also fixes its type.
+/// Default of a [`Param`], which also determines its type.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Default {
     /// A finite double.
@@ -34,7 +35,7 @@ pub enum Default {
 }
 
 impl Param {
-    /// A parameter that is a finite number.
+    /// Creates a parameter with a finite number.
     pub const fn number(
         name: &'static str,
         default: f64,
@@ -49,7 +50,7 @@ impl Param {
         }
     }
 
-    /// A parameter that is `true` or `false`.
+    /// Creates a parameter that is `true` or `false`.
     pub const fn flag(name: &'static str, default: bool, description: &'static str) -> Param {
         Param {
             name,
@@ -59,7 +60,7 @@ impl Param {
         }
     }
 
-    /// A parameter that is a text.
+    /// Creates a parameter with a text.
     pub const fn text(
         name: &'static str,
         default: &'static str,
@@ -73,7 +74,7 @@ impl Param {
         }
     }
 
-    /// What its value can be.
+    /// Returns the type of its value.
     pub fn value_type(&self) -> ParamType {
         match self.default {
             Default::Number(_) => ParamType::Number,
@@ -82,7 +83,7 @@ impl Param {
         }
     }
 
-    /// The default as a configuration would write it.
+    /// Returns the default as written in a configuration.
     pub fn default_text(&self) -> String {
         self.default_value().to_string()
     }
@@ -104,7 +105,7 @@ impl Param {
         })
     }
 
-    /// Meaning and unit in one sentence.
+    /// Returns meaning and unit in one sentence.
     pub fn meaning(&self) -> String {
         match self.unit {
             "" => self.description.to_owned(),
@@ -113,7 +114,7 @@ impl Param {
     }
 }
 
-/// Every checker has it: how many of its findings are listed in a result.
+/// Parameter of every checker: maximum number of its findings listed in a result.
 pub const MAX_ISSUES: Param = Param::number(
     "qcbus.max_issues",
     1000.0,
@@ -121,7 +122,7 @@ pub const MAX_ISSUES: Param = Param::number(
     "how many findings of this checker are listed; the rest is counted",
 );
 
-/// A configured value that its parameter cannot have.
+/// A configured value that is invalid for its parameter.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("the parameter `{name}` is `{value}`, but must be {expected}")]
 pub struct ParamError {
@@ -130,17 +131,17 @@ pub struct ParamError {
     expected: &'static str,
 }
 
-/// The values that one checker works with.
+/// Parameter values of one checker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values {
     values: Vec<(Param, ParamValue)>,
 }
 
 impl Values {
-    /// Takes what `configured` says about each parameter, else its default.
+    /// Returns the value from `configured` for each parameter, else its default.
     ///
     /// # Errors
-    /// [`ParamError`] when a configured text does not fit the parameter's type.
+    /// [`ParamError`] if a configured text does not fit the parameter's type.
     pub fn resolve(
         params: &[Param],
         configured: impl Fn(&str) -> Option<String>,
@@ -157,8 +158,8 @@ impl Values {
         })
     }
 
-    /// The values as a result file lists them: what the rule declares, and the number of listed
-    /// findings when it was changed.
+    /// Returns the values for a result file: the declared parameters of the rule, and the number of
+    /// listed findings if it was changed.
     pub fn listed(&self) -> Vec<xqar::Param> {
         let says_something = |(param, value): &&(Param, ParamValue)| {
             param.name != MAX_ISSUES.name || *value != param.default_value()
@@ -172,7 +173,7 @@ impl Values {
             .collect()
     }
 
-    /// A number; the parameter's default when the rule did not declare it.
+    /// Returns a number. It is the parameter's default if the rule did not declare the parameter.
     pub fn number(&self, param: &Param) -> f64 {
         match (self.get(param), param.default) {
             (Some(ParamValue::Number(number)), _) | (_, Default::Number(number)) => number,
@@ -180,7 +181,7 @@ impl Values {
         }
     }
 
-    /// A flag; the parameter's default when the rule did not declare it.
+    /// Returns a flag. It is the parameter's default if the rule did not declare the parameter.
     pub fn flag(&self, param: &Param) -> bool {
         match (self.get(param), param.default) {
             (Some(ParamValue::Flag(flag)), _) | (_, Default::Flag(flag)) => flag,
@@ -188,14 +189,14 @@ impl Values {
         }
     }
 
-    /// A text; the parameter's default when the rule did not declare it.
+    /// Returns a text. It is the parameter's default if the rule did not declare the parameter.
     pub fn text(&self, param: &Param) -> String {
         self.get(param)
             .unwrap_or_else(|| param.default_value())
             .to_string()
     }
 
-    /// Puts a text in the place of what was configured.
+    /// Replaces the configured value with a text.
     pub(crate) fn set(&mut self, param: &Param, text: String) {
         let known = self
             .values

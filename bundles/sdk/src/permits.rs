@@ -1,19 +1,19 @@
-//! How many threads may check at the same time in this process.
+//! Limit on the number of threads that check at the same time in this process.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-/// The hands of a process: as many threads check at the same time, and no more. Every job has one;
-/// what no job has is lent to large jobs, and given back as soon as another job waits.
+/// Permits of a process: the number of threads that may check at the same time. Every job holds
+/// one. Large jobs borrow free permits and return them as soon as another job waits.
 #[derive(Debug)]
 pub struct Permits {
     count: usize,
     state: Mutex<State>,
     changed: Condvar,
-    /// Free hands that no job waits for, readable without the lock. May be outdated.
+    /// Number of free permits that no job waits for, readable without the lock. It may be outdated.
     to_spare: AtomicUsize,
-    /// Jobs that wait, likewise.
+    /// Number of waiting jobs without a free permit, readable without the lock. It may be outdated.
     wanted: AtomicUsize,
 }
 
@@ -23,22 +23,22 @@ struct State {
     wanted: usize,
 }
 
-/// One of the [`Permits`], until it is dropped.
+/// One of the [`Permits`]; dropping it returns it.
 #[derive(Debug)]
 pub struct Permit<'h>(&'h Permits);
 
 impl Permits {
-    /// More threads than this help nobody, and are a slip of the finger.
+    /// Maximum number of threads. A larger number is useless and probably a typing error.
     pub const MOST: usize = 1024;
 
-    /// That many hands, one of which is taken: that of the thread which checks.
+    /// Creates that many permits. The calling thread holds one of them.
     pub fn new(count: usize) -> Permits {
         let permits = Permits::idle(count);
         std::mem::forget(permits.take());
         permits
     }
 
-    /// That many hands, none of which is taken.
+    /// Creates that many permits, all of them free.
     pub(crate) fn idle(count: usize) -> Permits {
         let count = count.clamp(1, Permits::MOST);
         let permits = Permits {
@@ -55,18 +55,18 @@ impl Permits {
         permits
     }
 
-    /// As many as this process may use processors: the affinity of its threads and the quota of its
-    /// control groups are respected. To be asked before the process is confined.
+    /// Returns the number of processors that this process may use. CPU affinity and cgroup quota
+    /// are respected. It must be called before the process enters the sandbox.
     pub fn available() -> usize {
         std::thread::available_parallelism().map_or(1, usize::from)
     }
 
-    /// How many there are.
+    /// Returns the number of permits.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Takes a hand for a job, and waits for it.
+    /// Takes a permit for a job, and waits until one is free.
     pub(crate) fn take(&self) -> Permit<'_> {
         let mut state = self.lock();
         state.wanted += 1;
@@ -83,7 +83,7 @@ impl Permits {
         Permit(self)
     }
 
-    /// A hand that is free and that no job waits for.
+    /// Returns a permit that is free and that no job waits for.
     pub(crate) fn spare(&self) -> Option<Permit<'_>> {
         if self.to_spare.load(Ordering::Relaxed) == 0 {
             return None;
@@ -97,16 +97,16 @@ impl Permits {
         Some(Permit(self))
     }
 
-    /// Waits for other threads, and lends the own hand meanwhile.
+    /// Waits for other threads, and lends the permit of this thread meanwhile.
     pub(crate) fn wait_for<T>(&self, others: impl FnOnce() -> T) -> T {
         drop(Permit(self));
-        // Whatever becomes of them, this thread goes on with a hand.
+        // This thread takes a permit again even if the other threads panic.
         let done = catch_unwind(AssertUnwindSafe(others));
         std::mem::forget(self.take());
         done.unwrap_or_else(|panic| resume_unwind(panic))
     }
 
-    /// Whether a job waits for a hand.
+    /// Checks whether a job waits for a permit.
     pub(crate) fn are_wanted(&self) -> bool {
         self.wanted.load(Ordering::Relaxed) > 0
     }

@@ -1,4 +1,4 @@
-//! From an element, an attribute or an offset to the locations that a result file lists.
+//! Converts an element, an attribute or an offset to the locations of a result file.
 
 use qcbus_document::{Attribute, Document, FaultCode, Node, Position};
 use qcbus_formats::location::OtherPlace;
@@ -10,14 +10,14 @@ mod expanded;
 
 pub(crate) use expanded::{copied_by, put_there};
 
-/// Something that an issue can point at.
+/// Target of an issue.
 #[derive(Clone, Copy)]
 pub enum Place<'p> {
-    /// An element: its `<`.
+    /// An element, located at its `<`.
     Node(Node<'p>),
-    /// An attribute: the first character of its name.
+    /// An attribute, located at the first character of its name.
     Attribute(Attribute<'p>),
-    /// A byte of a document's text, where there may be no element.
+    /// A byte offset in a document's text, for a place without an element.
     Text(Document<'p>, u32),
 }
 
@@ -40,7 +40,7 @@ impl<'p> From<(Document<'p>, u32)> for Place<'p> {
 }
 
 impl<'p> Place<'p> {
-    /// The attribute of `node` when it is there, else the element that lacks it.
+    /// Returns the attribute of `node` if it exists, else the element that lacks it.
     pub fn attribute_or_node(node: Node<'p>, attribute: &str) -> Place<'p> {
         node.attribute(attribute)
             .map_or(Place::Node(node), Place::Attribute)
@@ -82,7 +82,7 @@ impl<'p> Place<'p> {
         }
     }
 
-    /// What is to be seen at the place, when the rule says nothing else.
+    /// Returns the description of the place for a rule that gives none.
     fn label(&self) -> String {
         match self {
             Place::Node(node) => format!("element `{}`", node.name()),
@@ -94,21 +94,22 @@ impl<'p> Place<'p> {
     }
 }
 
-/// A place with everything that a result says about it.
+/// A place with all its data for a result.
 pub(crate) struct Spot {
     pub locations: Locations,
-    /// Document order: the root's text first, then other documents in the order of references.
+    /// Document order: the root's text comes first, then other documents in the order of
+    /// references.
     pub order: (usize, u32),
 }
 
-/// Works out rows, columns and XPaths. A place in another file is shown at the element of the
-/// root file that leads there.
+/// Computes rows, columns and XPaths. A place in another file is shown at the element of the root
+/// file that refers to it.
 pub(crate) fn locate(subject: &Subject<'_>, place: &Place<'_>, description: Option<&str>) -> Spot {
     locate_from(subject, place, description, None)
 }
 
-/// The same as [`locate`] for a place that goes with one in the root file: of several references to
-/// another file the one around that place, if there is one, is what leads there.
+/// Locates a place as [`locate`] does, for a place that belongs to another one in the root file. If
+/// several references lead to the other file, the one around that place is preferred.
 pub(crate) fn locate_from(
     subject: &Subject<'_>,
     place: &Place<'_>,
@@ -172,7 +173,7 @@ fn shown_at(subject: &Subject<'_>, node: Option<Node<'_>>) -> Vec<Location> {
     }
 }
 
-/// The XPath in the file that a place is written in.
+/// Returns the XPath in the file that contains the place.
 fn xpath_there(subject: &Subject<'_>, place: &Place<'_>) -> Option<String> {
     match subject.is_expanded() {
         true => expanded::xpath(subject, place),
@@ -185,7 +186,7 @@ fn places_of(
     position: &Position<'_>,
     xpath: Option<String>,
 ) -> Vec<Location> {
-    // Results count bytes on disk; those of a transcoded file are others than the image's.
+    // Results count bytes on disk. In a transcoded file these differ from those of the image.
     let transcoded = subject
         .written()
         .faults()
@@ -211,7 +212,7 @@ fn linked_index(subject: &Subject<'_>, document: &Document<'_>) -> Option<usize>
         .position(|linked| linked.document.path() == path)
 }
 
-/// The reference of the root file in which an offset lies, if it leads to a document of the set.
+/// Returns the reference of the root file around an offset, if it leads to the given document.
 fn reference_around(subject: &Subject<'_>, offset: u32, document: usize) -> Option<u32> {
     let before = subject.links().iter().filter(|link| link.at <= offset);
     let nearest = before.max_by_key(|link| link.at)?;
@@ -220,7 +221,8 @@ fn reference_around(subject: &Subject<'_>, offset: u32, document: usize) -> Opti
     (is_around && leads_to(subject, nearest.to as usize, document)).then_some(nearest.at)
 }
 
-/// Whether a document leads to another one, the root counted as the first.
+/// Checks whether references lead from one document to another. The root counts as the first
+/// document.
 fn leads_to(subject: &Subject<'_>, from: usize, to: usize) -> bool {
     let mut seen = vec![from];
     let mut next = 0;
@@ -244,13 +246,14 @@ fn leads_to(subject: &Subject<'_>, from: usize, to: usize) -> bool {
 
 fn reference_at<'d>(subject: &Subject<'d>, offset: u32) -> Option<Node<'d>> {
     let root = subject.written().root()?;
-    // Only for issues in other files, whose number is capped: a walk is cheap enough.
+    // This runs only for issues in other files. Their number is limited, so a full walk is fast
+    // enough.
     root.descendants()
         .find(|node| node.offset() == offset)
         .or(Some(root))
 }
 
-/// The innermost element around an included one that the root file itself contains.
+/// Returns the innermost ancestor of an included element that the root file itself contains.
 fn including_element(node: Option<Node<'_>>) -> Option<Node<'_>> {
     node?
         .ancestors()

@@ -1,4 +1,4 @@
-//! Which checkers run, and with which parameters.
+//! Selection of checkers and their parameters.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,39 +11,39 @@ use crate::resource::Resource;
 use crate::seen::Seen;
 use crate::{Bundle, Checker, ResourceValue, UserFiles, Values};
 
-/// A bundle's checkers, prepared for checking: which are demanded, and with which values.
+/// A bundle's checkers, prepared for checking: the demanded ones and their values.
 pub struct Plan {
     pub(crate) bundle: &'static Bundle,
     pub(crate) checkers: Vec<Checker>,
-    /// By model; the order of checking.
+    /// Checkers by model, in the order of checking.
     pub(crate) groups: Vec<Vec<usize>>,
-    /// Groups that may be checked side by side, because none of them rests on another of these.
+    /// Groups that may be checked in parallel, because they do not depend on each other.
     pub(crate) batches: Vec<Vec<usize>>,
-    /// In the order of `checkers`.
+    /// Entries in the order of `checkers`.
     pub(crate) entries: Vec<Entry>,
-    /// What was made of the user's files.
+    /// Values built from the user's files.
     pub(crate) resources: Vec<ResourceValue>,
-    /// What the files looked like that parameters name.
+    /// Recorded state of the files that parameters name.
     seen: Vec<Seen>,
-    /// The configuration that it follows.
+    /// The configuration of the plan.
     pub(crate) config: Option<Arc<Config>>,
 }
 
-/// How one checker takes part.
+/// Role of one checker in a plan.
 pub(crate) struct Entry {
-    /// Its result is asked for.
+    /// Whether its result is demanded.
     pub demanded: bool,
-    /// It runs: demanded, or a precondition of one that runs.
+    /// Whether it runs: it is demanded, or a precondition of one that runs.
     pub runs: bool,
-    /// Its parameters, or why they cannot be used.
+    /// Its parameters, or the reason why they cannot be used.
     pub values: Result<Values, String>,
-    /// Indices of its preconditions; the error names one that does not exist.
+    /// Indices of its preconditions, or an error with one that does not exist.
     pub after: Result<Vec<usize>, String>,
 }
 
 impl Plan {
-    /// Demands the checkers that `demanded` names, with the parameters that `configured` gives:
-    /// both are asked with the checker's id, the latter also with the parameter's name.
+    /// Creates a plan with the checkers that `demanded` selects and the parameters that
+    /// `configured` returns. Both closures get the checker, the latter also the parameter's name.
     pub fn new(
         bundle: &'static Bundle,
         demanded: impl Fn(&Checker) -> bool,
@@ -72,21 +72,21 @@ impl Plan {
         }
     }
 
-    /// Says which configuration it follows, for rules that hand it on ([`crate::Subject::config`]).
+    /// Sets the configuration of the plan, for rules that pass it on ([`crate::Subject::config`]).
     #[must_use]
     pub(crate) fn following(mut self, config: &Config) -> Plan {
         self.config = Some(Arc::new(config.clone()));
         self
     }
 
-    /// Every checker that is on by default, with the default parameters.
+    /// Creates a plan with every checker that is on by default and the default parameters.
     pub fn by_default(bundle: &'static Bundle) -> Plan {
         Plan::new(bundle, |checker| checker.facts.default_on, |_, _| None)
     }
 
-    /// Reads the files that parameters name, for the checkers that run; what the user gave on the
-    /// command line comes before what a configuration says. A checker whose files are of no use ends
-    /// with an error. A resource is read once, as the first checker demands it.
+    /// Reads the files that parameters name, for the checkers that run. Files given on the command
+    /// line take precedence over those of a configuration. A checker with unusable files ends with
+    /// an error. Each resource is read only once, for the first checker that needs it.
     #[must_use]
     pub fn with_files(mut self, given: Option<&UserFiles>) -> Plan {
         let mut read: Vec<(&'static Resource, Result<(), String>)> = Vec::new();
@@ -118,22 +118,23 @@ impl Plan {
         self
     }
 
-    /// The bundle.
+    /// Returns the bundle.
     pub fn bundle(&self) -> &'static Bundle {
         self.bundle
     }
 
-    /// All checkers of the bundle in the order of the result, demanded or not.
+    /// Returns all checkers of the bundle in the order of the result, demanded or not.
     pub fn checkers(&self) -> &[Checker] {
         &self.checkers
     }
 
-    /// Whether a file that a parameter names has changed since it was read.
+    /// Checks whether a file that a parameter names has changed since it was read.
     pub(crate) fn is_outdated(&self) -> bool {
         self.seen.iter().any(Seen::is_outdated)
     }
 
-    /// Files and directories that parameters name, which were read and are looked at again.
+    /// Returns the files and directories named by parameters. They were read and are checked for
+    /// changes.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
         self.seen
             .iter()
@@ -141,7 +142,8 @@ impl Plan {
             .collect()
     }
 
-    /// How many checkers are demanded, and of how many; what is off by default is left out by nobody.
+    /// Returns the number of demanded checkers and of offered ones. A checker that is off by
+    /// default counts only if it is demanded.
     pub fn asked(&self) -> Asked {
         let all = self.checkers.iter().zip(&self.entries);
         let in_question = all.filter(|(checker, it)| checker.facts.default_on || it.demanded);
@@ -151,13 +153,13 @@ impl Plan {
         }
     }
 
-    /// Whether the result of the checker with this index is asked for.
+    /// Checks whether the result of the checker with this index is demanded.
     pub fn is_demanded(&self, index: usize) -> bool {
         self.entries.get(index).is_some_and(|entry| entry.demanded)
     }
 }
 
-/// What a checker gets: from the command line, else from where its parameter says.
+/// Returns the value of a resource: from the command line, else from the path in its parameter.
 fn value_of(
     resource: &'static Resource,
     given: Option<&UserFiles>,
@@ -171,14 +173,14 @@ fn value_of(
         return Ok(None);
     }
     let path = Path::new(directory);
-    // Looked at before it is read: what changes in between is noticed later.
+    // The state is recorded before reading, so that a change in between is noticed later.
     seen.push(Seen::new(resource, path));
     let read = resource.read(path).map(Some);
     read.map_err(|error| format!("failed to {error}"))
 }
 
-/// Groups that follow each other and of which none rests on another, in any direction: that a checker
-/// does not look because it comes too early must not depend on how many threads there are.
+/// Forms batches of consecutive groups that do not depend on each other in any direction. A checker
+/// that runs before its precondition is blocked. This must not depend on the number of threads.
 fn batches(groups: &[Vec<usize>], entries: &[Entry]) -> Vec<Vec<usize>> {
     let rests_on = |group: &[usize], other: &[usize]| {
         let after = group
@@ -208,7 +210,8 @@ fn preconditions(checkers: &[Checker], checker: &Checker) -> Result<Vec<usize>, 
     checker.facts.after.iter().map(index_of).collect()
 }
 
-/// What a demanded checker depends on runs too; its findings are reported when they are in the way.
+/// Marks the preconditions of demanded checkers to run, too. Their findings are reported if they
+/// block a demanded checker.
 fn mark_preconditions(entries: &mut [Entry]) {
     let mut open: Vec<usize> = (0..entries.len()).filter(|&i| entries[i].runs).collect();
     while let Some(index) = open.pop() {

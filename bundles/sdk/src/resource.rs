@@ -1,5 +1,5 @@
-//! Files that a user brings for a rule, such as schemas: the host reads them before anything is
-//! checked, so that rules do no I/O.
+//! Files of a user for a rule, such as schemas. The host reads them before any check, so that rules
+//! do no I/O.
 
 use std::any::Any;
 use std::path::{Path, PathBuf};
@@ -10,20 +10,20 @@ use qcbus_messages::{Catalogue, Digest};
 
 use crate::{Bundle, Param};
 
-/// What a rule takes besides the documents, from a directory that the user names.
+/// Additional input of a rule from a directory that the user names.
 #[derive(Debug)]
 pub struct Resource {
-    /// The parameter whose value is the directory; while it is empty, there is nothing to read.
-    /// A rule that declares the resource declares the parameter, too.
+    /// The parameter with the path of the directory. If it is empty, nothing is read. A rule that
+    /// declares the resource must declare the parameter, too.
     pub param: Param,
-    /// The endings of the files that are read, in lower case.
+    /// File name extensions of the files to read, in lower case.
     pub endings: &'static [&'static str],
-    /// Makes of the files what rules get by [`crate::Subject::resource`]. Does no I/O; an error
-    /// reads well after "failed to ".
+    /// Builds the value that rules get by [`crate::Subject::resource`] from the files. Does no I/O;
+    /// the text of an error follows "failed to ".
     pub make: fn(&[ResourceFile]) -> Result<ResourceValue, String>,
 }
 
-/// What was made of a user's files.
+/// Value built from a user's files.
 pub type ResourceValue = Arc<dyn Any + Send + Sync>;
 
 /// One file that was read.
@@ -34,92 +34,92 @@ pub struct ResourceFile {
     prepared: Prepared,
 }
 
-/// Why a user's files cannot be used; reads well after "failed to ".
+/// Reasons why a user's files cannot be used; the text follows "failed to ".
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ResourceError {
     /// A directory or file that cannot be read.
     #[error("read {path}: {why}")]
     Unreadable {
-        /// What was to be read.
+        /// Path of the directory or file.
         path: String,
-        /// What the system says.
+        /// Error message of the system.
         why: String,
     },
-    /// Nothing that could be used.
+    /// No usable file was found.
     #[error("find a file ending in {endings} in {path}")]
     Nothing {
-        /// Where was looked.
+        /// Path of the search.
         path: String,
-        /// What was looked for.
+        /// Extensions that were searched.
         endings: String,
     },
-    /// More than anybody brings on purpose.
+    /// More files or deeper directories than expected.
     #[error(
         "read {path}: it has more than {most} files, or directories nested deeper than {deepest}; is it the right one?"
     )]
     TooMuch {
         /// The directory.
         path: String,
-        /// Most files that are read.
+        /// Maximum number of files and directories.
         most: usize,
-        /// Deepest nesting.
+        /// Maximum nesting depth.
         deepest: usize,
     },
-    /// A bundle without such rules.
+    /// No rule of the bundle takes files.
     #[error("bring files to {0}: none of its rules takes any")]
     NotTaken(&'static str),
-    /// The files were read, but are of no use.
+    /// The files were read but cannot be used.
     #[error("{0}")]
     Unusable(String),
 }
 
-/// Files and directories below the one that was named.
+/// Maximum number of files and directories below the named one.
 const MOST: usize = 1_000;
 const DEEPEST: usize = 8;
 
 impl ResourceFile {
-    /// Where it is.
+    /// Returns its path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Where it is below the directory that the user named.
+    /// Returns its path relative to the directory that the user named.
     pub fn below(&self) -> PathBuf {
         self.path.components().skip(self.below).collect()
     }
 
-    /// Whether its name ends in this, whatever the case.
+    /// Checks whether its name has this extension, ignoring case.
     pub fn ends_in(&self, ending: &str) -> bool {
         has_ending(&self.path, &[ending])
     }
 
-    /// Its bytes.
+    /// Returns its bytes.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// SHA-256 of its bytes.
+    /// Returns the SHA-256 of its bytes.
     pub fn digest(&self) -> Digest {
         Digest(self.prepared.digest())
     }
 
-    /// Its image, if it is XML.
+    /// Returns its image, if it is XML.
     pub fn image(&self) -> Vec<u8> {
         self.prepared.build()
     }
 }
 
 impl Resource {
-    /// Reads a directory (or one file) and makes of it what rules get.
+    /// Reads a directory (or one file) and builds the value for rules.
     ///
     /// # Errors
-    /// [`ResourceError`] when a file cannot be read or used: nothing is passed over in silence.
+    /// [`ResourceError`] if a file cannot be read or used: no file is skipped silently.
     pub fn read(&self, path: &Path) -> Result<ResourceValue, ResourceError> {
         let files = self.files(path)?;
         (self.make)(&files).map_err(ResourceError::Unusable)
     }
 
-    /// The files that are read, in order; a path that is no directory counts as a file.
+    /// Returns the sorted list of files to read. A path that is not a directory counts as a file.
     pub(crate) fn listing(&self, path: &Path) -> Result<Vec<PathBuf>, ResourceError> {
         let mut found = Vec::new();
         if path.is_dir() {
@@ -155,7 +155,8 @@ impl Resource {
     }
 }
 
-/// What a user brings on the command line (`--schema-dir DIR`): read once, when the bundle starts.
+/// Files that a user names on the command line (`--schema-dir DIR`). They are read once, when the
+/// bundle starts.
 #[derive(Clone)]
 pub struct UserFiles {
     directory: PathBuf,
@@ -167,7 +168,7 @@ impl UserFiles {
     /// Reads a directory for every rule of the bundle that takes such files.
     ///
     /// # Errors
-    /// [`ResourceError`] when they are of no use, or no rule takes any.
+    /// [`ResourceError`] if the files cannot be used, or no rule takes any.
     pub fn read(bundle: &Bundle, directory: &Path) -> Result<UserFiles, ResourceError> {
         let directory = std::path::absolute(directory).unwrap_or_else(|_| directory.to_owned());
         let mut read = UserFiles {
@@ -195,13 +196,13 @@ impl UserFiles {
         found.map(|(_, value)| value.clone())
     }
 
-    /// The directory as results and plans name it.
+    /// Returns the directory as text for results and plans.
     pub(crate) fn directory(&self) -> String {
         self.directory.display().to_string()
     }
 
-    /// Says in the catalogue what the defaults are now. The digest makes a broker judge again what
-    /// was judged with other files.
+    /// Writes the directory and the digest of its files into the catalogue as new defaults. A
+    /// changed digest makes a broker check files again.
     pub(crate) fn tell(&self, catalogue: &mut Catalogue) {
         let names: Vec<&str> = self
             .values
@@ -218,7 +219,7 @@ impl UserFiles {
     }
 }
 
-/// What the rules of a bundle take, each once.
+/// Returns the resources of a bundle's rules, each once.
 pub(crate) fn resources(bundle: &Bundle) -> Vec<&'static Resource> {
     let mut all: Vec<&'static Resource> = Vec::new();
     for resource in bundle.rules.iter().filter_map(|rule| rule.facts().resource) {
@@ -286,7 +287,7 @@ fn read_file(path: PathBuf, below: usize) -> Result<ResourceFile, ResourceError>
     })
 }
 
-/// A digest that changes with the files: their names below the directory and their contents.
+/// Returns a digest of the files: their names below the directory and their contents.
 fn fingerprint(files: &[ResourceFile]) -> String {
     let lines = files
         .iter()

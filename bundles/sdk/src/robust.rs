@@ -1,10 +1,10 @@
-//! Breaks files in every way that authors and tools do, for tests: no file, however broken, may make a
-//! rule panic. `QCBUS_FUZZ_ROUNDS` sets the number of mutations of examples (3,000), `QCBUS_FUZZ_FILES`
-//! that of other files (200), `QCBUS_FUZZ_PLACES` at how many places those are cut (2),
-//! `QCBUS_FUZZ_SEED` another beginning.
+//! Damages files for tests in every way that authors and tools do. No damaged file may make a rule
+//! panic. `QCBUS_FUZZ_ROUNDS` sets the number of mutations of examples (3,000), `QCBUS_FUZZ_FILES`
+//! that of other files (200). `QCBUS_FUZZ_PLACES` sets at how many places those files are cut (2).
+//! `QCBUS_FUZZ_SEED` sets another seed.
 //!
-//! A file that is cut is no XML any more, and few rules look at it. So each is cut a second time, and
-//! what is open is closed.
+//! A file that is cut is no longer well-formed XML, and few rules check it. So each file is cut a
+//! second time, and all open elements are closed.
 
 #![expect(
     clippy::unwrap_used,
@@ -20,18 +20,18 @@ use qcbus_document::fuzzing::Random;
 use crate::pages::evidence;
 use crate::{Bundle, Issue, Listener, Loaded, Outcome, Plan, Status, check};
 
-/// A bundle that is to be broken.
+/// A bundle under test.
 #[derive(Clone, Copy)]
 pub struct Robust {
     /// The bundle.
     pub bundle: &'static Bundle,
-    /// How the files end that it looks at, without the dot.
+    /// Extension of the files that it checks, without the dot.
     pub extension: &'static str,
-    /// What values are replaced by: [`NUMBERS`] and whatever else is apt to hurt.
+    /// Values that replace others: [`NUMBERS`] and further values that are likely to cause faults.
     pub hostile: &'static [&'static str],
 }
 
-/// Notes checkers that did not come to their end: a caught panic is one.
+/// Collects checkers that did not complete, for example because of a caught panic.
 #[derive(Default)]
 struct Broken(Vec<(usize, String)>);
 
@@ -47,7 +47,7 @@ impl Robust {
     /// Cuts every example of the pages at ten places.
     ///
     /// # Panics
-    /// With the first checker that did not come to its end, and the file.
+    /// If a checker does not complete. The message names the first such checker and the file.
     pub fn assert_truncated_examples(&self) {
         let plan = Plan::by_default(self.bundle);
         for shown in evidence::documents(self.bundle) {
@@ -58,7 +58,7 @@ impl Robust {
     /// Mutates the examples of the pages.
     ///
     /// # Panics
-    /// With the first checker that did not come to its end, and the file.
+    /// If a checker does not complete. The message names the first such checker and the file.
     pub fn assert_mutated_examples(&self) {
         let plan = Plan::by_default(self.bundle);
         let documents = evidence::documents(self.bundle);
@@ -71,17 +71,17 @@ impl Robust {
         }
     }
 
-    /// Mutates the files of a set, such as a modular scenario with its libraries, of which the first is
-    /// checked. `twists` are texts to be put where another stands, for faults of a set that a file alone
-    /// has not.
+    /// Mutates the files of a set, such as a modular scenario with its libraries, and checks the
+    /// first file. `twists` are pairs of a text and its replacement. They produce faults that only
+    /// a set of files can have.
     ///
     /// # Panics
-    /// With the first checker that did not come to its end, and the files.
+    /// If a checker does not complete. The message names the first such checker and the files.
     pub fn assert_mutated_set(&self, files: &[(&str, &str)], twists: &[(&str, &str)]) {
         let plan = Plan::by_default(self.bundle);
         let folder = tempfile::tempdir().unwrap();
         let mut dice = dice();
-        // Ten times as dear as one file in memory.
+        // A round costs ten times as much as one with a single file in memory.
         for _ in 0..setting("QCBUS_FUZZ_ROUNDS", 3_000) / 10 {
             let mut mutated: Vec<Vec<u8>> = Vec::new();
             let victim = dice.below(files.len());
@@ -116,10 +116,11 @@ impl Robust {
         }
     }
 
-    /// Checks whole files, cut files and mutated files below a directory; none, when it is not there.
+    /// Checks whole files, cut files and mutated files below a directory. Checks none if the
+    /// directory does not exist.
     ///
     /// # Panics
-    /// With the first checker that did not come to its end, and the file.
+    /// If a checker does not complete. The message names the first such checker and the file.
     pub fn assert_files_below(&self, directory: &Path) {
         let mut files = Vec::new();
         gather(directory, self.extension, &mut files);
@@ -145,10 +146,10 @@ impl Robust {
         }
     }
 
-    /// Demands that every checker of the plan comes to its end on a file.
+    /// Asserts that every checker of the plan completes on a file.
     ///
     /// # Panics
-    /// With the first that does not, and the file.
+    /// If a checker does not complete. The message names the first such checker and the file.
     pub fn assert_unbroken(&self, plan: &Plan, bytes: &[u8], what: &str) {
         let name = format!("fuzz.{}", self.extension);
         let loaded = Loaded::from_bytes(Path::new(&name), bytes.to_vec()).unwrap();
@@ -181,7 +182,7 @@ impl Robust {
     }
 }
 
-/// Numbers at which arithmetic goes wrong, and things that are no numbers.
+/// Numbers that break arithmetic, and texts that are not numbers.
 pub const NUMBERS: &[&str] = &[
     "0",
     "-0",
@@ -201,7 +202,8 @@ pub const NUMBERS: &[&str] = &[
     "1e5",
 ];
 
-/// The elements of a file that was cut, without the last piece of a tag, and with all of them closed.
+/// Returns the elements of a cut file, without the incomplete last tag and with all elements
+/// closed.
 fn mended(cut: &[u8]) -> Vec<u8> {
     let mut open: Vec<&[u8]> = Vec::new();
     let (mut at, mut whole) = (0, 0);
@@ -233,7 +235,7 @@ fn find(text: &[u8], from: usize, what: &[u8]) -> Option<usize> {
     Some(from + place)
 }
 
-/// One random edit of the kinds that authoring tools and editors produce.
+/// Applies one random edit of the kinds that authoring tools and editors produce.
 fn mutate(text: &mut Vec<u8>, dice: &mut Random, hostile: &[&str]) {
     let values: Vec<(usize, usize)> = attribute_values(text);
     let at = dice.below(text.len());

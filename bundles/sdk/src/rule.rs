@@ -1,4 +1,4 @@
-//! A rule: data and one function.
+//! A rule: its data and its check function.
 
 use std::any::{Any, TypeId};
 
@@ -8,36 +8,37 @@ use qcbus_formats::xqar::Level;
 
 use crate::{Param, Resource, Sink, Subject};
 
-/// What a rule looks at: built once per document and shared by all rules about it.
+/// The model that a rule checks. It is built once per document and shared by all rules about it.
 ///
-/// The type that implements it is only a name; the value that rules get is [`Model::Of`].
+/// The type that implements the trait is only a name. Rules get a value of [`Model::Of`].
 pub trait Model: 'static {
-    /// The model of a document that lives for `'d`.
-    /// Threads share it: what it finds out when it is first asked is behind `OnceLock`s.
+    /// The model of a document that lives for `'d`. Threads share it, so it caches lazily computed
+    /// values in `OnceLock`s.
     type Of<'d>: Sync;
 
-    /// Names a part of the model at which several rules look in turn before they go on to the next
-    /// part: small enough to stay in the processor's caches meanwhile.
+    /// A part of the model. Several rules check one part in turn before they go on to the next. A
+    /// part is small enough to stay in the processor's caches meanwhile.
     type Part: Sync;
 
-    /// Builds the model. It should be lazy: most documents need little of it.
+    /// Builds the model. It should be lazy, because most documents need little of it.
     ///
     /// # Errors
-    /// [`Unbuilt`] when rules about this model cannot say anything about the document.
+    /// [`Unbuilt`] if rules about this model cannot check the document.
     fn build<'d>(subject: &'d Subject<'d>) -> Result<Self::Of<'d>, Unbuilt>;
 
-    /// The parts of a model, in document order.
+    /// Returns the parts of a model, in document order.
     fn parts(model: &Self::Of<'_>) -> Vec<Self::Part>;
 }
 
-/// Why there is no model, each with a sentence fragment: `the road network could not be loaded`.
+/// Reason why a model was not built, as a sentence fragment:
+/// `the road network could not be loaded`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Unbuilt {
-    /// Rules about it do not apply to such a document: that is an answer.
+    /// Rules about the model do not apply to such a document. This is a valid answer.
     NotApplicable(String),
-    /// The document is broken: its rules owe an answer, and the file is not accepted.
+    /// The document is broken. Its rules cannot give an answer, and the file is not accepted.
     Broken(String),
-    /// What the model is built with is of no use; the document may be all right.
+    /// An input of the model is unusable. The document itself may be valid.
     Failed(String),
 }
 
@@ -54,7 +55,7 @@ impl From<Unbuilt> for Ending {
     }
 }
 
-/// The document itself, for rules that need no more: `Rule<Document>`.
+/// The document itself, for rules that need no other model: `Rule<Document>`.
 impl Model for Document<'static> {
     type Of<'d> = Document<'d>;
     type Part = ();
@@ -68,7 +69,7 @@ impl Model for Document<'static> {
     }
 }
 
-/// A rule: what it is called, when it applies, and the function that looks.
+/// A rule: its name, the conditions under which it applies, and the check function.
 ///
 /// ```text
 /// pub static RULE: Rule<Document> = Rule {
@@ -81,72 +82,74 @@ impl Model for Document<'static> {
 /// };
 /// ```
 pub struct Rule<M: Model> {
-    /// Identifier of the checker, unique in the bundle; ends in the name of the rule's file.
+    /// Identifier of the checker, unique in the bundle. It ends in the name of the rule's file.
     pub id: &'static str,
-    /// The rules of the standard that it answers for. The first is printed on issues, unless a
-    /// finding says otherwise.
+    /// Rules of the standard that it covers. Issues have the first UID, unless a finding names
+    /// another.
     pub uids: &'static [&'static str],
-    /// Severity of its issues, unless a finding says otherwise. [`Level::Error`] by default.
+    /// Severity of its issues, unless a finding sets another. [`Level::Error`] by default.
     pub level: Level,
-    /// The versions of the standard that it applies to; see [`crate::VersionRange`].
+    /// Versions of the standard that it applies to; see [`crate::VersionRange`].
     pub versions: &'static str,
-    /// Whether older documents are looked at, too.
+    /// Whether older documents are checked, too.
     pub backport: Backport,
-    /// Checkers that must have run without finding an error; else this one cannot look, and the file is not
-    /// accepted.
+    /// Checkers that must have completed without an error. Otherwise this checker cannot run, and
+    /// the file is not accepted.
     pub after: &'static [&'static str],
     /// Parameters that it reads.
     pub params: &'static [Param],
-    /// Files of the user that it takes, read before it runs.
+    /// User files that the rule needs. They are read before it runs.
     pub resource: Option<&'static Resource>,
-    /// Whether it runs when no configuration asks for it. `true` by default.
+    /// Whether it runs if no configuration selects it. `true` by default.
     pub default_on: bool,
-    /// Its page: `include_str!` of the Markdown file beside it.
+    /// Documentation page: `include_str!` of the Markdown file beside the rule.
     pub page: &'static str,
-    /// Looks at a part of the document and says what it found, one part after the other: for
-    /// rules that need to know nothing of one part to judge the next.
+    /// Checks one part of the document after the other and reports findings. It is for rules that
+    /// can check each part on its own.
     pub each: Option<Each<M>>,
-    /// Looks at the document and says what it found, after `each` has seen all parts. Nothing by default.
+    /// Checks the document and reports findings, after `each` has checked all parts. Does nothing
+    /// by default.
     pub run: fn(&M::Of<'_>, &mut Sink<'_>),
 }
 
-/// Looks at a part of a model and says what it found there.
+/// Checks one part of a model and reports its findings.
 pub type Each<M> = fn(&<M as Model>::Of<'_>, &<M as Model>::Part, &mut Sink<'_>);
 
-/// What a rule does with documents of versions before its range.
+/// Treatment of documents of versions before the range of the rule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Backport {
-    /// It is skipped.
+    /// The rule is skipped.
     None,
-    /// It runs, its issues are one severity lower and say that the rule is not normative there.
+    /// The rule runs. Its issues are one severity lower and state that the rule is not normative
+    /// there.
     Lower {
-        /// First version that has the elements in question; empty for every version.
+        /// First version that has the relevant elements; empty for every version.
         since: &'static str,
     },
-    /// Like `Lower`, but as a checker of its own, `…_backport`, so that the gate of this one
-    /// stays comparable with other tools.
+    /// Like `Lower`, but as a separate checker, `…_backport`. So the gate of this checker stays
+    /// comparable with other tools.
     Separate {
-        /// First version that has the elements in question; empty for every version.
+        /// First version that has the relevant elements; empty for every version.
         since: &'static str,
     },
-    /// A checker of its own, `…_backport`, and as severe: what it finds broke older documents just
-    /// as well, only that nobody had written the rule down.
+    /// A separate checker, `…_backport`, with the same severity. Its findings broke older
+    /// documents, too, although the rule was not yet written down.
     Alike {
-        /// First version that has the elements in question; empty for every version.
+        /// First version that has the relevant elements; empty for every version.
         since: &'static str,
     },
 }
 
 impl Backport {
-    /// Whether older documents have a checker of their own.
+    /// Returns whether older documents have a separate checker.
     pub(crate) fn is_separate(self) -> bool {
         matches!(self, Backport::Separate { .. } | Backport::Alike { .. })
     }
 }
 
 impl<M: Model> Rule<M> {
-    /// What most rules have in common, for the `..` of a rule. A rule that forgets its id, UIDs,
-    /// page or function fails its page test.
+    /// Default values of a rule, for its `..`. The page test fails if a rule has no id, UIDs, page
+    /// or function.
     pub const DEFAULTS: Rule<M> = Rule {
         id: "",
         uids: &[],
@@ -165,14 +168,14 @@ impl<M: Model> Rule<M> {
 
 fn finds_nothing<M: Model>(_: &M::Of<'_>, _: &mut Sink<'_>) {}
 
-/// A model that was built, on which every rule of its kind can be run.
+/// A built model, on which every rule of its kind can run.
 #[doc(hidden)]
 pub trait Built<'d>: Sync {
-    /// How many parts the model has.
+    /// Returns the number of parts of the model.
     fn parts(&self) -> usize;
-    /// Has a rule look at one part.
+    /// Runs a rule on one part.
     fn each(&self, part: usize, rule: &dyn AnyRule, found: &mut Sink<'d>);
-    /// Has a rule look at the whole.
+    /// Runs a rule on the whole model.
     fn run(&self, rule: &dyn AnyRule, found: &mut Sink<'d>);
 }
 
@@ -200,27 +203,27 @@ impl<'d, M: Model> Built<'d> for Divided<'_, 'd, M> {
     }
 }
 
-/// A rule of whatever model, as a bundle lists them.
+/// A rule of any model, as a bundle lists it.
 pub trait AnyRule: Sync {
-    /// Everything about the rule but its function.
+    /// Returns everything about the rule except its function.
     fn facts(&self) -> Facts;
-    /// Tells apart the models that rules look at.
+    /// Returns the type id of the rule's model.
     fn model(&self) -> TypeId;
-    /// Whether it looks at one part of the model after the other.
+    /// Returns whether the rule checks one part of the model after the other.
     fn goes_by_parts(&self) -> bool;
-    /// Builds this rule's model and hands it on, for every rule of the same model.
+    /// Builds this rule's model and passes it on, for every rule of the same model.
     #[doc(hidden)]
     fn with_model<'d>(
         &self,
         subject: &'d Subject<'d>,
         permit: &mut dyn FnMut(&dyn Built<'d>),
     ) -> Result<(), Unbuilt>;
-    /// The rule, to find out its type.
+    /// Returns the rule as `Any`, so that its type can be determined.
     #[doc(hidden)]
     fn as_any(&self) -> &dyn Any;
 }
 
-/// Everything about a rule but its function and its model; see [`Rule`] for the fields.
+/// Everything about a rule except its function and its model; see [`Rule`] for the fields.
 #[expect(missing_docs, reason = "the fields are those of `Rule`")]
 #[derive(Debug, Clone, Copy)]
 pub struct Facts {

@@ -1,4 +1,4 @@
-//! Whether a user's files are still those that were read, told without reading them again.
+//! Detects whether a user's files have changed since they were read, without reading them again.
 
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
@@ -6,24 +6,24 @@ use std::time::{Duration, SystemTime};
 
 use crate::{Resource, ResourceError};
 
-/// What a directory (or one file) looked like just before it was read.
+/// State of a directory (or one file) just before it was read.
 pub(crate) struct Seen {
     resource: &'static Resource,
     path: PathBuf,
     files: Result<Vec<FileState>, ResourceError>,
-    /// Something had changed so shortly before that it may change again without a trace.
+    /// Set if a file changed so shortly before that a further change may not be visible.
     racy: bool,
 }
 
-/// Changes whenever a file is written, replaced or given back an old date.
+/// State of a file. It changes if the file is written, replaced or given an old date.
 #[derive(Debug, PartialEq, Eq)]
 struct FileState {
     path: PathBuf,
-    /// Device, inode, size, and when it was changed; nothing for a file that is not there.
+    /// Device, inode, size and time of the last change; `None` for a file that does not exist.
     known: Option<(u64, u64, u64, SystemTime)>,
 }
 
-/// Clocks of file systems are coarse.
+/// Maximum age of a change that counts as recent, because the clocks of file systems are coarse.
 const RACY: Duration = Duration::from_secs(2);
 
 impl Seen {
@@ -47,7 +47,7 @@ impl Seen {
         &self.path
     }
 
-    /// Whether what was read should be read again.
+    /// Returns whether the files should be read again.
     pub(crate) fn is_outdated(&self) -> bool {
         self.racy || stamps(self.resource, &self.path) != self.files
     }
@@ -81,7 +81,7 @@ mod tests {
         make: |_| Ok(Arc::new(())),
     };
 
-    /// Seen long after the last change.
+    /// Returns the state as if seen long after the last change.
     fn later(path: &Path) -> Seen {
         Seen::at(SystemTime::now() + 2 * RACY, &TEXTS, path)
     }

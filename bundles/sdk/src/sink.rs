@@ -1,4 +1,4 @@
-//! Where a rule puts what it found.
+//! Collection of the findings of a rule.
 
 use std::collections::HashMap;
 
@@ -23,55 +23,55 @@ pub struct Sink<'d> {
     subject: &'d Subject<'d>,
     facts: &'d Facts,
     values: &'d Values,
-    /// Said on every issue of a rule that is not normative for the document's version.
+    /// Note on every issue of a rule that is not normative for the document's version.
     not_normative: Option<String>,
-    cached: Vec<Cached>,
-    /// What is looked at now: the part with this number, or the whole.
+    kept: Vec<Kept>,
+    /// Number of the part that is being checked, or the whole.
     part: u32,
     suppressed: Option<Suppressed>,
-    /// What was found behind references: by the text and where the document's path lies in memory.
+    /// Findings behind references, by the text and by the address of the document's path in memory.
     behind: HashMap<(String, usize, u32), Behind>,
     metadata: Vec<Metadata>,
-    /// How the rule has ended, when it has said so itself.
+    /// Ending of the rule, if it has set one itself.
     ending: Option<Ending>,
-    /// The level of what is said once more and not kept.
+    /// Level of a repeated finding, which is dropped.
     unheard: Level,
-    /// Takes what is said about findings that are not kept. In a box, because most checkers keep
-    /// all of theirs, and many are at work at the same time.
+    /// Receives the data of findings that are not listed. It is boxed, because most checkers list
+    /// all findings and many sinks exist at the same time.
     scratch: Option<Box<Issue>>,
 }
 
 /// A finding that is listed.
-struct Cached {
-    /// What was being looked at: findings are made in this order.
+struct Kept {
+    /// Part that was being checked. Findings are made in this order.
     part: u32,
-    /// Where it is in the document: findings are listed in this order.
+    /// Position in the document. Findings are listed in this order.
     order: (usize, u32),
     issue: Issue,
 }
 
-/// Stands for the whole, which is looked at after all parts.
+/// Stands for the whole document, which is checked after all parts.
 pub(crate) const WHOLE: u32 = u32::MAX;
 
-/// A finding about something to which references lead.
+/// A finding at the target of references.
 struct Behind {
-    /// Its place in `cached`, if it is there.
-    cached: Option<usize>,
-    /// Where the last reference stands.
+    /// Its index in `cached`, if it is listed.
+    kept: Option<usize>,
+    /// Offset of the last reference.
     last: u32,
-    /// The references after the first.
+    /// Number of references after the first.
     more: usize,
 }
 
-/// Further references to a fault that are shown.
+/// Maximum number of further references that are shown for a finding.
 const MOST_REFERENCES: usize = 3;
 
-/// The findings beyond the limit.
+/// Findings beyond the limit.
 struct Suppressed {
     count: u64,
-    /// Worst of all but the last.
+    /// Worst level of all but the last finding.
     worst: Level,
-    /// The last one's, which its rule may still change.
+    /// Level of the last finding, which its rule may still change.
     last: Level,
     first: Spot,
 }
@@ -88,7 +88,7 @@ impl<'d> Sink<'d> {
             facts,
             values,
             not_normative,
-            cached: Vec::new(),
+            kept: Vec::new(),
             part: WHOLE,
             suppressed: None,
             behind: HashMap::new(),
@@ -99,15 +99,15 @@ impl<'d> Sink<'d> {
         }
     }
 
-    /// Says that something is wrong at a place. The text names what was found and what is
-    /// allowed. Further facts can be added to what is returned.
+    /// Reports a fault at a place. The text names the value that was found and the values that are
+    /// allowed. Further facts can be added to the returned finding.
     pub fn issue<'p>(
         &mut self,
         at: impl Into<Place<'p>>,
         text: impl Into<String>,
     ) -> Finding<'_, 'd> {
         let (place, text) = (at.into(), text.into());
-        // What is wrong in a library is wrong in every copy that a modular scenario takes of it.
+        // A fault in a library occurs in every copy of it in a modular scenario.
         let reference = copied_by(self.subject, &place);
         if reference.is_some_and(|reference| self.is_said(reference, &place, &text)) {
             return self.unheard();
@@ -121,16 +121,16 @@ impl<'d> Sink<'d> {
         } else {
             self.facts.level
         };
-        let full = self.cached.len() >= self.limit();
+        let full = self.kept.len() >= self.limit();
         let issue = if full {
             self.suppress(place, level);
             scratch(&mut self.scratch)
         } else {
             let (order, issue) = self.complete(place, text, level);
             let part = self.part;
-            self.cached.push(Cached { part, order, issue });
-            match self.cached.last_mut() {
-                Some(cached) => &mut cached.issue,
+            self.kept.push(Kept { part, order, issue });
+            match self.kept.last_mut() {
+                Some(kept) => &mut kept.issue,
                 None => scratch(&mut self.scratch),
             }
         };
@@ -151,9 +151,9 @@ impl<'d> Sink<'d> {
         }
     }
 
-    /// Says that something is wrong with what a reference leads to: at the reference, with the place
-    /// itself as second. Where several references lead to the same, it is said once, and the others are
-    /// further places.
+    /// Reports a fault at the target of a reference. The reference is the first place, the target
+    /// the second one. If several references lead to the same fault, it is listed once with the
+    /// others as further places.
     pub fn issue_behind<'p>(
         &mut self,
         reference: Node<'p>,
@@ -168,8 +168,8 @@ impl<'d> Sink<'d> {
             .at(place, "the place in the catalog")
     }
 
-    /// Whether the same was said of the same place for another reference; then this one is added. Else
-    /// it counts as said from now on.
+    /// Checks whether the same fault was reported at the same place for another reference. If so,
+    /// adds this reference. Otherwise, records the fault as reported.
     fn is_said(&mut self, reference: Node<'_>, place: &Place<'_>, text: &str) -> bool {
         let document = place.document().path().as_ptr() as usize;
         let key = (text.to_owned(), document, place.offset());
@@ -178,18 +178,18 @@ impl<'d> Sink<'d> {
             known.last = reference.offset();
             known.more += usize::from(is_other);
             let shown = known
-                .cached
+                .kept
                 .filter(|_| is_other && known.more <= MOST_REFERENCES);
-            if let Some(cached) = shown.and_then(|cached| self.cached.get_mut(cached)) {
+            if let Some(kept) = shown.and_then(|kept| self.kept.get_mut(kept)) {
                 let what = "a further reference that leads there";
                 let spot = locate(self.subject, &Place::Node(reference), Some(what));
-                cached.issue.locations.push(spot.locations);
+                kept.issue.locations.push(spot.locations);
             }
             return true;
         }
-        let cached = self.cached.len();
+        let kept = self.kept.len();
         let behind = Behind {
-            cached: (cached < self.limit()).then_some(cached),
+            kept: (kept < self.limit()).then_some(kept),
             last: reference.offset(),
             more: 0,
         };
@@ -197,7 +197,7 @@ impl<'d> Sink<'d> {
         false
     }
 
-    /// A finding that is said already.
+    /// Returns a finding for a fault that was already reported.
     fn unheard(&mut self) -> Finding<'_, 'd> {
         let issue = scratch(&mut self.scratch);
         issue.locations.clear();
@@ -212,7 +212,7 @@ impl<'d> Sink<'d> {
         }
     }
 
-    /// Adds a fact about the check itself, such as what the document was measured by.
+    /// Adds a fact about the check itself, such as the reference values that were used.
     pub fn fact(&mut self, key: &str, value: impl Into<String>, description: &str) {
         self.metadata.push(Metadata {
             key: key.to_owned(),
@@ -221,78 +221,79 @@ impl<'d> Sink<'d> {
         });
     }
 
-    /// Says that the rule could not look, or came to no end: its checker has failed, whatever it found before. The
-    /// text is a sentence or several lines, such as the traceback of a language that rules are written in.
+    /// Reports that the rule could not check or did not complete. Its checker has failed,
+    /// regardless of earlier findings. The text is a sentence or several lines, such as the
+    /// traceback of the language of the rule.
     pub fn fail(&mut self, why: impl Into<String>) {
         self.end(Ending::Failed { reason: why.into() });
     }
 
-    /// Says how the rule has ended, for one that asks somebody else. The first that is said counts.
+    /// Sets the ending of a rule that delegates to another program. The first call counts.
     pub fn end(&mut self, ending: Ending) {
         if ending != Ending::Completed {
             self.ending.get_or_insert(ending);
         }
     }
 
-    /// How the rule has ended, when it has said so, once.
+    /// Takes out the ending of the rule, if it has set one.
     pub(crate) fn take_ending(&mut self) -> Option<Ending> {
         self.ending.take()
     }
 
-    /// Passes on an issue as another program has said it, with its places, which are not looked at. Such issues are
-    /// listed in the order in which they are passed on.
+    /// Passes on an issue of another program unchanged. Its places are not verified. Such issues
+    /// are listed in the order in which they are passed on.
     pub fn retell(&mut self, issue: Issue) {
-        if self.cached.len() >= self.limit() {
+        if self.kept.len() >= self.limit() {
             let level = issue.level;
             return self.suppress(&Place::Text(self.subject.written(), 0), level);
         }
         let part = self.part;
-        let order = (0, u32::try_from(self.cached.len()).unwrap_or(u32::MAX));
-        self.cached.push(Cached { part, order, issue });
+        let order = (0, u32::try_from(self.kept.len()).unwrap_or(u32::MAX));
+        self.kept.push(Kept { part, order, issue });
     }
 
-    /// What is checked, with everything that the root refers to.
+    /// Returns the checked documents: the root and everything that it refers to.
     pub fn subject(&self) -> &'d Subject<'d> {
         self.subject
     }
 
-    /// The version of the standard that the document names.
+    /// Returns the version of the standard that the document names.
     pub fn version(&self) -> Option<Version> {
         self.subject.version()
     }
 
-    /// The value of a number that the rule declares.
+    /// Returns the value of a number that the rule declares.
     pub fn number(&self, param: &Param) -> f64 {
         self.values.number(param)
     }
 
-    /// The value of a flag that the rule declares.
+    /// Returns the value of a flag that the rule declares.
     pub fn flag(&self, param: &Param) -> bool {
         self.values.flag(param)
     }
 
-    /// The value of a text that the rule declares.
+    /// Returns the value of a text that the rule declares.
     pub fn text(&self, param: &Param) -> String {
         self.values.text(param)
     }
 
-    /// How many findings there are, listed or not.
+    /// Returns the number of findings, listed or not.
     pub fn count(&self) -> u64 {
-        self.cached.len() as u64
+        self.kept.len() as u64
             + self
                 .suppressed
                 .as_ref()
                 .map_or(0, |suppressed| suppressed.count)
     }
 
-    /// Says what is looked at next: the part with this number, or the [`WHOLE`].
+    /// Sets the part that is checked next: the part with this number, or the [`WHOLE`].
     pub(crate) fn turn_to(&mut self, part: u32) {
         self.part = part;
     }
 
-    /// Takes in what other threads have found for the same checker, up to a part: then it has what it would have
-    /// if it had taken all parts in their order. `false` when that cannot be told: something is not listed, or is
-    /// counted.
+    /// Merges the findings of other threads for the same checker, up to a part. The result is the
+    /// same as if one thread had checked all parts in order. Returns `false` if this is not
+    /// certain, because a finding is not listed or is counted.
     pub(crate) fn take_in(&mut self, others: Vec<Sink<'d>>, last: u32) -> bool {
         let plain = |sink: &Sink<'_>| {
             sink.suppressed.is_none() && sink.behind.is_empty() && sink.metadata.is_empty()
@@ -300,23 +301,22 @@ impl<'d> Sink<'d> {
         if !plain(self) || !others.iter().all(plain) {
             return false;
         }
-        self.cached
-            .extend(others.into_iter().flat_map(|it| it.cached));
-        // Every part was one thread's, and is in order.
-        self.cached.sort_by_key(|cached| cached.part);
-        self.cached.retain(|cached| cached.part <= last);
-        self.cached.len() <= self.limit()
+        self.kept.extend(others.into_iter().flat_map(|it| it.kept));
+        // One thread checked each part, so its findings are in order.
+        self.kept.sort_by_key(|kept| kept.part);
+        self.kept.retain(|kept| kept.part <= last);
+        self.kept.len() <= self.limit()
     }
 
-    /// Takes out the findings in document order, and facts about those that are not listed.
+    /// Takes out the findings in document order, and facts about findings that are not listed.
     pub(crate) fn finish(&mut self) -> (Vec<Issue>, Vec<Metadata>) {
-        let mut cached = std::mem::take(&mut self.cached);
+        let mut kept = std::mem::take(&mut self.kept);
         let mut behind: Vec<Behind> = std::mem::take(&mut self.behind).into_values().collect();
-        behind.sort_unstable_by_key(|behind| behind.cached);
+        behind.sort_unstable_by_key(|behind| behind.kept);
         for behind in behind {
-            let finding = behind.cached.and_then(|at| cached.get_mut(at));
+            let finding = behind.kept.and_then(|at| kept.get_mut(at));
             let unsaid = behind.more.saturating_sub(MOST_REFERENCES);
-            if let Some(Cached { issue, .. }) = finding.filter(|_| unsaid > 0) {
+            if let Some(Kept { issue, .. }) = finding.filter(|_| unsaid > 0) {
                 let text = match unsaid {
                     1 => "; one more reference leads there".to_owned(),
                     unsaid => format!("; {unsaid} more references lead there"),
@@ -324,8 +324,8 @@ impl<'d> Sink<'d> {
                 issue.description.push_str(&text);
             }
         }
-        cached.sort_by_key(|cached| cached.order);
-        let mut issues: Vec<Issue> = cached.into_iter().map(|cached| cached.issue).collect();
+        kept.sort_by_key(|kept| kept.order);
+        let mut issues: Vec<Issue> = kept.into_iter().map(|kept| kept.issue).collect();
         let mut facts = std::mem::take(&mut self.metadata);
         let Some(suppressed) = self.suppressed.take() else {
             return (issues, facts);
@@ -337,7 +337,7 @@ impl<'d> Sink<'d> {
              (parameter `{}`)",
             MAX_ISSUES.name
         );
-        // As severe as the worst of them, so that a verdict cannot depend on the limit.
+        // The level is the worst of them, so that a verdict cannot depend on the limit.
         let worst = suppressed.worst.min(suppressed.last);
         let mut rest = issue(text, worst, first(self.facts.uids));
         rest.locations.push(suppressed.first.locations);
@@ -352,7 +352,7 @@ impl<'d> Sink<'d> {
     }
 
     fn limit(&self) -> usize {
-        // At least one, so that something is always shown; the cast saturates.
+        // The limit is at least one, so that something is always shown. The cast saturates.
         self.values.number(&MAX_ISSUES).max(1.0) as usize
     }
 
@@ -378,23 +378,23 @@ impl<'d> Sink<'d> {
         }
         let spot = locate(self.subject, place, None);
         let mut issue = issue(text, level, first(self.facts.uids));
-        // In a modular scenario the value is mended where it is given, not in the library.
+        // In a modular scenario the value is fixed where it is assigned, not in the library.
         issue.locations.extend(put_there(self.subject, place));
         issue.locations.push(spot.locations);
         (spot.order, issue)
     }
 }
 
-/// One finding that has been put into the [`Sink`], to be completed.
+/// One finding in the [`Sink`], which can be completed.
 pub struct Finding<'s, 'd> {
     issue: &'s mut Issue,
     subject: &'d Subject<'d>,
     facts: &'s Facts,
-    /// Where the finding is, if that is in the root file as it is written.
+    /// Offset of the finding, if it is in the root file as written.
     beside: Option<u32>,
-    /// What is said where the rule is not normative, and levels are lowered.
+    /// Note for a rule that is not normative. If it is set, levels are lowered.
     note: Option<&'s str>,
-    /// Set when the finding is only counted: where its level is kept.
+    /// Level of a finding that is only counted. `None` if it is listed.
     unlisted: Option<&'s mut Level>,
 }
 
@@ -407,7 +407,7 @@ impl Finding<'_, '_> {
         self
     }
 
-    /// Adds a further place and what is to be seen there.
+    /// Adds a further place and its description.
     pub fn at<'p>(self, place: impl Into<Place<'p>>, description: impl AsRef<str>) -> Self {
         if !self.is_listed() {
             return self;
@@ -418,12 +418,12 @@ impl Finding<'_, '_> {
         self
     }
 
-    /// Adds the point in the inertial coordinate system, in metres, to the place named last.
+    /// Adds the point in the inertial coordinate system, in metres, to the last place.
     pub fn point(self, x: f64, y: f64, z: f64) -> Self {
         self.also(Location::Inertial { x, y, z })
     }
 
-    /// Adds the position on a road, in metres, to the place named last.
+    /// Adds the position on a road, in metres, to the last place.
     pub fn road(self, road_id: &str, s: f64, t: f64) -> Self {
         self.also(Location::Road {
             road_id: road_id.to_owned(),
@@ -432,7 +432,7 @@ impl Finding<'_, '_> {
         })
     }
 
-    /// Adds facts that the result format has no element for.
+    /// Adds facts for which the result format has no element.
     pub fn info(self, info: DomainInfo) -> Self {
         if self.is_listed() {
             self.issue.domain_info.push(info);
@@ -440,8 +440,8 @@ impl Finding<'_, '_> {
         self
     }
 
-    /// Names a further rule of the standard that the same fact violates. An issue has one UID, so that this
-    /// one is a fact of its own, `qcbus.rule`.
+    /// Names a further rule of the standard that the same fact violates. An issue has one UID, so
+    /// this one becomes a separate fact, `qcbus.rule`.
     pub fn also_violates(self, uid: &str) -> Self {
         let rule = InfoElement {
             name: "Rule".to_owned(),
@@ -455,7 +455,7 @@ impl Finding<'_, '_> {
         })
     }
 
-    /// Another severity than the rule's. It is lowered as the rule's would be.
+    /// Sets another severity than the rule's. It is lowered in the same way as the rule's.
     pub fn level(mut self, level: Level) -> Self {
         let level = if self.note.is_some() {
             lower(level)
@@ -466,8 +466,8 @@ impl Finding<'_, '_> {
         self
     }
 
-    /// A severity for what is wrong in every version, whether the standard said so already or not: it is
-    /// not lowered, and nothing is said about when the rule became normative.
+    /// Sets the severity of a fault that is wrong in every version, even in those without the rule.
+    /// It is not lowered, and the note about normative versions is removed.
     pub fn in_every_version(mut self, level: Level) -> Self {
         self.set_level(level);
         let text = self
@@ -486,7 +486,7 @@ impl Finding<'_, '_> {
         }
     }
 
-    /// Another UID of the rule than its first.
+    /// Sets another UID of the rule than its first.
     pub fn uid(self, uid: &str) -> Self {
         debug_assert!(
             self.facts.uids.contains(&uid),
@@ -509,7 +509,7 @@ impl Finding<'_, '_> {
     }
 }
 
-/// One severity less; information stays information.
+/// Returns the next lower severity. Information stays information.
 fn lower(level: Level) -> Level {
     match level {
         Level::Error => Level::Warning,

@@ -1,4 +1,4 @@
-//! What is checked: a root document and the documents that it refers to.
+//! The subject of a check: a root document and the documents that it refers to.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -15,7 +15,7 @@ use crate::{LinkedModel, Reads, ResourceValue, Version};
 #[derive(Debug, Clone)]
 pub struct Subject<'d> {
     root: Document<'d>,
-    /// What `root` is read from.
+    /// Image of `root`.
     image: &'d Image,
     written: Document<'d>,
     is_expanded: bool,
@@ -34,19 +34,19 @@ pub struct Subject<'d> {
 pub struct Linked<'d> {
     /// The document.
     pub document: Document<'d>,
-    /// What it is to the root.
+    /// Its role for the root.
     pub role: DocumentRole,
     /// Absolute path; for a member of an archive, the archive's path, `!` and the member's name.
     pub path: String,
-    /// Byte offset of the element in the root's image that leads here.
+    /// Byte offset of the referring element in the root's image.
     pub referred_at: u32,
-    /// Where its own references to maps and scenarios lead; the root counts as the first document.
+    /// Targets of its own references to maps and scenarios. The root counts as the first document.
     pub links: &'d [Link],
     image: &'d LinkedImage,
     models: JobModels,
 }
 
-/// A document that a root refers to, as whoever checks has it in hand.
+/// A document that a root refers to, in the form in which the checking thread holds it.
 #[derive(Debug, Clone)]
 pub(crate) struct LinkedImage {
     pub role: DocumentRole,
@@ -58,7 +58,7 @@ pub(crate) struct LinkedImage {
 }
 
 impl LinkedImage {
-    /// The document, with models of it from among those that are kept.
+    /// Opens the document, with access to the cached models.
     pub(crate) fn open(&self, models: &JobModels) -> Result<Linked<'_>, ImageError> {
         Ok(Linked {
             document: self.image.document()?,
@@ -73,24 +73,26 @@ impl LinkedImage {
 }
 
 impl Linked<'_> {
-    /// The document's image, for whoever keeps what he made of it longer than he was given it.
+    /// Returns the document's image, for callers that keep data derived from it for longer than the
+    /// check.
     pub fn image(&self) -> &Image {
         &self.image.image
     }
 
-    /// A model of the document that is built when it is first asked for, shared by all rules, and
-    /// kept for the next root that refers to the same document with the same bytes, in it and in
-    /// all that it includes. `None` when nothing can be made of the document.
+    /// Returns a cached model of the document, or `None` if it cannot be built. It is built on
+    /// first use and shared by all rules. It is kept for the next root that refers to the same
+    /// document, if the bytes of it and of its includes are the same.
     ///
-    /// What costs time on a large document belongs into such a model, so that a root costs its own
-    /// checks and not those of its map.
+    /// Computations that are slow on a large document belong in such a model. A root then costs
+    /// only its own checks, not those of its map.
     pub fn cached<M: LinkedModel>(&self) -> Option<Arc<M>> {
         self.models.get(self.image.id, &self.image.image)
     }
 }
 
 impl<'d> Subject<'d> {
-    /// A root document on its own. `version_of` reads what the document says about itself.
+    /// Creates a subject from a single root document. `version_of` reads the version that the
+    /// document names.
     ///
     /// # Errors
     /// As [`Document::open`].
@@ -117,7 +119,7 @@ impl<'d> Subject<'d> {
         })
     }
 
-    /// Adds the documents that the root refers to, and those that could not be had.
+    /// Adds the documents that the root refers to, and those that are not available.
     #[must_use]
     pub fn with(mut self, linked: Vec<Linked<'d>>, missing: Vec<MissingDocument>) -> Subject<'d> {
         self.linked = linked;
@@ -125,15 +127,15 @@ impl<'d> Subject<'d> {
         self
     }
 
-    /// Says where the root's references to maps and scenarios lead; the root counts as the first
-    /// document, the linked ones follow.
+    /// Sets the targets of the root's references to maps and scenarios. The root counts as the
+    /// first document, and the linked ones follow.
     #[must_use]
     pub fn with_links(mut self, links: Vec<Link>) -> Subject<'d> {
         self.links = links;
         self
     }
 
-    /// The same subject as a bundle looks at it that reads modular scenarios in this way.
+    /// Returns the same subject for a bundle that reads modular scenarios in this way.
     #[must_use]
     pub fn read(mut self, reads: Reads) -> Subject<'d> {
         if reads == Reads::Expanded {
@@ -147,47 +149,47 @@ impl<'d> Subject<'d> {
         self
     }
 
-    /// The same subject with what was made of the user's files; see [`crate::Resource`].
+    /// Returns the same subject with the data made from the user's files; see [`crate::Resource`].
     #[must_use]
     pub fn with_resources(mut self, resources: Vec<ResourceValue>) -> Subject<'d> {
         self.resources = resources;
         self
     }
 
-    /// The same subject under the configuration in force.
+    /// Returns the same subject under the configuration in force.
     #[must_use]
     pub(crate) fn under(mut self, config: Option<Arc<Config>>) -> Subject<'d> {
         self.config = config;
         self
     }
 
-    /// The configuration in force, for whoever hands it on to another program; rules have their parameters from their
-    /// [`crate::Sink`].
+    /// Returns the configuration in force, for callers that pass it on to another program. Rules
+    /// get their parameters from their [`crate::Sink`].
     pub fn config(&self) -> Option<&Config> {
         self.config.as_deref()
     }
 
-    /// What was made of the user's files, if the user gave any to this bundle.
+    /// Returns the data made from the user's files, if the user gave any to this bundle.
     pub fn resource<T: 'static>(&self) -> Option<&T> {
         self.resources.iter().find_map(|one| one.downcast_ref())
     }
 
-    /// The root file as it is written, also where the root is what it was expanded to.
+    /// Returns the root file as written, even if the root is its expansion.
     pub fn written(&self) -> Document<'d> {
         self.written
     }
 
-    /// Whether the root is what a modular scenario was expanded to.
+    /// Returns whether the root is the expansion of a modular scenario.
     pub fn is_expanded(&self) -> bool {
         self.is_expanded
     }
 
-    /// Where the written root's references to maps and scenarios lead.
+    /// Returns the targets of the written root's references to maps and scenarios.
     pub fn links(&self) -> &[Link] {
         &self.links
     }
 
-    /// What becomes of the written root when it is expanded, with all that is wrong on the way.
+    /// Expands the written root and returns the result with all faults found on the way.
     pub fn expansion(&self) -> Expansion<'d> {
         let root = Piece {
             document: self.written,
@@ -201,38 +203,39 @@ impl<'d> Subject<'d> {
         qcbus_ingest::modular::expand(pieces, Limits::default().max_archive)
     }
 
-    /// The document that is checked.
+    /// Returns the document that is checked.
     pub fn root(&self) -> Document<'d> {
         self.root
     }
 
-    /// The image of the document that is checked, for whoever keeps what he made of it longer than he was given it.
+    /// Returns the image of the checked document, for callers that keep data derived from it for
+    /// longer than the check.
     pub fn image(&self) -> &'d Image {
         self.image
     }
 
-    /// What the root file's name promises.
+    /// Returns the kind of file that the root file's name indicates.
     pub fn kind(&self) -> FileKind {
         self.kind
     }
 
-    /// The version of its standard that the root names, if it names one.
+    /// Returns the version of its standard that the root names, if any.
     pub fn version(&self) -> Option<Version> {
         self.version
     }
 
-    /// The documents that the root refers to, in the order of the references.
+    /// Returns the documents that the root refers to, in the order of the references.
     pub fn linked(&self) -> &[Linked<'d>] {
         &self.linked
     }
 
-    /// The documents of one role, in the order of the references.
+    /// Returns the documents of one role, in the order of the references.
     pub fn with_role(&self, role: DocumentRole) -> impl Iterator<Item = &Linked<'d>> {
         self.linked.iter().filter(move |linked| linked.role == role)
     }
 
-    /// The XPath of an element. Many findings within one large parent cost no more than few: what
-    /// tells the root document's elements from their siblings is remembered.
+    /// Returns the XPath of an element. The positions among siblings in the root document are
+    /// cached, so many findings within one large parent stay cheap.
     pub(crate) fn xpath(&self, node: Node<'_>) -> String {
         self.paths
             .lock()
@@ -240,7 +243,7 @@ impl<'d> Subject<'d> {
             .xpath(node)
     }
 
-    /// What the root refers to and could not be had.
+    /// Returns the documents that the root refers to and that are not available.
     pub fn missing(&self) -> &[MissingDocument] {
         &self.missing
     }

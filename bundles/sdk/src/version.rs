@@ -1,9 +1,9 @@
-//! Versions of a standard and the ranges of them that a rule applies to.
+//! Versions of a standard, and the ranges of versions that a rule applies to.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// A version of a standard, such as 1.7. Files only name the first two numbers; the third is 0.
+/// A version of a standard, such as 1.7. Files name only the first two numbers, and the third is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Version {
     /// First number.
@@ -15,7 +15,7 @@ pub struct Version {
 }
 
 impl Version {
-    /// The version that a file with these two numbers has.
+    /// Returns the version of a file with these two numbers.
     pub const fn new(major: u16, minor: u16) -> Version {
         Version {
             major,
@@ -36,7 +36,7 @@ impl fmt::Display for Version {
     }
 }
 
-/// Why a text is no version or no range of versions.
+/// Reason why a text is not a valid version or range of versions.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is no version range such as `1.7.0..`, `1.4.0..1.8.0`, `..=1.6.0` or nothing")]
 pub struct VersionError(String);
@@ -66,9 +66,9 @@ impl FromStr for Version {
     }
 }
 
-/// The versions that a rule applies to, written as Rust writes ranges: `1.7.0..`,
-/// `1.4.0..1.8.0` (1.8.0 excluded), `..=1.6.0`; the empty text means every version and also
-/// documents that name none.
+/// The versions that a rule applies to, in the notation of Rust ranges: `1.7.0..`, `1.4.0..1.8.0`
+/// (1.8.0 excluded), `..=1.6.0`. The empty text means every version and also documents that name
+/// none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct VersionRange {
     from: Option<Version>,
@@ -77,22 +77,22 @@ pub struct VersionRange {
 }
 
 impl VersionRange {
-    /// Whether any document will do, even one that names no version.
+    /// Returns whether the range includes every document, even one without a version.
     pub fn is_everything(&self) -> bool {
         self.from.is_none() && self.to.is_none()
     }
 
-    /// First version in the range, if it has a start.
+    /// Returns the first version of the range, if it has a start.
     pub fn first(&self) -> Option<Version> {
         self.from
     }
 
-    /// Whether `version` lies before the start.
+    /// Returns whether `version` is before the start.
     pub fn is_before(&self, version: Version) -> bool {
         self.from.is_some_and(|from| version < from)
     }
 
-    /// Whether `version` lies in the range.
+    /// Returns whether `version` is in the range.
     pub fn contains(&self, version: Version) -> bool {
         let below_end = match self.to {
             None => true,

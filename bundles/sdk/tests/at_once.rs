@@ -1,4 +1,4 @@
-//! Several jobs at the same time in one bundle, against the bus's own host.
+//! Tests of several parallel jobs in one bundle, against the bus's own host.
 
 #![expect(
     clippy::unwrap_used,
@@ -21,11 +21,12 @@ use qcbus_messages::{DocId, FromPeer, JobId, ToPeer};
 use qcbus_sdk::run::BusOptions;
 use qcbus_sdk::{Bundle, Exit, Mode, Rule, Sink};
 
-/// How many jobs are in the rule now, and how many were at most.
+/// Number of jobs in the rule now, and the maximum so far.
 static NOW: AtomicUsize = AtomicUsize::new(0);
 static MOST: AtomicUsize = AtomicUsize::new(0);
 const THREADS: usize = 2;
-/// For machines on which nobody else is ever given time; nobody waits for so long elsewhere.
+/// Timeout for machines that give other threads almost no time. Elsewhere the test ends much
+/// earlier.
 const WATCHDOG: Duration = Duration::from_secs(20);
 
 static MEETS: Rule<Document> = Rule {
@@ -40,7 +41,8 @@ static BUNDLE: Bundle = Bundle {
     ..common::BUNDLE
 };
 
-/// Waits until another job is at it, too. The job with the road `slow` waits for all others to be over.
+/// Waits until another job is in the rule, too. The job with the road `slow` waits for the end of
+/// all others.
 fn meets(document: &Document<'_>, found: &mut Sink<'_>) {
     let now = NOW.fetch_add(1, Ordering::SeqCst) + 1;
     MOST.fetch_max(now, Ordering::SeqCst);
@@ -60,7 +62,7 @@ fn meets(document: &Document<'_>, found: &mut Sink<'_>) {
     NOW.fetch_sub(1, Ordering::SeqCst);
 }
 
-/// Jobs that the host has heard the end of.
+/// Number of jobs with an end that the host has received.
 static OVER: AtomicUsize = AtomicUsize::new(0);
 const JOBS: usize = 12;
 
@@ -112,7 +114,8 @@ fn road(job: u64) -> String {
 
 type Found = BTreeMap<JobId, Vec<String>>;
 
-/// Plays the broker until the bundle leaves: what was found, and the order in which jobs were over.
+/// Acts as the broker until the bundle leaves. Returns the findings and the order in which jobs
+/// ended.
 async fn talk(host: &mut Host) -> (Found, Vec<JobId>) {
     let (mut found, mut order) = (Found::new(), Vec::new());
     loop {
@@ -136,7 +139,7 @@ async fn talk(host: &mut Host) -> (Found, Vec<JobId>) {
     }
 }
 
-/// `true`: the bundle leaves.
+/// Handles a message. Returns `true` if the bundle leaves.
 fn said(
     host: &mut Host,
     peer: PeerId,

@@ -1,4 +1,4 @@
-//! A bundle as a daemon, against the bus's own host: join, job, missing document, drain.
+//! Tests of a bundle as a daemon, against the bus's own host: join, job, missing document, drain.
 
 #![expect(
     clippy::unwrap_used,
@@ -59,7 +59,7 @@ fn a_job_is_checked_and_the_bundle_leaves_when_drained() {
         let talk = tokio::time::timeout(Duration::from_secs(60), talk(&mut host)).await;
         let (issues, done) = talk.expect("the bundle answers");
         assert_eq!((issues, done), (2, Status::Completed));
-        // The host acknowledges what the leaving bundle still waits for.
+        // The host must acknowledge the last messages before the bundle ends.
         while !daemon.is_finished() {
             let _ = tokio::time::timeout(Duration::from_millis(20), host.next()).await;
         }
@@ -68,7 +68,7 @@ fn a_job_is_checked_and_the_bundle_leaves_when_drained() {
     assert_eq!(daemon.join().unwrap(), Exit::Accepted);
 }
 
-/// Plays the broker until the bundle leaves. The document is published when it is asked for.
+/// Acts as the broker until the bundle leaves. Publishes the document on request.
 async fn talk(host: &mut Host) -> (usize, Status) {
     let (mut issues, mut status) = (0, Status::Error);
     loop {

@@ -1,4 +1,4 @@
-//! Gates, preconditions, panics, backports and limits, with rules made for it.
+//! Tests of gates, preconditions, panics, backports and limits, with rules made for them.
 
 #![expect(
     clippy::unwrap_used,

@@ -1,4 +1,4 @@
-//! What a bundle keeps of a map from one job to the next.
+//! Tests of the models that a bundle caches for a map from one job to the next.
 
 #![expect(
     clippy::unwrap_used,
@@ -23,7 +23,7 @@ use qcbus_messages::{
 use qcbus_sdk::run::BusOptions;
 use qcbus_sdk::{Bundle, Exit, LinkedModel, Loaded, Mode, Plan, Rule, Sink, examine};
 
-/// The first road of a map, and how many models of such a map had been built before.
+/// The first road of a map, and the number of models of such a map that were built before.
 struct FirstRoad {
     id: String,
     before: usize,
@@ -90,7 +90,7 @@ static BUNDLE: Bundle = Bundle {
 
 const CONFIG: Digest = Digest([7; 32]);
 
-/// A map that is worth keeping.
+/// Returns a map that is large enough to be cached.
 fn map(first: &str) -> String {
     let mut text = format!("<OpenDRIVE><header/><road id='{first}'/>");
     for number in 0..20_000 {
@@ -102,7 +102,7 @@ fn map(first: &str) -> String {
 const ROOT: &str = "<OpenSCENARIO/>";
 const BAD_ROOT: &str = "<OpenSCENARIO fails='1'/>";
 
-/// Plays the broker.
+/// A test broker.
 struct Broker {
     host: Host,
     peer: PeerId,
@@ -143,13 +143,13 @@ impl Broker {
         let image = prepared.build();
         let mut loan = self.host.documents().loan(image.len()).unwrap();
         loan[..image.len()].copy_from_slice(&image);
-        // The same for all: it is not what documents are told apart by.
+        // All documents have the same digest, because it does not identify them.
         let digest = Digest([1; 32]);
         drop(loan.publish(doc, image.len(), digest, kind).unwrap());
         doc
     }
 
-    /// What the rules say about a scenario on this map.
+    /// Returns the findings of the rules for a scenario on this map.
     async fn check(&mut self, root: &str, map: DocId) -> Vec<String> {
         self.jobs += 1;
         let document = |doc, role| JobDocument {
@@ -223,14 +223,14 @@ async fn talk(host: Host) -> Broker {
     for _ in 0..3 {
         assert_eq!(broker.check(ROOT, town).await, twice("a, 0 before"));
     }
-    // It has changed, and what is said of it has.
+    // The map has changed, so the findings change, too.
     let changed = broker.publish(FileKind::Xodr, &map("b"));
     for _ in 0..2 {
         assert_eq!(broker.check(ROOT, changed).await, twice("b, 0 before"));
     }
-    // Another scenario still has the former one.
+    // The earlier map is still cached for another scenario.
     assert_eq!(broker.check(ROOT, town).await, twice("a, 0 before"));
-    // What was at hand when a rule panicked is not trusted.
+    // A cached model is dropped after a rule has panicked.
     broker.check(BAD_ROOT, town).await;
     assert_eq!(broker.check(ROOT, town).await, twice("a, 1 before"));
     let empty = broker.publish(FileKind::Xodr, "<OpenDRIVE/>");

@@ -1,4 +1,4 @@
-//! Rules that look at one part of a model after the other.
+//! Tests of rules that check one part of the model after the other.
 
 #![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
 
@@ -65,12 +65,12 @@ static BUNDLE: Bundle = Bundle {
     ..common::BUNDLE
 };
 
-/// What was heard: who began in which order, and how each ended.
+/// Events of a check: the order of starts, and the end of each checker.
 #[derive(Default)]
 struct Heard {
     begun: Mutex<Vec<usize>>,
     ended: Vec<(usize, Vec<Issue>, Outcome)>,
-    /// Cancel before this many have begun.
+    /// Number of starts after which the check is cancelled.
     patience: Option<usize>,
 }
 
@@ -113,9 +113,10 @@ fn rules_look_at_a_part_in_turn_and_then_at_the_whole() {
     let (complete, heard) = heard(None);
     assert!(complete);
     let parts = [[0, 1].as_slice(), &[0, 1], &[0]].concat();
-    // The one that looks at the whole only, then the one that went by parts and did not fail.
+    // First runs the rule that checks only the whole, then the one that checked parts and did not
+    // fail.
     let whole = [2, 0];
-    // Three parts and the whole.
+    // The rule runs on three parts and the whole.
     let dependent = [3, 3, 3, 3];
     let begun = heard.begun.into_inner().unwrap();
     assert_eq!(begun, [parts.as_slice(), &whole, &dependent].concat());

@@ -1,4 +1,4 @@
-//! What is found does not depend on how many threads look.
+//! Tests that the findings do not depend on the number of threads.
 
 #![expect(
     clippy::unwrap_used,
@@ -25,7 +25,7 @@ use qcbus_sdk::{
 };
 use roads::Roads;
 
-/// How many roads the file has.
+/// Number of roads in the file.
 const ROADS: usize = 300;
 
 type Report = fn(&Roads<'_>, &usize, &mut Sink<'_>);
@@ -43,7 +43,7 @@ const fn by_parts(
     }
 }
 
-/// So that others have the time to come.
+/// Waits, so that other threads have time to join.
 fn take_time() {
     let begin = Instant::now();
     while begin.elapsed() < Duration::from_micros(15) {
@@ -55,13 +55,13 @@ static FINDS: Rule<Roads> = by_parts("finds", &["x:xodr:1.0.0:a.a"], |roads, par
     take_time();
     let road = roads.0[*part];
     found.issue(road, format!("road {part}"));
-    // At the same place as all the others of its kind: they stay in the order of their parts.
+    // All these findings have the same place, so they stay in the order of their parts.
     found.issue(
         road.document().root().unwrap(),
         format!("seen from road {part}"),
     );
 });
-/// Lists fewer than it finds.
+/// Lists fewer findings than it makes.
 static MANY: Rule<Roads> = by_parts("many", &["x:xodr:1.0.0:a.b"], |roads, part, found| {
     found
         .issue(roads.0[*part], format!("road {part}"))
@@ -105,7 +105,7 @@ static WHOLE_PANICS: Rule<Roads> = Rule {
     },
     ..Rule::DEFAULTS
 };
-/// Does not look, because another has found errors.
+/// Is skipped, because another rule has found errors.
 static AFTER_ERRORS: Rule<Roads> = Rule {
     after: &["finds"],
     ..by_parts("after_errors", &["x:xodr:1.0.0:a.i"], |_, _, _| {})
@@ -120,7 +120,7 @@ static AFTER_CLEAN: Rule<Roads> = Rule {
         },
     )
 };
-/// Of another model, which goes beside.
+/// Has another model and runs in parallel.
 static BESIDE: Rule<Document> = Rule {
     id: "beside",
     uids: &["x:xodr:1.0.0:a.k"],
@@ -151,7 +151,7 @@ static BUNDLE: Bundle = Bundle {
 #[derive(Default)]
 struct Heard {
     ended: Vec<(usize, Vec<Issue>, Outcome)>,
-    /// Cancel when this many have begun.
+    /// Number of starts after which the check is cancelled.
     patience: Option<usize>,
     begun: AtomicUsize,
 }
@@ -182,7 +182,7 @@ fn map() -> Loaded {
     Loaded::from_bytes(Path::new("a.xodr"), text.into_bytes()).unwrap()
 }
 
-/// All checkers, of which one lists no more than 20 findings.
+/// Returns a plan of all checkers. One of them lists at most 20 findings.
 fn plan(bundle: &'static Bundle) -> Plan {
     Plan::new(
         bundle,
@@ -246,12 +246,12 @@ fn a_check_is_cancelled_in_all_its_threads() {
         let (complete, heard) = heard(&BUNDLE, threads, Some(60));
         assert!(!complete);
         let begun = heard.begun.load(Ordering::Relaxed);
-        // Everybody ends the part that he is at.
+        // Each thread finishes its current part.
         assert!(begun <= 60 + threads * BUNDLE.rules.len(), "{begun}");
     }
 }
 
-/// The threads that have looked at a part.
+/// Threads that have checked a part.
 static THREADS: Mutex<Option<HashSet<ThreadId>>> = Mutex::new(None);
 
 static SLOW: Rule<Roads> = by_parts("slow", &["x:xodr:1.0.0:a.a"], |_, _, _| {

@@ -1,9 +1,10 @@
-//! How long the rules take on maps, from the image of the document.
+//! Measures the time of the rules on maps, from the image of the document.
 //!
 //! `cargo run --release -p qcbus-xodr --example rule_times -- [--rules] [--runs N] [--threads N] MAP.xodr…`
-//! prints the time of all rules together per map: with one thread (unless told otherwise) its CPU time, with more
-//! the time on the clock on the wall; with `--rules` what each took (on the clock on the
-//! wall, the least of all runs), of the maps one after the other, sorted by the last. `tests/xodr_speed.py` makes large maps to measure.
+//! prints the time of all rules together per map. With one thread (the default) it is CPU time,
+//! with more threads it is wall-clock time. `--rules` prints the wall-clock time of each rule (the
+//! minimum of all runs) for each map, sorted by the last map. `tests/xodr_speed.py` makes large
+//! maps for measurements.
 
 #![expect(
     clippy::print_stdout,
@@ -63,12 +64,12 @@ fn milliseconds(took: Duration) -> f64 {
     took.as_secs_f64() * 1e3
 }
 
-/// What was measured of one map.
+/// Measurements of one map.
 struct Measured {
-    /// All rules together.
+    /// Minimum time of all rules together.
     best: Duration,
     median: Duration,
-    /// The least that each rule took.
+    /// Minimum time of each rule.
     rules: BTreeMap<String, Duration>,
     issues: usize,
 }
@@ -84,7 +85,7 @@ fn measure(
     let mut rules: BTreeMap<String, Duration> = BTreeMap::new();
     let (mut totals, mut issues) = (Vec::new(), 0);
     for _ in 0..runs.max(1) {
-        // As a bundle does it: what a subject remembers is not carried over to the next run.
+        // A bundle also creates a new subject for each run, so that cached data is not reused.
         let before = clock(hands);
         let subject = loaded.subject(&qcbus_xodr::BUNDLE)?;
         let mut times = Times::default();
@@ -106,7 +107,7 @@ fn measure(
     })
 }
 
-/// The CPU time of this thread when it is alone, else the time on the wall.
+/// Returns the CPU time of this thread if it is the only one, otherwise the wall-clock time.
 fn clock(hands: &Permits) -> Duration {
     let clock = match hands.count() {
         1 => libc::CLOCK_THREAD_CPUTIME_ID,
@@ -128,7 +129,7 @@ fn clock(hands: &Permits) -> Duration {
     Duration::from_secs(seconds) + Duration::from_nanos(u64::try_from(time.tv_nsec).unwrap_or(0))
 }
 
-/// The time that each checker says it took.
+/// The times that the checkers report.
 #[derive(Default)]
 struct Times {
     took: Vec<(usize, Duration)>,

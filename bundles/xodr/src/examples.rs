@@ -1,11 +1,11 @@
-//! What the short examples of the pages are put into: minimal valid maps with a hole.
+//! Templates for the short examples of the pages: minimal valid maps with a gap.
 //!
 //! | `in=` | the example is |
 //! |---|---|
-//! | (nothing) | what follows the header: `<road>`, `<junction>`, `<controller>`, … |
+//! | (nothing) | everything after the header: `<road>`, `<junction>`, `<controller>`, … |
 //! | `header` | the content of the header |
-//! | `road` | what follows `<lanes>` in a straight road of 100 m: `<objects>`, `<signals>`, … |
-//! | `roadHead` | what comes before `<lanes>`: `<link>`, `<type>`, `<elevationProfile>`, … |
+//! | `road` | everything after `<lanes>` in a straight road of 100 m: `<objects>`, `<signals>`, … |
+//! | `roadHead` | everything before `<lanes>`: `<link>`, `<type>`, `<elevationProfile>`, … |
 //! | `planView` | the content of `<planView>` in a road of 100 m with one lane to the right |
 //! | `lanes` | the content of `<lanes>` in a straight road of 100 m |
 //! | `laneSection` | the content of its only `<laneSection>` |
@@ -76,7 +76,7 @@ macro_rules! short_road {
     };
 }
 
-/// The templates; the first is used when an example names none.
+/// The templates. The first one is the default for examples that name no template.
 pub(crate) const TEMPLATES: &[Template] = &[
     Template {
         name: "map",

@@ -1,7 +1,7 @@
 //! The checker bundle for ASAM OpenDRIVE.
 //!
-//! One rule is one file in `rules/` with its page beside it; `rules/mod.rs` is the list.
-//! `docs/writing-a-rule.md` shows how to add one.
+//! Each rule has its own file in `rules/` with its page beside it. `rules/mod.rs` is the list.
+//! `docs/writing-a-rule.md` shows how to add a rule.
 
 mod examples;
 mod families;

@@ -1,14 +1,14 @@
-//! What rules about roads, lanes and junctions look at: `Rule<Roads>` gets a `&RoadMap<'_>`.
+//! Model for rules about roads, lanes and junctions: `Rule<Roads>` gets a `&RoadMap<'_>`.
 
 use std::ops::Range;
 
 use qcbus_opendrive::RoadMap;
 use qcbus_sdk::{Model, Subject, Unbuilt};
 
-/// Some roads by their places, for [`RoadMap::part`].
+/// Indices of some roads, for [`RoadMap::part`].
 pub type Part = Range<usize>;
 
-/// The road network, read once per document and shared by all rules about it.
+/// The road network, read once per document and shared by all rules that use it.
 pub enum Roads {}
 
 impl Model for Roads {

@@ -1,13 +1,13 @@
-//! Where the standard says what a rule checks.
+//! Sections of the standard that define the rules.
 
-/// Name of a rule, number and title of the section: of ASAM OpenDRIVE 1.9.0.
+/// Name of a rule, number and title of the section in ASAM OpenDRIVE 1.9.0.
 const SECTIONS: &str = include_str!("sections.tsv");
 
-/// Where the standard's pages begin.
+/// Base address of the standard's pages.
 const PAGES: &str = "https://publications.pages.asam.net/standards/ASAM_OpenDRIVE/\
     ASAM_OpenDRIVE_Specification/v1.9.0/specification/";
 
-/// The first pages of its chapters, by their numbers.
+/// First pages of the chapters, by chapter number.
 const CHAPTERS: [(&str, &str); 12] = [
     ("6", "06_general_architecture/06_01_introduction.html"),
     ("7", "07_additional_data/07_00_additional_data.html"),
@@ -23,8 +23,8 @@ const CHAPTERS: [(&str, &str); 12] = [
     ("F", "index.html"),
 ];
 
-/// The section of ASAM OpenDRIVE 1.9.0 that states a rule, by the end of its UID: its name as people cite
-/// it, and the address of the chapter.
+/// Returns the section of ASAM OpenDRIVE 1.9.0 that states a rule, given by the end of its UID. The
+/// result is the name of the section for citations and the address of the chapter.
 pub fn section(rule: &str) -> Option<(String, String)> {
     let mut rows = SECTIONS.lines().map(|row| row.split('\t'));
     let (number, title) = rows.find_map(|mut row| {

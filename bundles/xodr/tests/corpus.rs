@@ -1,13 +1,14 @@
-//! The recorded results of ASAM's own OpenDRIVE bundle, where they are at hand.
+//! Compares the findings with the recorded results of ASAM's own OpenDRIVE bundle, if they are
+//! available.
 
 use std::path::Path;
 
 use qcbus_sdk::corpus::{Deviations, Parity};
 
-/// Where the recorded results lie, if they are at hand.
+/// Directory of the recorded results, if they are available.
 const CASES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/cases");
 
-/// The page that shows where we agree and where we do not.
+/// Page that lists agreements and differences.
 const PAGE: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../../docs/evidence/parity-opendrive.md"
@@ -31,7 +32,7 @@ const CONNECTING: &str = "the roads belong to a junction, which the rule exclude
 const NO_WIDTH: &str = "the lane has no width where it is linked, so it has no edges that could miss any; \
      its link is reported by `new_lane_appear` and `zero_width_at_…`";
 
-/// Where we differ, and why ours is right.
+/// Differences from the recorded results, with the reasons why this bundle is right.
 const DEVIATIONS: &[Deviations] = &[
     Deviations {
         checker: CONTACT,
@@ -128,7 +129,7 @@ const DEVIATIONS: &[Deviations] = &[
     },
 ];
 
-/// Where we differ on the maps of other projects, and why ours is right.
+/// Differences on the maps of other projects, with the reasons why this bundle is right.
 const ON_REAL_MAPS: &[Deviations] = &[
     Deviations {
         checker: ACROSS,

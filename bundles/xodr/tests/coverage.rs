@@ -1,5 +1,6 @@
-//! The table of rules in the bundle's README, generated: which of the standard's normative rules are
-//! checked, proven by what fires in the pages' bad examples. `QCBUS_BLESS=1` rewrites it.
+//! Generates the table of rules in the bundle's README. It shows which of the standard's normative
+//! rules are checked, as proven by the findings in the pages' bad examples. `QCBUS_BLESS=1`
+//! rewrites it.
 
 #![expect(clippy::unwrap_used, reason = "in a test it is a finding")]
 
@@ -13,7 +14,7 @@ use qcbus_xodr::BUNDLE;
 
 const ANNEX: &str = include_str!("../annex_f.tsv");
 
-/// Rules that the standard prints, with the reason for those that cannot be checked.
+/// Returns the rules that the standard prints, with the reason for those that cannot be checked.
 fn annex() -> Vec<(&'static str, Option<&'static str>)> {
     evidence::listed(ANNEX)
 }
@@ -25,7 +26,8 @@ fn table() -> String {
     let (mut own, mut twins, mut definitions, mut open) = (0, 0, 0, 0);
     let mut rows = String::new();
     for (uid, why) in &annex {
-        // One UID is printed with a version that is none; the rule bears that of its chapter.
+        // The standard prints one UID with an invalid version. The rule uses the version of its
+        // chapter.
         let answered = uid.replace(":1.x.0:", ":1.9.0:");
         let state = match (evidence.get(answered.as_str()), why) {
             (Some((id, true)), _) => {

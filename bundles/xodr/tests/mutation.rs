@@ -1,8 +1,9 @@
-//! Proof by mutation: in maps with which nothing is wrong, one violating edit at a time makes the rule
-//! that it violates fire, and no other but those that the table of edits allows.
+//! Proof by mutation on maps without faults. One violating edit at a time must make the violated
+//! rule fire. No other rule may fire, except those that the table of edits allows.
 //!
-//! The maps and the table lie in `tests/mutation/`. `QCBUS_BLESS=1` writes `docs/evidence/mutation-opendrive.md`;
-//! `QCBUS_MUTATE=NAME` tries the edits of the rules whose name contains it, and says what each leads to.
+//! The maps and the table are in `tests/mutation/`. `QCBUS_BLESS=1` writes
+//! `docs/evidence/mutation-opendrive.md`. `QCBUS_MUTATE=NAME` tries the edits of the rules whose
+//! name contains it, and prints the results of each.
 
 #![expect(
     clippy::panic,
@@ -29,8 +30,8 @@ const PAGE: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../../docs/evidence/mutation-opendrive.md"
 );
-/// The schemas that are published reject some of what the standard prints; the rule says so and
-/// does not call it an error.
+/// The published schemas reject some constructs that the standard prints. The rule mentions this
+/// and does not report an error.
 const DEFECT: &str = "known defect of the published schema";
 
 const MAPS: [(&str, &str); 4] = [
@@ -40,8 +41,8 @@ const MAPS: [(&str, &str); 4] = [
     ("1.9", include_str!("mutation/all-1.9.xodr")),
 ];
 
-/// Everything that is on by default, and the profiles of simulators: read from the rules' pages once, not for
-/// every map.
+/// All rules that are on by default, and the profiles of simulators. The rules' pages are read
+/// once, not for every map.
 static PLAN: LazyLock<Plan> = LazyLock::new(|| {
     let is_on = |id: &'static str, by_default| by_default || name(id).starts_with("profile_");
     Plan::new(
@@ -51,10 +52,10 @@ static PLAN: LazyLock<Plan> = LazyLock::new(|| {
     )
 });
 
-/// What the rules say of a map, by their names.
+/// The findings of the rules for a map, by the rules' names.
 #[derive(Default)]
 struct Verdict {
-    /// Ran to their end.
+    /// Rules that completed.
     completed: BTreeSet<&'static str>,
     findings: BTreeMap<&'static str, Vec<Issue>>,
 }
@@ -68,7 +69,7 @@ impl Verdict {
         heard.0
     }
 
-    /// Rules with a finding at error level.
+    /// Returns the rules with a finding at error level.
     fn errors(&self) -> impl Iterator<Item = &'static str> {
         let error = |issues: &Vec<Issue>| issues.iter().any(|issue| issue.level == Level::Error);
         let all = self.findings.iter();
@@ -91,7 +92,7 @@ struct Heard(Verdict);
 
 impl Listener for Heard {
     fn ended(&mut self, checker: usize, issues: Vec<Issue>, outcome: Outcome) {
-        // A backport is the same rule on older files.
+        // A backport is the same rule for older files.
         let rule = name(PLAN.checkers()[checker].facts.id);
         if outcome.ending.status() == Status::Completed {
             self.0.completed.insert(rule);
@@ -106,7 +107,7 @@ fn name(id: &'static str) -> &'static str {
     id.split_once("_xodr_").map_or(id, |(_, name)| name)
 }
 
-/// What came of a rule's edits.
+/// Result of a rule's edits.
 #[derive(Default)]
 struct Row {
     tried: usize,
@@ -132,7 +133,7 @@ fn maps() -> Vec<Map> {
     MAPS.into_iter().map(map).collect()
 }
 
-/// Tries a rule's edits on all maps; what is wrong is added to `faults`.
+/// Tries a rule's edits on all maps. Adds errors to `faults`.
 fn row(entry: &Entry, maps: &[Map], faults: &mut Vec<String>) -> Row {
     let mut row = Row::default();
     for edit in &entry.edits {
@@ -167,8 +168,8 @@ fn row(entry: &Entry, maps: &[Map], faults: &mut Vec<String>) -> Row {
     row
 }
 
-/// The rows of all rules whose name contains `wanted`, in order, and what is wrong. Rules do not know
-/// of each other, so every processor takes the next.
+/// Returns the rows of all rules whose name contains `wanted`, in order, and the errors. Rules are
+/// independent, so they run in parallel.
 fn rows(entries: &[Entry], maps: &[Map], wanted: &str) -> (Vec<Row>, Vec<String>) {
     let done = in_parallel(entries, |(): &mut (), entry| {
         let mut faults = Vec::new();
@@ -182,7 +183,7 @@ fn rows(entries: &[Entry], maps: &[Map], wanted: &str) -> (Vec<Row>, Vec<String>
     (rows, faults.concat())
 }
 
-/// Whether the edited map makes the rule fire.
+/// Returns whether the rule fires on the edited map.
 fn judged(
     entry: &Entry,
     edit: &Edit,

@@ -1,5 +1,5 @@
-//! No file, however broken, makes a rule panic: the examples of the pages and, where they are at hand,
-//! real maps, broken in the ways of `qcbus_sdk::robust`.
+//! Checks that a damaged file never makes a rule panic. The tests break the examples of the pages
+//! and, if they are available, real maps. They use the methods of `qcbus_sdk::robust`.
 
 use std::path::Path;
 
@@ -30,7 +30,7 @@ fn real_maps_broken_in_any_way_break_no_rule() {
     ROBUST.assert_files_below(Path::new(cases));
 }
 
-/// Each of these lengths in turn, for all roads, geometries, sections and repeats of an example.
+/// Tries each of these lengths for all roads, geometries, sections and repeats of an example.
 #[test]
 fn lengths_that_cannot_be_break_no_rule() {
     let plan = Plan::by_default(&BUNDLE);

@@ -1,5 +1,5 @@
-//! Real maps, broken as authors and tools break them, and changed within what is allowed: see
-//! `qcbus_sdk::mutate::seeded` and `tests/seeded/README.md`.
+//! Tests with real maps, broken as authors and tools break them, and changed within the allowed
+//! range. See `qcbus_sdk::mutate::seeded` and `tests/seeded/README.md`.
 
 use std::path::Path;
 
@@ -8,7 +8,8 @@ use qcbus_xodr::BUNDLE;
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
-/// A study of maps; `least` of the faults must be found at the due level, in hundredths.
+/// Runs a study of maps. `least` is the percentage of the faults that must be found at the required
+/// level.
 fn run(place: &'static str, lists: [&str; 2], page: &str, least: usize) {
     let root = Path::new(ROOT);
     let [faults, harmless] = lists;

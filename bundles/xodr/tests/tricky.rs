@@ -1,7 +1,8 @@
-//! Maps that lie in wait for rules: valid ones that look wrong, and wrong ones that look valid. Each row
-//! of a table says which rules find something in its map, and nothing else may.
+//! Tests with tricky maps: valid ones that look wrong, and wrong ones that look valid. Each row of
+//! a table names the rules that find something in its map. No other rule may find something.
 //!
-//! The pages show the plain cases; here are those that a hurried implementation gets wrong.
+//! The pages show the plain cases. These tests contain the cases that a careless implementation
+//! gets wrong.
 
 #![expect(clippy::unwrap_used, reason = "in a test it is a finding")]
 
@@ -40,8 +41,8 @@ use std::path::Path;
 use qcbus_sdk::{Issue, Level, Listener, Loaded, Outcome, Plan, check};
 use qcbus_xodr::BUNDLE;
 
-/// What it is, the map after its header, and `error NAME` or `warning NAME` for every rule that finds
-/// something of that level.
+/// Description, the map after its header, and `error NAME` or `warning NAME` for every rule with a
+/// finding of that level.
 type Row = (&'static str, String, &'static [&'static str]);
 
 struct Heard<'p> {
@@ -53,7 +54,7 @@ impl Listener for Heard<'_> {
     fn ended(&mut self, checker: usize, issues: Vec<Issue>, _: Outcome) {
         let id = self.plan.checkers()[checker].facts.id;
         let name = id.split_once("_xodr_").map_or(id, |(_, name)| name);
-        // The schemas have tests of their own.
+        // The schemas have separate tests.
         for issue in issues.iter().filter(|_| name != "xml_valid_schema") {
             let level = match issue.level {
                 Level::Error => "error",
@@ -65,7 +66,7 @@ impl Listener for Heard<'_> {
     }
 }
 
-/// The rules that find something in a file.
+/// Returns the rules with a finding in a file.
 fn findings(plan: &Plan, file: &[u8]) -> BTreeSet<String> {
     let loaded = Loaded::from_bytes(Path::new("map.xodr"), file.to_vec()).unwrap();
     let mut heard = Heard {
@@ -76,13 +77,13 @@ fn findings(plan: &Plan, file: &[u8]) -> BTreeSet<String> {
     heard.findings
 }
 
-/// Runs a table over maps of version 1.9.
+/// Runs a table on maps of version 1.9.
 fn run(rows: &[Row]) {
     let whole = |(what, map, expected): &Row| (*what, build::file("9", map), *expected);
     run_files(&rows.iter().map(whole).collect::<Vec<_>>());
 }
 
-/// Runs a table over whole files.
+/// Runs a table on whole files.
 fn run_files(rows: &[Row]) {
     let plan = Plan::by_default(&BUNDLE);
     let mut faults = Vec::new();

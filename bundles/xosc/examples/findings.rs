@@ -1,4 +1,4 @@
-//! Prints every finding of the bundle on the files that are named: `findings [--checker PART] PATH…`
+//! Prints every finding of the bundle in the given files: `findings [--checker PART] PATH…`
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     qcbus_sdk::corpus::print_findings(&qcbus_xosc::BUNDLE, std::env::args().skip(1))

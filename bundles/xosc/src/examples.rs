@@ -1,5 +1,6 @@
-//! What the short examples of the pages are put into: minimal scenarios with a hole. The whole around
-//! a hole is sound: two cars, `Ego` and `Other`, start 50 m apart, and the run ends after a minute.
+//! Templates for the short examples of the pages: minimal scenarios into which an example is
+//! inserted. The rest of each template is valid. Two cars, `Ego` and `Other`, start 50 m apart, and
+//! the run ends after a minute.
 //!
 //! | `in=` | the example is |
 //! |---|---|
@@ -147,7 +148,7 @@ macro_rules! on_map {
     };
 }
 
-/// A scenario with something of its own between the cars and the end.
+/// Builds a scenario with custom content between the cars and the end.
 macro_rules! scenario {
     ($($storyboard:expr),* $(,)?) => {
         document!(
@@ -210,7 +211,7 @@ macro_rules! by_name {
     };
 }
 
-/// The templates; the first is used when an example names none.
+/// The templates. The first one is the default for an example that names none.
 pub(crate) const TEMPLATES: &[Template] = by_name![
     "scenario": document!("{example}\n"),
     "parameters": document!(

@@ -1,8 +1,8 @@
 //! The checker bundle for ASAM OpenSCENARIO XML.
 //!
-//! One rule is one file in `rules/` with its page beside it; `rules/mod.rs` is the list; an
-//! algorithm that several rules share is in `families/`. `docs/writing-a-rule.md` shows how to add
-//! a rule.
+//! Each rule is one file in `rules/` with its page beside it. `rules/mod.rs` is the list.
+//! Algorithms that several rules share are in `families/`. `docs/writing-a-rule.md` shows how to
+//! add a rule.
 
 mod examples;
 mod families;

@@ -1,4 +1,4 @@
-//! What rules about scenarios look at: `Rule<Scene>` gets a `&Scenario<'_>`.
+//! The model for rules about scenarios: `Rule<Scene>` gets a `&Scenario<'_>`.
 
 use std::sync::Arc;
 
@@ -7,8 +7,8 @@ use qcbus_messages::{Absence, DocumentRole};
 use qcbus_openscenario::{Element, Inputs, LinkedCatalog, LinkedMap, RoadNetwork, Scenario};
 use qcbus_sdk::{Finding, LinkedModel, Model, Place, Sink, Subject, Unbuilt};
 
-/// A scenario, catalog or distribution with all that it refers to, read once per document and shared
-/// by all rules about it.
+/// A scenario, catalog or distribution with everything that it refers to. It is read once per
+/// document and shared by all rules about it.
 pub enum Scene {}
 
 impl Model for Scene {
@@ -17,7 +17,7 @@ impl Model for Scene {
 
     fn build<'d>(subject: &'d Subject<'d>) -> Result<Scenario<'d>, Unbuilt> {
         if let Some(version) = subject.version().filter(|version| version.major != 1) {
-            // What has the same name in another language may mean something else.
+            // The same name may mean something else in another version of the language.
             let why = format!("OpenSCENARIO {version} is not known, only 1.0 to 1.4 are");
             return Err(Unbuilt::Broken(why));
         }
@@ -39,7 +39,7 @@ impl Model for Scene {
     }
 }
 
-/// The roads of a scenario's map, kept for the next scenario on the same one.
+/// The roads of a scenario's map, cached for the next scenario on the same map.
 struct KeptRoads(Arc<RoadNetwork>);
 
 impl LinkedModel for KeptRoads {
@@ -55,7 +55,7 @@ fn map(subject: &Subject<'_>) -> LinkedMap {
         let broken = subject.missing().iter().any(|missing| {
             missing.role == DocumentRole::Map && matches!(missing.why, Absence::Broken { .. })
         });
-        // Of a map that breaks off, nobody knows what would have followed.
+        // The missing part of a truncated map is unknown, so a broken map is not used.
         let is_map = linked
             .document
             .root()
@@ -90,8 +90,8 @@ fn catalogs<'d>(subject: &'d Subject<'d>) -> Vec<LinkedCatalog<'d>> {
         .collect()
 }
 
-/// The directories of which something could not be read. One that is not there at all is no doubt:
-/// nothing can be in it.
+/// Returns the directories with a file that could not be read. A missing directory is left out
+/// because it cannot contain anything.
 fn incomplete(subject: &Subject<'_>) -> Vec<u32> {
     let doubtful = subject.missing().iter().filter(|missing| {
         missing.role == DocumentRole::Catalog
@@ -100,12 +100,12 @@ fn incomplete(subject: &Subject<'_>) -> Vec<u32> {
     doubtful.map(|missing| missing.referred_at).collect()
 }
 
-/// Says things about elements that may be written in a catalog.
+/// Reports findings about elements that may be in a catalog.
 pub trait About<'d> {
-    /// Says something about an attribute of an element, or about the element when the attribute is
-    /// not there. What is written in the entry of a catalog is said at the reference to it, with the
-    /// place in the catalog as second: whoever mends it must know both. Where several references lead to
-    /// the same fault, it is said at the first, with the others as further places.
+    /// Reports a finding about an attribute of an element, or about the element if the attribute is
+    /// missing. A finding in a catalog entry is reported at the reference, with the place in the
+    /// catalog as second place. The author needs both to fix it. If several references lead to the
+    /// same fault, it is reported at the first one. The others are further places.
     fn about(
         &mut self,
         element: Element<'_, '_>,

@@ -1,19 +1,20 @@
-//! The recorded results of ASAM's own OpenSCENARIO bundle, where they are at hand.
+//! Compares the findings with the recorded results of ASAM's own OpenSCENARIO bundle, if they are
+//! available.
 
 use std::path::Path;
 
 use qcbus_sdk::corpus::{Deviations, Parity};
 
-/// Where the recorded results lie, if they are at hand.
+/// Directory of the recorded results, if they are available.
 const CASES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/cases");
 
-/// The page that shows where we agree and where we do not.
+/// Page that lists agreements and differences.
 const PAGE: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../../docs/evidence/parity-openscenario.md"
 );
 
-/// Where we differ, and why ours is right.
+/// Differences from the recorded results, with the reasons why this bundle is right.
 const DEVIATIONS: &[Deviations] = &[
     Deviations {
         checker: "check_asam_xosc_reference_control_valid_actor_reference_in_private_actions",
@@ -42,7 +43,7 @@ const DEVIATIONS: &[Deviations] = &[
     },
 ];
 
-/// Where we differ on the scenarios of other projects, and why ours is right.
+/// Differences on the scenarios of other projects, with the reasons why this bundle is right.
 const ON_REAL_SCENARIOS: &[Deviations] = &[
     Deviations {
         checker: "check_asam_xosc_data_type_allowed_operators",

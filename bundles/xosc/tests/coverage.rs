@@ -1,5 +1,5 @@
-//! The table of rules in the bundle's README, generated: which rules are checked, proven by what fires
-//! in the pages' bad examples. `QCBUS_BLESS=1` rewrites it.
+//! Generates the table of rules in the bundle's README. It shows which rules are checked, as proven
+//! by the findings in the pages' bad examples. `QCBUS_BLESS=1` rewrites it.
 
 #![expect(clippy::unwrap_used, reason = "in a test it is a finding")]
 
@@ -13,7 +13,7 @@ use qcbus_xosc::BUNDLE;
 
 const RULES: &str = include_str!("../rules.tsv");
 
-/// How many of some rules are checked, and how.
+/// Number of checked rules, by kind of check.
 #[derive(Default)]
 struct Count {
     own: u32,

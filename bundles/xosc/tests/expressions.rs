@@ -1,5 +1,5 @@
-//! Expressions that simulators' own tests contain, in scenarios: each faulty one is said exactly once by
-//! the whole bundle, wherever it stands, and the good one not at all.
+//! Tests of expressions from simulators' own tests, in scenarios. The whole bundle reports each
+//! faulty expression exactly once, wherever it is, and does not report the good one.
 
 #![expect(clippy::unwrap_used, reason = "in a test it is a finding")]
 
@@ -8,16 +8,17 @@ use std::path::Path;
 use qcbus_sdk::{Issue, Level, Listener, Loaded, Outcome, Plan, check};
 use qcbus_xosc::BUNDLE;
 
-/// An attribute of the kind that the expression is written for.
+/// Kind of attribute that the expression is written for.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
-    /// `delay`, which the schema knows as a double.
+    /// `delay`, a double in the schema.
     Double,
-    /// `revMinor` is the only such attribute, and decides much else: a declared value stands for it.
+    /// `revMinor` is the only such attribute. It has many other effects, so a declared value
+    /// replaces it.
     UnsignedShort,
 }
 
-/// The expression, its kind, and the rule that says what is wrong with it in a declared value.
+/// The expression, its kind, and the rule that reports it in a declared value.
 const FAULTY: &[(&str, Kind, &str)] = &[
     ("${2/0}", Kind::Double, EVALUATION),
     ("${34/$doubleVal}", Kind::Double, EVALUATION),
@@ -56,7 +57,7 @@ const FAULTY: &[(&str, Kind, &str)] = &[
 const OPERATORS: &str = "data_type_allowed_operators";
 const EVALUATION: &str = "expressions_evaluation_of_expressions_possible";
 
-/// What the expressions depend on.
+/// Parameters of the expressions.
 const PARAMETERS: &str = r#"
 <ParameterDeclaration name="doubleVal" parameterType="double" value="0.0"/>
 <ParameterDeclaration name="timeParam" parameterType="dateTime" value="2026-01-31T12:00:00"/>
@@ -72,7 +73,7 @@ const PARAMETERS: &str = r#"
 
 const GOOD: &str = "${$delay + ((($x1 - $x0)* 2 + ($y1 - $y0)*2 )*0.5 / $speed) + sqrt(9)}";
 
-/// A sound scenario with one more declaration and the delay of the only condition.
+/// Returns a valid scenario with one further declaration and the delay of the only condition.
 fn scenario(minor: u8, declaration: &str, delay: &str) -> String {
     format!(
         r#"<?xml version="1.0" encoding="UTF-8"?>
@@ -110,7 +111,7 @@ impl Listener for Heard<'_> {
         let name = id.split_once("_xosc_").map_or(id, |(_, name)| name);
         let name = name.strip_suffix("_backport").unwrap_or(name);
         for issue in issues {
-            // Stories may be missing here, and not every parameter is used.
+            // Stories may be missing here, and some parameters are unused.
             let expected =
                 issue.level == Level::Information || issue.description.contains("<Story>");
             if !expected {

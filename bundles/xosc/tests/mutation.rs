@@ -1,9 +1,11 @@
-//! Proof by mutation: in scenarios with which nothing is wrong, one violating edit at a time makes the rule
-//! that it violates fire at the place of the edit, and no other but those that the list of edits allows.
+//! Proof by mutation on scenarios without faults. One violating edit at a time must make the
+//! violated rule fire at the place of the edit. No other rule may fire, except those that the list
+//! of edits allows.
 //!
-//! The scenarios, their map and their catalogs lie in `tests/mutation/world`, the edits in `tests/mutation/edits.txt`.
-//! `QCBUS_BLESS=1` writes `docs/evidence/mutation-openscenario.md`; `QCBUS_MUTATE=NAME` tries the edits of the rules
-//! whose name contains it, and says what each leads to.
+//! The scenarios, their map and their catalogs are in `tests/mutation/world`, the edits in
+//! `tests/mutation/edits.txt`. `QCBUS_BLESS=1` writes `docs/evidence/mutation-openscenario.md`.
+//! `QCBUS_MUTATE=NAME` tries the edits of the rules whose name contains it, and prints the results
+//! of each.
 
 #![expect(clippy::unwrap_used, reason = "a test may fail and tell what it tried")]
 
@@ -22,17 +24,17 @@ use list::{Entry, Mutation};
 use qcbus_sdk::corpus::agrees_or_says;
 use qcbus_sdk::mutate::in_parallel;
 use qcbus_xosc::BUNDLE;
-use trial::{BASES, Base, Cli, Trial, rule_of};
+use trial::{BASES, Base, Bench, Trial, rule_of};
 
 const EDITS: &str = include_str!("mutation/edits.txt");
 
-/// Each family has at least so many.
+/// Minimum number of edits of each family.
 const LEAST: usize = 3;
 
 #[test]
 fn nothing_is_wrong_with_the_scenarios() {
-    let told: Vec<String> = in_parallel(&BASES, |cli: &mut Cli, base: &Base| {
-        let said = cli.unedited(base).unwrap();
+    let told: Vec<String> = in_parallel(&BASES, |bench: &mut Bench, base: &Base| {
+        let said = bench.unedited(base).unwrap();
         let told = said.iter().map(|it| format!("{}: {it}\n", base.name));
         told.collect()
     });
@@ -72,8 +74,9 @@ fn every_edit_is_found_and_by_its_rule_only() {
         .filter(asked)
         .flat_map(|entry| entry.edits.iter().map(move |edit| (entry, edit)))
         .collect();
-    let trials: Vec<Trial<'_>> =
-        in_parallel(&all, |cli: &mut Cli, (entry, edit)| cli.trial(entry, edit));
+    let trials: Vec<Trial<'_>> = in_parallel(&all, |bench: &mut Bench, (entry, edit)| {
+        bench.trial(entry, edit)
+    });
     if !wanted.is_empty() {
         for trial in &trials {
             std::io::stderr()
@@ -96,7 +99,8 @@ fn every_edit_is_found_and_by_its_rule_only() {
     }
 }
 
-/// Checkers that no edit makes fire, though their rule has some: a backport needs an older scenario.
+/// Returns the checkers that no edit makes fire, although their rule has edits. A backport needs an
+/// older scenario.
 fn silent(entries: &[Entry], trials: &[Trial<'_>]) -> Vec<String> {
     let heard: BTreeSet<&str> = trials
         .iter()

@@ -1,4 +1,4 @@
-//! Rules, files and pages agree, and every example does what its page says.
+//! Checks that rules, files and pages agree, and that every example matches its page.
 
 #[test]
 fn pages_keep_their_word() {

@@ -1,5 +1,5 @@
-//! No file, however broken, makes a rule panic: the examples of the pages and, where they are at hand,
-//! real scenarios, broken in the ways of `qcbus_sdk::robust`.
+//! Checks that a damaged file never makes a rule panic. The tests break the examples of the pages
+//! and, if they are available, real scenarios. They use the methods of `qcbus_sdk::robust`.
 
 use std::path::Path;
 
@@ -59,8 +59,8 @@ fn real_scenarios_broken_in_any_way_break_no_rule() {
     ROBUST.assert_files_below(Path::new(cases));
 }
 
-/// What a modular scenario expands to has its elements from several files, in another order than they
-/// are written.
+/// Breaks an expanded modular scenario. Its elements come from several files, in another order than
+/// they are written.
 #[test]
 fn an_expanded_scenario_broken_in_any_way_breaks_no_rule() {
     const MAIN: &str = include_str!("../../../tests/farm/modular/convoy.xosc");

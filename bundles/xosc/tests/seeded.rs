@@ -1,5 +1,5 @@
-//! Real scenarios, broken as authors and tools break them, and changed within what is allowed: see
-//! `qcbus_sdk::mutate::seeded` and `tests/seeded/README.md`.
+//! Tests with real scenarios, broken as authors and tools break them, and changed within the
+//! allowed range. See `qcbus_sdk::mutate::seeded` and `tests/seeded/README.md`.
 
 use std::path::Path;
 

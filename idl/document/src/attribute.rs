@@ -1,4 +1,4 @@
-//! One attribute and where it stands.
+//! One attribute and its position.
 
 use crate::document::Document;
 use crate::layout::{AttributeRecord, NodeRecord, Section};
@@ -14,7 +14,7 @@ pub struct Attribute<'a> {
 }
 
 impl PartialEq for Attribute<'_> {
-    /// Attributes are equal when they are the same one, not when they look alike.
+    /// Compares identity: attributes are equal if they are the same one, not if they look alike.
     fn eq(&self, other: &Self) -> bool {
         self.node == other.node && std::ptr::eq(self.record, other.record)
     }
@@ -28,25 +28,25 @@ impl<'a> Attribute<'a> {
         Attribute { node, record }
     }
 
-    /// The name as written, prefix included (`xsi:type`).
+    /// Returns the name as written, prefix included (`xsi:type`).
     #[inline]
     pub fn name(&self) -> &'a str {
         self.node.document().name(self.record.name.get())
     }
 
-    /// The number of its name within this image, as [`Node::name_number`].
+    /// Returns the number of its name within this image, like [`Node::name_number`].
     #[inline]
     pub fn name_number(&self) -> u16 {
         self.record.name.get()
     }
 
-    /// Whether its name as written is this.
+    /// Checks whether its name as written equals the given name.
     #[inline]
     pub fn is(&self, name: &str) -> bool {
         self.node.document().is_name(self.record.name.get(), name)
     }
 
-    /// The value, entities resolved and white space normalised as XML demands.
+    /// Returns the value with resolved entities and with white space normalised according to XML.
     pub fn value(&self) -> &'a str {
         let (document, record) = (self.node.document(), self.record);
         let value = match record.value_delta.get() {
@@ -62,7 +62,7 @@ impl<'a> Attribute<'a> {
         value.unwrap_or("")
     }
 
-    /// The bytes of the value, without the price of looking whether they are UTF-8: for a first glance.
+    /// Returns the bytes of the value for a quick check, without the cost of UTF-8 validation.
     #[inline]
     pub fn value_bytes(&self) -> &'a [u8] {
         let record = self.record;
@@ -76,12 +76,12 @@ impl<'a> Attribute<'a> {
             .unwrap_or(&[])
     }
 
-    /// Offset of the name in the image's text.
+    /// Returns the offset of the name in the image's text.
     pub fn offset(&self) -> u32 {
         self.record.offset.get()
     }
 
-    /// Offset of the value's first byte (after the quote) in the image's text.
+    /// Returns the offset of the value's first byte (after the quote) in the image's text.
     pub fn value_offset(&self) -> u32 {
         let record = self.record;
         let offset = match record.value_delta.get() {
@@ -95,7 +95,8 @@ impl<'a> Attribute<'a> {
         offset.unwrap_or(0)
     }
 
-    /// Bytes of the value as written at [`Attribute::value_offset`], entities unresolved.
+    /// Returns the bytes of the value as written at [`Attribute::value_offset`], entities
+    /// unresolved.
     pub fn raw_len(&self) -> u32 {
         let record = self.record;
         match record.value_delta.get() {
@@ -108,28 +109,28 @@ impl<'a> Attribute<'a> {
         }
     }
 
-    /// The value as a double; see [`Node::f64`].
+    /// Returns the value as a double; see [`Node::f64`].
     ///
     /// # Errors
-    /// When it is no number, or is beyond what a double holds.
+    /// Fails if it is not a number, or is outside the range of a double.
     pub fn f64(&self) -> Result<f64, ValueError<'a>> {
         value::parse_f64(*self)
     }
 
-    /// The value as an integer; see [`Node::i64`].
+    /// Returns the value as an integer; see [`Node::i64`].
     ///
     /// # Errors
-    /// When it is no integer, or is beyond 64 bits.
+    /// Fails if it is not an integer, or does not fit into 64 bits.
     pub fn i64(&self) -> Result<i64, ValueError<'a>> {
         value::parse_i64(*self)
     }
 
-    /// Where its name is.
+    /// Returns the position of its name.
     pub fn position(&self) -> Position<'a> {
         self.node.document().position(self.offset())
     }
 
-    /// The element that bears it.
+    /// Returns the element that has the attribute.
     #[inline]
     pub fn node(&self) -> Node<'a> {
         self.node
@@ -142,7 +143,7 @@ impl std::fmt::Debug for Attribute<'_> {
     }
 }
 
-/// The attributes of an element; made by [`Node::attributes`].
+/// The attributes of an element; created by [`Node::attributes`].
 #[derive(Clone)]
 pub struct Attributes<'a> {
     node: Node<'a>,
@@ -189,8 +190,8 @@ impl<'a> Iterator for Attributes<'a> {
 impl ExactSizeIterator for Attributes<'_> {}
 
 impl<'a> Document<'a> {
-    /// The records of the attributes of the node with this index: from its first one up to that of
-    /// the next node, or to the last of all.
+    /// Returns the attribute records of the node with this index. They end at the first record of
+    /// the next node, or at the end of all.
     #[inline]
     pub(crate) fn attribute_records(&self, node: u32) -> &'a [AttributeRecord] {
         let size = size_of::<AttributeRecord>();
@@ -209,13 +210,13 @@ impl<'a> Document<'a> {
             .unwrap_or(&[])
     }
 
-    /// The text from `offset` on, as bytes.
+    /// Returns the text from `offset` on, as bytes.
     pub(crate) fn text_from(&self, offset: u32) -> Option<&'a [u8]> {
         self.section(Section::Text).get(offset as usize..)
     }
 }
 
-/// The first record, and the bytes after it.
+/// Returns the first record and the bytes after it.
 #[inline]
 fn split_record<T: bytemuck::Pod>(bytes: &[u8]) -> Option<(&T, &[u8])> {
     let (head, rest) = bytes.split_at_checked(size_of::<T>())?;

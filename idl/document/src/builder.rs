@@ -1,9 +1,9 @@
-//! Writes an image into a buffer that somebody else owns, in one pass over the events of a parser.
+//! Writes an image into a buffer of the caller, in one pass over the events of a parser.
 //!
-//! The caller counts an upper bound first ([`Capacities`]), loans that many bytes and feeds the
-//! events. Each section grows at the place that it would have in an image of full capacity;
-//! [`ImageBuilder::finish`] then moves the sections together, each at most once and only
-//! downwards, and the text not at all.
+//! The caller first counts upper bounds ([`Capacities`]), borrows that many bytes and passes the
+//! events. Each section grows at the offset that it has in an image of full capacity. Then
+//! [`ImageBuilder::finish`] moves the sections together. Each section moves at most once and only
+//! downwards, and the text never moves.
 
 mod capacities;
 mod finish;
@@ -20,15 +20,15 @@ use crate::layout::{
 pub use capacities::Capacities;
 use names::Names;
 
-/// Why an image could not be built.
+/// Reason why an image cannot be built.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum BuildError {
-    /// More of something than its capacity.
+    /// The number of items exceeds its capacity.
     #[error("build the document image: no room for more {what} than {capacity}")]
     NoRoom {
-        /// What there is too much of.
+        /// The kind of item.
         what: &'static str,
-        /// How many (or how many bytes) there is room for.
+        /// Maximum number of items (or bytes).
         capacity: usize,
     },
     /// The buffer is smaller than [`Capacities::image_len`].
@@ -36,22 +36,22 @@ pub enum BuildError {
     SmallBuffer {
         /// Its length.
         found: usize,
-        /// What the capacities need.
+        /// Required length according to the capacities.
         needed: usize,
     },
-    /// More than 4 GiB of text or nodes.
+    /// The text or the nodes exceed 4 GiB.
     #[error("build the document image: {what} do not fit into 32 bits")]
     TooLarge {
-        /// What there is too much of.
+        /// The kind of item.
         what: &'static str,
     },
-    /// More distinct names than [`Capacities::MAX_NAMES`].
+    /// The number of distinct names exceeds [`Capacities::MAX_NAMES`].
     #[error(
         "build the document image: more than {} distinct names",
         Capacities::MAX_NAMES
     )]
     TooManyNames,
-    /// A range that is not within the text so far.
+    /// A range is outside of the text written so far.
     #[error("build the document image: {offset} + {len} lies outside of the text")]
     OutsideText {
         /// Its offset.
@@ -59,7 +59,7 @@ pub enum BuildError {
         /// Its length.
         len: u32,
     },
-    /// An event that cannot come here, such as an end without a start or a second root.
+    /// An event is invalid at this point, such as an end without a start or a second root.
     #[error("build the document image: {event} cannot come here")]
     Misplaced {
         /// The event.
@@ -67,10 +67,10 @@ pub enum BuildError {
     },
 }
 
-/// Builds an image; see the methods for the events it takes.
+/// Builds an image. The methods describe the accepted events.
 pub struct ImageBuilder<'out> {
     out: &'out mut [u8],
-    /// Where each section of a full image lies, and how long it may become.
+    /// Offset and maximum length of each section of a full image.
     places: [usize; SECTIONS],
     limits: [usize; SECTIONS],
     /// Bytes used of each section.
@@ -78,15 +78,15 @@ pub struct ImageBuilder<'out> {
     names: Names,
     /// Elements not yet closed, outermost first.
     open: Vec<u32>,
-    /// The element that attributes belong to right now.
+    /// Whether the last opened element still accepts attributes.
     taking_attributes: bool,
 }
 
 impl<'out> ImageBuilder<'out> {
-    /// Starts an image in `out`, whose present content does not matter.
+    /// Starts an image in `out`. The current content of `out` does not matter.
     ///
     /// # Errors
-    /// When `out` is shorter than [`Capacities::image_len`].
+    /// Fails if `out` is shorter than [`Capacities::image_len`].
     pub fn new(out: &'out mut [u8], capacities: &Capacities) -> Result<Self, BuildError> {
         let needed = capacities.image_len();
         let found = out.len();
@@ -105,19 +105,19 @@ impl<'out> ImageBuilder<'out> {
         })
     }
 
-    /// Appends a file's whole text and returns the offset of its first byte. The first file is the
-    /// one that the document is named after; the text of an include comes before its first node.
+    /// Appends the whole text of a file and returns the offset of its first byte. The document is
+    /// named after the first file. The text of an include must precede its first node.
     ///
     /// # Errors
-    /// When the capacity of text, sources or heap is exceeded.
+    /// Fails if the capacity of text, sources or heap is exceeded.
     pub fn source(&mut self, path: &str, text: &str) -> Result<u32, BuildError> {
-        // So that "just past the end" of a file is no place of the next one.
+        // With the gap, the position just past the end of a file is not part of the next one.
         let gap: &[u8] = if self.used[Section::Sources as usize] > 0 {
             b"\n"
         } else {
             b""
         };
-        // All or nothing: half a source would be text that belongs to no file.
+        // Everything is checked first: the text of a partial source would belong to no file.
         self.room(Section::Text, gap.len() + text.len())?;
         self.room(Section::Heap, path.len())?;
         self.room(Section::Sources, size_of::<SourceRecord>())?;
@@ -139,10 +139,10 @@ impl<'out> ImageBuilder<'out> {
         Ok(start)
     }
 
-    /// An element starts; `name` as written with its prefix, `offset` of its `<`.
+    /// Opens an element. `name` is as written with its prefix, `offset` is that of its `<`.
     ///
     /// # Errors
-    /// When a capacity is exceeded, or the root element has been closed already.
+    /// Fails if a capacity is exceeded, or if the root element is already closed.
     pub fn open_element(&mut self, name: &str, offset: u32) -> Result<(), BuildError> {
         if self.open.is_empty() && self.used[Section::Nodes as usize] > 0 {
             return Err(BuildError::Misplaced {
@@ -161,11 +161,11 @@ impl<'out> ImageBuilder<'out> {
         Ok(())
     }
 
-    /// An attribute of the element just opened; `name` as written. `value` is what the parser
-    /// resolved, or `None` when it is literally the `value_len` bytes at `value_offset`.
+    /// Adds an attribute to the element just opened; `name` is as written. `value` is the value
+    /// resolved by the parser, or `None` if it equals the `value_len` bytes at `value_offset`.
     ///
     /// # Errors
-    /// When a capacity is exceeded, the range is outside of the text, or a child came already.
+    /// Fails if a capacity is exceeded, the range is outside of the text, or a child precedes it.
     pub fn attribute(
         &mut self,
         name: &str,
@@ -199,11 +199,11 @@ impl<'out> ImageBuilder<'out> {
             .map(drop)
     }
 
-    /// Character data from `start` to `stop`; `value` is what the parser resolved, or `None` when
-    /// it is literally those bytes. White space alone is left out.
+    /// Adds character data from `start` to `stop`. `value` is the value resolved by the parser, or
+    /// `None` if it equals those bytes. Pure white space is skipped.
     ///
     /// # Errors
-    /// When a capacity is exceeded, the range is outside of the text, or no element is open.
+    /// Fails if a capacity is exceeded, the range is outside of the text, or no element is open.
     pub fn text(&mut self, start: u32, stop: u32, value: Option<&str>) -> Result<(), BuildError> {
         let len = stop.checked_sub(start).ok_or(BuildError::OutsideText {
             offset: start,
@@ -215,18 +215,18 @@ impl<'out> ImageBuilder<'out> {
                 .all(|byte| matches!(byte, b' ' | b'\t' | b'\n' | b'\r'))
         };
         let literal = self.text_bytes(start, len);
-        // `&#32;` is white space that somebody wanted.
+        // The literal text is checked, because `&#32;` is intentional white space.
         if blank(literal) {
             return Ok(());
         }
         self.character_data(start, len, value)
     }
 
-    /// The content of a CDATA section, which lies from `start` to `stop`; `value` as for
+    /// Adds the content of a CDATA section from `start` to `stop`; `value` is as for
     /// [`text`](ImageBuilder::text). White space is kept.
     ///
     /// # Errors
-    /// As for [`text`](ImageBuilder::text).
+    /// Fails as [`text`](ImageBuilder::text) does.
     pub fn cdata(&mut self, start: u32, stop: u32, value: Option<&str>) -> Result<(), BuildError> {
         let len = stop.checked_sub(start).ok_or(BuildError::OutsideText {
             offset: start,
@@ -256,10 +256,10 @@ impl<'out> ImageBuilder<'out> {
         Ok(())
     }
 
-    /// The innermost open element ends; `end` is one past the `>` that ends it.
+    /// Closes the innermost open element; `end` is one past the `>` that ends it.
     ///
     /// # Errors
-    /// When no element is open, or `end` lies outside of the text.
+    /// Fails if no element is open, or if `end` is outside of the text.
     pub fn close_element(&mut self, end: u32) -> Result<(), BuildError> {
         self.check_range(end, 0)?;
         let index = self.open.pop().ok_or(BuildError::Misplaced {
@@ -273,10 +273,10 @@ impl<'out> ImageBuilder<'out> {
         Ok(())
     }
 
-    /// Something is wrong with the file at `offset` of the text (beyond the end means the end).
+    /// Adds a fault of the file at `offset` of the text (beyond the end means the end).
     ///
     /// # Errors
-    /// When the capacity of faults or heap is exceeded.
+    /// Fails if the capacity of faults or heap is exceeded.
     pub fn fault(&mut self, code: FaultCode, offset: u32, text: &str) -> Result<(), BuildError> {
         self.room(Section::Faults, size_of::<FaultRecord>())?;
         let text_offset = self.append(Section::Heap, text.as_bytes())?;
@@ -290,21 +290,21 @@ impl<'out> ImageBuilder<'out> {
             .map(drop)
     }
 
-    /// How many elements are open.
+    /// Returns the number of open elements.
     pub fn depth(&self) -> usize {
         self.open.len()
     }
 
-    /// Whether there has been a root element already.
+    /// Checks whether a root element already exists.
     pub fn has_root(&self) -> bool {
         self.used[Section::Nodes as usize] > 0
     }
 }
 
-/// What follows the first colon of a name that has a prefix.
+/// Returns the part of a name after the first colon, or the whole name if it has no prefix.
 #[inline]
 pub(crate) fn local_name(name: &str) -> &str {
-    // Few names have one, and all are short.
+    // Few names have a prefix, and all names are short.
     if !name.bytes().any(|byte| byte == b':') {
         return name;
     }

@@ -1,4 +1,4 @@
-//! The view over a finished image.
+//! View of a finished image.
 
 use bytemuck::Pod;
 use thiserror::Error;
@@ -12,28 +12,28 @@ use crate::node::{Named, Node};
 
 /// A parsed file, read in place.
 ///
-/// Two words to copy; hand it around by value.
+/// It consists of two words, so pass it by value.
 #[derive(Clone, Copy)]
 pub struct Document<'a> {
     header: &'a Header,
     bytes: &'a [u8],
 }
 
-/// Why bytes are no document image.
+/// Reason why bytes are not a document image.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ImageError {
-    /// Fewer bytes than the image says it has, or than a header has.
+    /// There are fewer bytes than the image or a header needs.
     #[error("read the document image: it ends after {found} of {needed} bytes")]
     Truncated {
-        /// Bytes at hand.
+        /// Available bytes.
         found: u64,
-        /// Bytes needed.
+        /// Required bytes.
         needed: u64,
     },
     /// The magic number is missing.
     #[error("read the document image: these bytes are something else")]
     NotAnImage,
-    /// Written by another version of qcbus.
+    /// The image was written by another version of qcbus.
     #[error(
         "read the document image: its layout has version {found}, this program reads version {expected}"
     )]
@@ -43,10 +43,10 @@ pub enum ImageError {
         /// Version of this program.
         expected: u32,
     },
-    /// A section lies outside of the image, is misaligned, or is no whole number of records.
+    /// A section is outside of the image, is misaligned, or is not a whole number of records.
     #[error("read the document image: the section of {section} is out of place")]
     Section {
-        /// Which one.
+        /// Name of the section.
         section: &'static str,
     },
     /// A record contradicts another one.
@@ -66,7 +66,7 @@ impl<'a> Document<'a> {
     /// longer than the image and may start at any address.
     ///
     /// # Errors
-    /// When the bytes are no image of this version, or end before the image does.
+    /// Fails if the bytes are not an image of this version, or end before the image does.
     pub fn open(bytes: &'a [u8]) -> Result<Document<'a>, ImageError> {
         let truncated = |needed: u64| ImageError::Truncated {
             found: bytes.len() as u64,
@@ -115,19 +115,19 @@ impl<'a> Document<'a> {
         behind_header && within && whole && offset % ALIGNMENT as u64 == 0
     }
 
-    /// The root element; `None` when the file has none.
+    /// Returns the root element, or `None` if the file has none.
     #[inline]
     pub fn root(&self) -> Option<Node<'a>> {
         self.node(0).filter(Node::is_element)
     }
 
-    /// The node at `index` in document order, which may be character data.
+    /// Returns the node at `index` in document order, which may be character data.
     #[inline]
     pub fn node(&self, index: u32) -> Option<Node<'a>> {
         self.node_record(index).map(|_| Node::new(*self, index))
     }
 
-    /// How many nodes there are: elements and runs of character data.
+    /// Returns the number of nodes: elements and runs of character data.
     #[expect(
         clippy::len_without_is_empty,
         reason = "a document without nodes is asked for its root"
@@ -137,8 +137,8 @@ impl<'a> Document<'a> {
         u32::try_from(bytes / size_of::<NodeRecord>() as u64).unwrap_or(0)
     }
 
-    /// The distinct names of the document in the order of their numbers: local names of elements,
-    /// names as written of attributes.
+    /// Returns the distinct names of the document in the order of their numbers. These are local
+    /// names of elements and attribute names as written.
     pub fn names(&self) -> impl Iterator<Item = &'a str> + use<'a> {
         let document = *self;
         let records: &'a [NameRecord] = document.records(Section::Names);
@@ -147,7 +147,7 @@ impl<'a> Document<'a> {
             .map(move |record| document.name_of(record).unwrap_or(""))
     }
 
-    /// The elements with this local name, in document order; costs nothing per other element.
+    /// Returns the elements with this local name in document order; other elements cost nothing.
     pub fn elements(&self, name: &str) -> Elements<'a> {
         let postings = self.name_id(name).map_or(&[][..], |id| self.postings(id));
         Elements {
@@ -156,17 +156,17 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// The elements with this local name, to be asked for within one subtree after the other.
+    /// Returns the elements with this local name, for queries in successive subtrees.
     pub fn named(&self, name: &str) -> Named<'a> {
         Named::new(*self, name)
     }
 
-    /// SHA-256 of the source bytes on disk, as ingest computed it.
+    /// Returns the SHA-256 of the source bytes on disk, as computed by ingest.
     pub fn content_hash(&self) -> [u8; 32] {
         self.header.content_hash
     }
 
-    /// What ingest found wrong, in the order in which it found it.
+    /// Returns the faults that ingest found, in the order of their discovery.
     pub fn faults(&self) -> impl Iterator<Item = Fault<'a>> + use<'a> {
         let document = *self;
         let records: &'a [FaultRecord] = self.records(Section::Faults);
@@ -179,23 +179,23 @@ impl<'a> Document<'a> {
         })
     }
 
-    /// Whether the tree is the whole file: no fault [makes it partial](FaultCode::makes_partial).
+    /// Checks whether the tree is complete: no fault [makes it partial](FaultCode::makes_partial).
     pub fn is_well_formed(&self) -> bool {
         !self.faults().any(|fault| fault.code.makes_partial())
     }
 
-    /// Bytes of the image, its header included.
+    /// Returns the size of the image in bytes, header included.
     pub fn size(&self) -> usize {
         self.bytes.len()
     }
 
-    /// Bytes of text of all sources together.
+    /// Returns the bytes of text of all sources together.
     pub fn text_len(&self) -> u32 {
         u32::try_from(self.section(Section::Text).len()).unwrap_or(u32::MAX)
     }
 }
 
-/// Reading records; nothing here panics, whatever the bytes are.
+/// Access to records. It never panics, for any content of the bytes.
 impl<'a> Document<'a> {
     #[inline]
     pub(crate) fn section(&self, section: Section) -> &'a [u8] {
@@ -233,7 +233,7 @@ impl<'a> Document<'a> {
         str_at(self.section(Section::Heap), offset, len)
     }
 
-    /// A resolved value, and where the text has it unresolved (offset, bytes).
+    /// Returns a resolved value with the position (offset, bytes) of its unresolved text.
     pub(crate) fn heap_value(&self, place: u32) -> Option<(&'a str, u32, u32)> {
         let rest = self.section(Section::Heap).get(place as usize..)?;
         let (head, rest) = rest.split_at_checked(size_of::<HeapRecord>())?;
@@ -259,7 +259,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// The bytes of a name, without the price of looking whether they are UTF-8: for comparing.
+    /// Returns the bytes of a name for comparison, without the cost of UTF-8 validation.
     fn name_bytes(&self, id: u16) -> &'a [u8] {
         let Some(record) = self.record::<NameRecord>(Section::Names, usize::from(id)) else {
             return &[];
@@ -275,7 +275,7 @@ impl<'a> Document<'a> {
             .unwrap_or(&[])
     }
 
-    /// Whether the name with this number is this one.
+    /// Checks whether the name with this number equals the given name.
     #[inline]
     pub(crate) fn is_name(&self, id: u16, name: &str) -> bool {
         self.record::<NameRecord>(Section::Names, usize::from(id))
@@ -285,7 +285,7 @@ impl<'a> Document<'a> {
     #[inline]
     fn is_record_of(&self, record: &NameRecord, name: &[u8]) -> bool {
         let len = record.len.get();
-        // Nearly all names of other lengths are told apart here.
+        // This length check rules out nearly all other names.
         if (len & !NAME_IN_HEAP) as usize != name.len() {
             return false;
         }
@@ -299,7 +299,7 @@ impl<'a> Document<'a> {
             .is_some_and(|found| same_bytes(found, name))
     }
 
-    /// What tells a name by its number, again and again.
+    /// Returns a matcher that repeatedly compares name numbers with one name.
     #[inline]
     pub(crate) fn matcher<'s>(&self, name: &'s str) -> NameMatcher<'a, 's> {
         NameMatcher {
@@ -309,7 +309,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// The id of a name by binary search over the sorted ids.
+    /// Returns the id of a name by binary search over the sorted ids.
     pub(crate) fn name_id(&self, name: &str) -> Option<u16> {
         let order: &[U16] = self.records(Section::NameOrder);
         let found = order
@@ -318,7 +318,7 @@ impl<'a> Document<'a> {
         Some(order[found].get())
     }
 
-    /// The elements of a name, as node indices in document order.
+    /// Returns the elements of a name, as node indices in document order.
     #[inline]
     pub(crate) fn postings(&self, id: u16) -> &'a [U32] {
         let postings: &'a [U32] = self.records(Section::Postings);
@@ -349,18 +349,18 @@ fn str_at(bytes: &[u8], offset: u32, len: u32) -> Option<&str> {
             unsafe_code,
             reason = "the standard library looks at short texts for four times as long"
         )]
-        // SAFETY: every byte was seen to be ASCII just now, which is UTF-8. Nothing is taken from an
-        // earlier look, and nothing rests on `validate`; as everywhere, a `&[u8]` does not change
-        // while it is borrowed, which is for whoever makes it of shared memory to see to.
+        // SAFETY: every byte was just checked to be ASCII, which is valid UTF-8. No earlier check
+        // and no result of `validate` is used. As everywhere, a `&[u8]` does not change while it is
+        // borrowed; the code that creates it from shared memory must ensure that.
         return Some(unsafe { std::str::from_utf8_unchecked(bytes) });
     }
     std::str::from_utf8(bytes).ok()
 }
 
-/// Up to this length, in bytes, texts are looked at word by word: names, ids, numbers.
+/// Maximum length in bytes of texts that are checked word by word: names, ids, numbers.
 const SHORT: usize = 64;
 
-/// Whether all bytes are ASCII; quick for a few of them.
+/// Checks whether all bytes are ASCII; fast for short texts.
 #[inline]
 fn is_ascii(bytes: &[u8]) -> bool {
     const HIGH: u64 = 0x8080_8080_8080_8080;
@@ -376,7 +376,7 @@ fn is_ascii(bytes: &[u8]) -> bool {
     }
 }
 
-/// Names as short as these are told apart faster here than by a call of `memcmp`.
+/// Compares short names faster than a call of `memcmp`.
 #[inline]
 fn same_bytes(one: &[u8], other: &[u8]) -> bool {
     match (one.first_chunk::<4>(), other.first_chunk::<4>()) {
@@ -389,7 +389,7 @@ fn same_bytes(one: &[u8], other: &[u8]) -> bool {
     }
 }
 
-/// Whether numbers stand for one name; see [`Document::matcher`].
+/// Checks whether numbers stand for one name; see [`Document::matcher`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NameMatcher<'a, 's> {
     document: Document<'a>,
@@ -408,7 +408,7 @@ impl NameMatcher<'_, '_> {
     }
 }
 
-/// The elements of one name in document order; made by [`Document::elements`].
+/// The elements of one name in document order; created by [`Document::elements`].
 #[derive(Clone, Debug)]
 pub struct Elements<'a> {
     document: Document<'a>,

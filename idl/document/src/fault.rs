@@ -1,32 +1,33 @@
-//! What ingest found wrong with a file's bytes, before any rule looked at its meaning.
+//! Faults that ingest finds in a file's bytes, before any rule checks its meaning.
 
 use crate::layout::FaultRecord;
 
-/// A fault of the file itself, at a place in the image's text.
+/// A fault of the file itself, at an offset of the image's text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault<'a> {
-    /// What sort of fault.
+    /// Kind of fault.
     pub code: FaultCode,
-    /// Where, as an offset of the image's text (see [`crate::Document::position`]).
+    /// Offset in the image's text (see [`crate::Document::position`]).
     pub offset: u32,
-    /// What was found and what is allowed, for people.
+    /// Text for people: found and allowed content.
     pub text: &'a str,
 }
 
-/// What a fault is about.
+/// Subject of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FaultGroup {
-    /// The text breaks XML's own grammar.
+    /// The text breaks the grammar of XML.
     NotWellFormed,
-    /// The text follows XML's grammar, but not that of its namespaces.
+    /// The text follows the grammar of XML, but not that of its namespaces.
     Namespaces,
-    /// A document type declaration of more than a name, which qcbus refuses (it can pull in files and blow up).
+    /// A document type declaration with more than a name. qcbus refuses it, because it can include
+    /// files and expand to a huge size.
     Doctype,
-    /// Bytes and their declared encoding.
+    /// The bytes and their declared encoding.
     Encoding,
     /// `<include>` of OpenDRIVE.
     Include,
-    /// A bound that protects the machine was hit.
+    /// The file exceeds a limit that protects the machine.
     Limit,
     /// gzip and zip around the XML.
     Archive,
@@ -34,7 +35,7 @@ pub enum FaultGroup {
 
 macro_rules! fault_codes {
     ($($(#[$doc:meta])* $code:ident = $number:literal, $name:literal, $group:ident, $partial:literal;)*) => {
-        /// The sorts of faults; numbers and names are stable.
+        /// Kinds of faults; numbers and names are stable.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         #[repr(u32)]
         pub enum FaultCode {
@@ -42,21 +43,21 @@ macro_rules! fault_codes {
         }
 
         impl FaultCode {
-            /// Every code, by number.
+            /// All codes in the order of their numbers.
             pub const ALL: &'static [FaultCode] = &[$(FaultCode::$code,)*];
 
-            /// The stable name, in kebab case.
+            /// Returns the stable name, in kebab case.
             pub fn as_str(self) -> &'static str {
                 match self { $(FaultCode::$code => $name,)* }
             }
 
-            /// What the fault is about.
+            /// Returns the subject of the fault.
             pub fn group(self) -> FaultGroup {
                 match self { $(FaultCode::$code => FaultGroup::$group,)* }
             }
 
-            /// Whether the tree may lack or misplace parts of the file, so that rules about its
-            /// meaning would talk nonsense and must be skipped.
+            /// Checks whether the tree may lack or misplace parts of the file. Rules about its
+            /// meaning would then give wrong results and must be skipped.
             pub fn makes_partial(self) -> bool {
                 match self { $(FaultCode::$code => $partial,)* }
             }
@@ -69,31 +70,31 @@ macro_rules! fault_codes {
 }
 
 fault_codes! {
-    /// Breaks the grammar in a way no other code names.
+    /// A violation of the grammar without a code of its own.
     Syntax = 1, "syntax", NotWellFormed, true;
-    /// An end tag that closes another element than the open one, or none at all.
+    /// An end tag that does not match the open element, or without an open element.
     MismatchedTag = 2, "mismatched-tag", NotWellFormed, true;
-    /// A second element at the top.
+    /// A second element at the top level.
     SecondRoot = 3, "second-root", NotWellFormed, true;
     /// Character data before or after the root element.
     TextOutsideRoot = 4, "text-outside-root", NotWellFormed, true;
-    /// A name with characters that names may not have.
+    /// A name with forbidden characters.
     BadName = 5, "bad-name", NotWellFormed, true;
     /// A character that XML 1.0 forbids everywhere, such as NUL.
     BadCharacter = 6, "bad-character", NotWellFormed, true;
-    /// Two attributes of one element with one name.
+    /// Two attributes of one element with the same name.
     DuplicateAttribute = 7, "duplicate-attribute", NotWellFormed, true;
     /// No space between two attributes.
     MissingSpace = 8, "missing-space", NotWellFormed, true;
     /// The text ends within an element, a tag, a comment or a CDATA section.
     Unclosed = 9, "unclosed", NotWellFormed, true;
-    /// No element at all.
+    /// There is no element.
     NoRoot = 10, "no-root", NotWellFormed, true;
-    /// No byte at all, or white space only.
+    /// The file is empty or contains only white space.
     Empty = 11, "empty", NotWellFormed, true;
     /// An attribute without value or quotes, or with `<` in its value.
     BadAttribute = 12, "bad-attribute", NotWellFormed, true;
-    /// `&…` that is no predefined entity and no reference to an allowed character.
+    /// `&…` that is neither a predefined entity nor a reference to an allowed character.
     BadReference = 13, "bad-reference", NotWellFormed, true;
     /// `--` within a comment, or a comment that ends in `--->`.
     BadComment = 14, "bad-comment", NotWellFormed, true;
@@ -104,16 +105,16 @@ fault_codes! {
     /// A prefix that no `xmlns:` binds.
     UnboundPrefix = 17, "unbound-prefix", Namespaces, true;
 
-    /// A document type declaration that says more than a name, or stands where none may.
+    /// A document type declaration with more than a name, or in a forbidden position.
     Doctype = 32, "doctype", Doctype, true;
 
-    /// Bytes that do not decode in the encoding that they should have.
+    /// Bytes that are invalid in the expected encoding.
     EncodingMalformed = 48, "encoding-malformed", Encoding, true;
-    /// The declaration names an encoding that the bytes do not have.
+    /// The declaration names an encoding that does not match the bytes.
     EncodingMismatch = 49, "encoding-mismatch", Encoding, false;
-    /// The declaration names an encoding that nobody knows.
+    /// The declaration names an unknown encoding.
     EncodingUnknown = 50, "encoding-unknown", Encoding, true;
-    /// Another encoding than UTF-8, transcoded without loss.
+    /// An encoding other than UTF-8, transcoded without loss.
     EncodingTranscoded = 51, "encoding-transcoded", Encoding, false;
 
     /// The file of an `<include>` does not exist or cannot be read.
@@ -141,29 +142,29 @@ fault_codes! {
     FaultLimit = 84, "fault-limit", Limit, true;
     /// Unpacked data larger than allowed.
     UnpackedLimit = 85, "unpacked-limit", Limit, true;
-    /// Packed so tightly that it looks like a bomb.
+    /// The compression ratio is so high that the file looks like a zip bomb.
     RatioLimit = 86, "ratio-limit", Limit, true;
 
     /// A gzip stream that ends early.
     GzipTruncated = 96, "gzip-truncated", Archive, true;
-    /// A gzip stream that is damaged, or none although the name says so.
+    /// A gzip stream that is damaged, or missing although the name suggests one.
     GzipMalformed = 97, "gzip-malformed", Archive, true;
     /// A zip archive that ends early.
     ArchiveTruncated = 98, "archive-truncated", Archive, true;
-    /// A zip archive that is damaged, encrypted, or none although the name says so.
+    /// A zip archive that is damaged, encrypted, or missing although the name suggests one.
     ArchiveMalformed = 99, "archive-malformed", Archive, true;
-    /// A member that should be there is not.
+    /// A required member is missing.
     ArchiveMemberMissing = 100, "archive-member-missing", Archive, true;
-    /// A member whose name leads out of the archive.
+    /// A member with a name that leads out of the archive.
     ArchiveEscapes = 101, "archive-escapes", Archive, true;
     /// More members than allowed.
     ArchiveLimit = 102, "archive-limit", Archive, true;
-    /// Two members with one name.
+    /// Two members with the same name.
     ArchiveDuplicate = 103, "archive-duplicate", Archive, true;
 }
 
 impl FaultCode {
-    /// The number under which an image stores it.
+    /// Returns the number that an image stores for it.
     pub(crate) fn number(self) -> u32 {
         self as u32
     }

@@ -1,7 +1,7 @@
 //! Bodies of fuzz targets, shared by `cargo fuzz` and the seeded tests, and a small writer that
 //! makes images without a parser.
 //!
-//! No part of the public interface: it may change at any time.
+//! This module is not part of the public interface. It may change at any time.
 
 mod tree;
 
@@ -9,12 +9,12 @@ pub use tree::{Child, Tree};
 
 use crate::{BuildError, Capacities, Document, FaultCode, ImageBuilder, Node, XPaths};
 
-/// A small generator of random numbers (SplitMix64): the same numbers on every machine.
+/// A small random generator (SplitMix64) with the same numbers on every machine.
 #[derive(Clone, Debug)]
 pub struct Random(pub u64);
 
 impl Random {
-    /// The next number.
+    /// Returns the next number.
     pub fn number(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut mixed = self.0;
@@ -23,19 +23,19 @@ impl Random {
         mixed ^ (mixed >> 31)
     }
 
-    /// A number below `bound` (0 when that is 0).
+    /// Returns a number below `bound` (0 if that is 0).
     pub fn below(&mut self, bound: usize) -> usize {
         (self.number() % bound.max(1) as u64) as usize
     }
 }
 
-/// Spoils an image in one to eight places: bits, bytes, words, stretches, its length.
+/// Corrupts an image in one to eight places: bits, bytes, words, ranges, its length.
 pub fn corrupt(image: &mut Vec<u8>, random: &mut Random) {
     for _ in 0..=random.below(8) {
         if image.is_empty() {
             return;
         }
-        // Half of the blows go to the header and the columns right behind it.
+        // Half of the changes affect the header and the columns directly after it.
         let at = if random.below(2) == 0 {
             random.below(image.len().min(512))
         } else {
@@ -66,18 +66,19 @@ fn overwrite(image: &mut [u8], at: usize, bytes: &[u8]) {
     }
 }
 
-/// What became of bytes that claim to be an image.
+/// Result of reading bytes that may be an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// `open` refused them.
+    /// `open` rejected them.
     Refused,
-    /// They opened and could be walked, but `validate` found a contradiction.
+    /// They could be opened and walked, but `validate` found a contradiction.
     Contradictory,
-    /// They are a sound image, and every promise about sound images held.
+    /// They are a valid image, and all guarantees for valid images hold.
     Sound,
 }
 
-/// Fuzz body: any bytes are refused or can be walked; sound ones keep their promises.
+/// Reads any bytes as a fuzz body. They are rejected or can be walked, and valid images keep their
+/// guarantees.
 pub fn read_image(bytes: &[u8]) -> Outcome {
     let Ok(document) = Document::open(bytes) else {
         return Outcome::Refused;
@@ -90,7 +91,7 @@ pub fn read_image(bytes: &[u8]) -> Outcome {
     Outcome::Sound
 }
 
-/// Calls every accessor; returns a number that depends on all answers, so that none is optimised
+/// Calls every accessor. Returns a number that depends on all answers, so that no call is optimised
 /// away.
 pub fn walk(document: Document<'_>) -> u64 {
     let mut sum = u64::from(document.len()) + document.path().len() as u64 + document.size() as u64;
@@ -106,7 +107,7 @@ pub fn walk(document: Document<'_>) -> u64 {
         .sum::<u64>();
     sum += u64::from(document.is_well_formed());
     let mut paths = XPaths::new(document);
-    // Also indices that do not exist.
+    // Indices that do not exist are included.
     for index in (0..document.len().min(200)).chain([document.len(), u32::MAX - 1, u32::MAX]) {
         let Some(node) = document.node(index) else {
             continue;
@@ -146,13 +147,13 @@ fn walk_node(node: Node<'_>) -> u64 {
     sum
 }
 
-/// As many items as a walk takes from what may be long.
+/// Maximum number of items that a walk takes from a long sequence.
 const SOME: usize = 100;
 
-/// What holds of every sound image.
+/// Checks the guarantees of every valid image.
 ///
 /// # Panics
-/// When it does not.
+/// If a guarantee does not hold.
 pub fn check_promises(document: Document<'_>) {
     let elements: Vec<Node<'_>> = document.root().map_or(Vec::new(), |root| {
         std::iter::once(root).chain(root.descendants()).collect()
@@ -199,8 +200,8 @@ pub fn check_promises(document: Document<'_>) {
     }
 }
 
-/// Fuzz body: any order of events is refused or makes an image that opens; and when the ranges
-/// cut no character, a sound one.
+/// Builds an image from any order of events, as a fuzz body. The events are rejected, or the image
+/// can be opened. It is valid if no range cuts a character.
 pub fn build_image(data: &[u8]) -> Result<Vec<u8>, BuildError> {
     let mut script = data.iter().copied();
     let mut next = || script.next().map_or(0, usize::from);
@@ -216,7 +217,7 @@ pub fn build_image(data: &[u8]) -> Result<Vec<u8>, BuildError> {
     let mut out = vec![0xA5; capacities.image_len() + next() % 3];
     let mut builder = ImageBuilder::new(&mut out, &capacities)?;
     for _ in 0..64 {
-        // An event that does not fit is refused and must leave the rest as it was.
+        // An invalid event is rejected and must not change the rest.
         let _ = one_event(&mut builder, &mut next);
     }
     let used = builder.finish([7; 32])?;

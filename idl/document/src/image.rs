@@ -1,4 +1,4 @@
-//! An image that somebody owns.
+//! An image that owns its bytes.
 
 use std::fmt;
 use std::ops::Deref;
@@ -6,21 +6,21 @@ use std::sync::Arc;
 
 use crate::{Document, ImageError};
 
-/// The bytes of an image, wherever they are: they stay readable as long as any clone lives. For
-/// those who keep what they made of a document longer than they were given it.
+/// The bytes of an image, in any kind of memory. They stay readable as long as any clone lives. Use
+/// it to keep results made from a document after the document is returned.
 #[derive(Clone)]
 pub struct Image(Arc<dyn AsRef<[u8]> + Send + Sync>);
 
 impl Image {
-    /// An image in these bytes, which may be held in shared memory.
+    /// Creates an image from these bytes, which may lie in shared memory.
     pub fn new(bytes: impl AsRef<[u8]> + Send + Sync + 'static) -> Image {
         Image(Arc::new(bytes))
     }
 
-    /// The document, read in place.
+    /// Returns the document, which is read in place.
     ///
     /// # Errors
-    /// As [`Document::open`].
+    /// The errors of [`Document::open`].
     pub fn document(&self) -> Result<Document<'_>, ImageError> {
         Document::open(self)
     }

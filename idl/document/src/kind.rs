@@ -1,4 +1,4 @@
-//! What sort of file a document is, told from its name alone.
+//! Detection of a file's kind from its name alone.
 
 use std::path::Path;
 
@@ -16,14 +16,14 @@ pub enum FileKind {
     Mosc,
 }
 
-/// A suffix of file names and what it promises.
+/// The suffix of file names that belongs to a file format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Suffix {
-    /// With its dot, in lower case.
+    /// The suffix with its dot, in lower case.
     pub text: &'static str,
     /// The kind of file.
     pub kind: FileKind,
-    /// Whether the file is packed by gzip.
+    /// Whether the file is compressed with gzip.
     pub packed: bool,
 }
 
@@ -37,7 +37,7 @@ const fn packed(text: &'static str, kind: FileKind) -> Suffix {
     Suffix { text, kind, packed }
 }
 
-/// The suffixes of all files that qcbus checks, the one table of them.
+/// The only table of the suffixes of all files that qcbus checks.
 pub const SUFFIXES: [Suffix; 5] = [
     plain(".xodr", FileKind::Xodr),
     packed(".xodrz", FileKind::Xodr),
@@ -47,32 +47,32 @@ pub const SUFFIXES: [Suffix; 5] = [
 ];
 
 impl Suffix {
-    /// The suffix of a file's name, compared without regard to case; `None` when it is none of
-    /// [`SUFFIXES`] or the whole name.
+    /// Returns the suffix of a file's name; upper and lower case are equal. Returns `None` when the
+    /// suffix is not in [`SUFFIXES`] or is the whole name.
     pub fn of_path(path: &Path) -> Option<Suffix> {
-        // Only the end of a name counts; the rest of it need not be UTF-8.
+        // Only the end of a name matters, so the rest may be invalid UTF-8.
         let name = path.file_name()?.as_encoded_bytes().to_ascii_lowercase();
         let ends = |it: &Suffix| name.len() > it.text.len() && name.ends_with(it.text.as_bytes());
         SUFFIXES.into_iter().find(ends)
     }
 
-    /// All of them, for a message: `.xodr .xodrz ...`.
+    /// Returns all suffixes as text for a message: `.xodr .xodrz ...`.
     pub fn list() -> String {
         SUFFIXES.map(|it| it.text).join(" ")
     }
 }
 
 impl FileKind {
-    /// Every kind, in a fixed order.
+    /// All kinds, in a fixed order.
     pub const ALL: [FileKind; 3] = [FileKind::Xodr, FileKind::Xosc, FileKind::Mosc];
 
-    /// The kind that a file's name promises (suffixes are compared without regard to case), or
-    /// `None` when qcbus does not check such files.
+    /// Returns the kind that belongs to the suffix of a file's name; upper and lower case are
+    /// equal. Returns `None` when qcbus does not check such files.
     pub fn of_path(path: &Path) -> Option<FileKind> {
         Suffix::of_path(path).map(|suffix| suffix.kind)
     }
 
-    /// The kind's short name, `xodr`, `xosc` or `mosc`.
+    /// Returns the kind's short name: `xodr`, `xosc` or `mosc`.
     pub fn as_str(self) -> &'static str {
         match self {
             FileKind::Xodr => "xodr",

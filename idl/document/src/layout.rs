@@ -1,23 +1,23 @@
-//! How an image lies in memory: the one place that knows offsets, record sizes and magic numbers.
+//! Memory layout of an image: the only module that knows offsets, record sizes and magic numbers.
 //!
-//! All integers are little-endian byte arrays with an alignment of one, so a record can be read
-//! from any address on any machine by a checked cast; sections still start on multiples of 64
-//! bytes, so that no record needlessly straddles a cache line at the start of its column.
+//! All integers are little-endian byte arrays with an alignment of one. A checked cast can
+//! therefore read a record from any address on any machine. Sections still start on multiples of 64
+//! bytes. No record at the start of its column then crosses a cache line needlessly.
 
 use bytemuck::{Pod, Zeroable};
 
 /// First eight bytes of every image.
 pub(crate) const MAGIC: [u8; 8] = *b"qcbusDOC";
-/// Raised whenever the meaning of a byte changes; images never outlive a broker, so no version
-/// but this one is ever read.
+/// Format version, raised whenever the meaning of a byte changes. Images never outlive a broker, so
+/// readers only ever find this version.
 pub(crate) const VERSION: u32 = 1;
 /// Sections start on multiples of this many bytes.
 pub(crate) const ALIGNMENT: usize = 64;
-/// Rows and columns are remembered every so many bytes of text.
+/// Distance between two row and column checkpoints, in bytes of text.
 pub(crate) const LINE_STRIDE: usize = 4096;
-/// "No node": the parent of the root.
+/// Stands for "no node": the parent of the root.
 pub(crate) const NONE: u32 = u32::MAX;
-/// Set in [`NameRecord::len`] when the name lies in the heap instead of the text.
+/// Bit in [`NameRecord::len`] that is set when the name lies in the heap instead of the text.
 pub(crate) const NAME_IN_HEAP: u32 = 1 << 31;
 
 macro_rules! little_endian {
@@ -44,10 +44,10 @@ little_endian!(U16, u16, 2);
 little_endian!(U32, u32, 4);
 little_endian!(U64, u64, 8);
 
-/// The columns of an image, in the order in which they lie behind the header.
+/// The columns of an image, in their order behind the header.
 ///
-/// The text comes first because its length is known exactly before building, so it never moves;
-/// the heap comes last because its length is known least.
+/// The text comes first because its length is known exactly before building, so it never moves. The
+/// heap comes last because its length is the hardest to predict.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Section {
     Text,
@@ -62,11 +62,11 @@ pub(crate) enum Section {
     Heap,
 }
 
-/// How many sections there are.
+/// Number of sections.
 pub(crate) const SECTIONS: usize = 10;
 
 impl Section {
-    /// Every section in image order, with the size of its records.
+    /// All sections in image order, with the size of their records.
     pub(crate) const ALL: [(Section, usize); SECTIONS] = [
         (Section::Text, 1),
         (Section::Nodes, size_of::<NodeRecord>()),
@@ -80,7 +80,7 @@ impl Section {
         (Section::Heap, 1),
     ];
 
-    /// The word for it in error messages.
+    /// Returns the section's name for error messages.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Section::Text => "text",
@@ -97,7 +97,7 @@ impl Section {
     }
 }
 
-/// Where a section lies, in bytes from the start of the image.
+/// Position of a section, in bytes from the start of the image.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Extent {
@@ -111,9 +111,9 @@ pub(crate) struct Extent {
 pub(crate) struct Header {
     pub(crate) magic: [u8; 8],
     pub(crate) version: U32,
-    /// Zero; here so that a later version can say more without moving anything.
+    /// Always zero. Reserved so that a later version can add flags without moving other fields.
     pub(crate) flags: U32,
-    /// Bytes of the whole image, this header included.
+    /// Size of the whole image in bytes, including this header.
     pub(crate) total: U64,
     pub(crate) content_hash: [u8; 32],
     pub(crate) extents: [Extent; SECTIONS],
@@ -122,14 +122,14 @@ pub(crate) struct Header {
 
 /// An element or a run of character data, in document order; 24 bytes.
 ///
-/// The first child of an element is the next record, its next sibling is the record at `end`.
-/// Attributes of record `i` are those from its `first_attribute` up to that of record `i + 1`.
+/// The first child of an element is the next record; its next sibling is the record at `end`.
+/// Record `i` owns the attributes from its `first_attribute` up to that of record `i + 1`.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct NodeRecord {
     /// Offset of `<`, or of the first character of character data.
     pub(crate) start: U32,
-    /// One past the last byte; for resolved character data the place of its [`HeapRecord`].
+    /// One past the last byte. For resolved character data: the position of its [`HeapRecord`].
     pub(crate) stop: U32,
     pub(crate) parent: U32,
     /// One past the last record of the subtree.
@@ -141,7 +141,7 @@ pub(crate) struct NodeRecord {
 
 /// [`NodeRecord::kind`] of an element.
 pub(crate) const ELEMENT: u16 = 0;
-/// Character data that is literally the text from `start` to `stop`.
+/// Character data that equals the text from `start` to `stop`.
 pub(crate) const TEXT: u16 = 1;
 /// Character data that differs from the text (entities, line ends) and lies in the heap.
 pub(crate) const RESOLVED_TEXT: u16 = 2;
@@ -153,44 +153,44 @@ pub(crate) struct AttributeRecord {
     /// Offset of the name.
     pub(crate) offset: U32,
     pub(crate) name: U16,
-    /// From the name's offset to the value's first byte; zero when the value lies in the heap.
+    /// Distance from the name to the value's first byte; zero when the value lies in the heap.
     pub(crate) value_delta: U16,
-    /// Bytes of the value; the place of the [`HeapRecord`] when the value lies in the heap.
+    /// Length of the value in bytes; position of the [`HeapRecord`] when it lies in the heap.
     pub(crate) value_len: U32,
 }
 
-/// What stands in the heap before the bytes of a value that differs from the text.
+/// Header in the heap before the bytes of a value that differs from the text.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct HeapRecord {
-    /// Where the text has the unresolved value.
+    /// Offset of the unresolved value in the text.
     pub(crate) offset: U32,
-    /// Bytes of the unresolved value in the text.
+    /// Length of the unresolved value in the text, in bytes.
     pub(crate) raw_len: U32,
-    /// Bytes that follow here.
+    /// Number of value bytes that follow this record.
     pub(crate) len: U32,
 }
 
-/// A distinct name: local name of elements, name as written of attributes; 16 bytes.
+/// A distinct name: the local name of elements, or the name of attributes as written; 16 bytes.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct NameRecord {
     /// Offset of one occurrence in the text (or in the heap).
     pub(crate) offset: U32,
-    /// Bytes; the top bit is [`NAME_IN_HEAP`].
+    /// Length in bytes; the top bit is [`NAME_IN_HEAP`].
     pub(crate) len: U32,
-    /// The elements of this name: a range of the postings.
+    /// Start of the range of postings that lists the elements of this name.
     pub(crate) first_posting: U32,
     pub(crate) postings: U32,
 }
 
-/// What lies before a multiple of [`LINE_STRIDE`] within the same source file.
+/// Counts before a multiple of [`LINE_STRIDE`] within the same source file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct LineRecord {
-    /// Line feeds since the start of the file.
+    /// Number of line feeds since the start of the file.
     pub(crate) feeds: U32,
-    /// Characters since the last of them.
+    /// Number of characters since the last line feed.
     pub(crate) characters: U32,
 }
 
@@ -204,7 +204,7 @@ pub(crate) struct SourceRecord {
     pub(crate) len: U32,
 }
 
-/// Something that ingest found wrong.
+/// A fault that ingest found.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct FaultRecord {

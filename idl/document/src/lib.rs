@@ -1,14 +1,14 @@
 //! The document image: one parsed file as one flat, relocatable block of bytes that any process
 //! reads in place.
 //!
-//! The broker's ingest drives an [`ImageBuilder`] that writes straight into a loaned buffer;
-//! everybody else [opens](Document::open) the finished bytes as a [`Document`] and walks
-//! [`Node`]s. Opening costs the same for one kilobyte and for one gigabyte: nothing is decoded,
-//! nothing is copied. Every accessor is bounds-checked: bytes that are no sound image lead to an
-//! error or to "absent", never to a panic, an endless loop or undefined behaviour. Whether they
-//! also tell the *truth* about the text they carry is what [`Document::validate`] answers.
+//! The broker's ingest drives an [`ImageBuilder`] that writes directly into a loaned buffer. All
+//! other code [opens](Document::open) the finished bytes as a [`Document`] and walks [`Node`]s.
+//! Opening costs the same for one kilobyte and for one gigabyte, because it decodes and copies
+//! nothing. Every accessor is bounds-checked. An invalid image leads to an error or to "absent",
+//! never to a panic, an endless loop or undefined behaviour. [`Document::validate`] checks whether
+//! the image also describes its text *correctly*.
 //!
-//! This crate knows neither XML syntax nor files: what is well-formed is ingest's knowledge.
+//! This crate knows neither XML syntax nor files. Ingest decides whether a file is well-formed.
 
 mod attribute;
 mod builder;

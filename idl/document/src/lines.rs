@@ -1,8 +1,8 @@
-//! Counting line feeds and characters, fast enough to do it for every byte of every file.
+//! Counting of line feeds and characters, fast enough for every byte of every file.
 
 use crate::layout::{LINE_STRIDE, LineRecord, U32};
 
-/// Line feeds, and characters since the last of them.
+/// Number of line feeds, and number of characters since the last one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Tally {
     pub(crate) feeds: u32,
@@ -24,8 +24,8 @@ impl Tally {
         }
     }
 
-    /// Goes on over `text`, which may start and end within a character: a character is counted
-    /// where its first byte is.
+    /// Continues the count over `text`, which may start and end within a character. A character is
+    /// counted at its first byte.
     pub(crate) fn count(&mut self, text: &[u8]) {
         let last_line = match text.iter().rposition(|&byte| byte == b'\n') {
             Some(feed) => {
@@ -42,8 +42,8 @@ impl Tally {
     }
 }
 
-/// The checkpoints of a text made of files that start at `starts` (ascending, the first at 0),
-/// one for each started stride.
+/// Returns the checkpoints of a text, one for each started stride. The text consists of files that
+/// start at `starts` (ascending, the first at 0).
 pub(crate) fn checkpoints<'t>(
     text: &'t [u8],
     starts: impl Iterator<Item = usize> + 't,
@@ -60,7 +60,7 @@ pub(crate) fn checkpoints<'t>(
             let record = tally.record();
             let mut from = 0;
             while let Some(start) = starts.next_if(|&start| start < begin + chunk.len()) {
-                // The stride holds the start of another file: only what follows it counts.
+                // Another file starts within this stride, so only the bytes after its start count.
                 tally = Tally::default();
                 from = start.saturating_sub(begin);
             }
@@ -69,8 +69,8 @@ pub(crate) fn checkpoints<'t>(
         })
 }
 
-/// How many bytes satisfy `wanted`; blocks whose count fits into one byte, so that the compiler
-/// makes vector code of it.
+/// Counts the bytes that satisfy `wanted`. The count of a block fits into one byte, so that the
+/// compiler can vectorise the loop.
 fn occurrences(text: &[u8], wanted: impl Fn(u8) -> bool) -> u32 {
     let count = |block: &[u8]| block.iter().map(|&byte| u8::from(wanted(byte))).sum::<u8>();
     let (blocks, rest) = text.as_chunks::<128>();

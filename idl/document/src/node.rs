@@ -1,4 +1,4 @@
-//! One element (or run of character data) and the ways from it to others.
+//! One element (or run of character data) and the navigation from it to others.
 
 use std::borrow::Cow;
 use std::cmp::Ordering;
@@ -10,10 +10,10 @@ use crate::layout::{ELEMENT, NodeRecord, RESOLVED_TEXT, Section, TEXT};
 use crate::source::Position;
 use crate::value::{self, ValueError};
 
-/// A node of a document: an element, unless its [`is_element`](Node::is_element) says otherwise;
+/// A node of a document. It is an element unless [`is_element`](Node::is_element) returns `false`;
 /// the navigation below leads to elements only.
 ///
-/// Nodes compare by their place in the document; nodes of different images are never equal.
+/// Nodes compare by their position in the document. Nodes of different images are never equal.
 #[derive(Clone, Copy)]
 pub struct Node<'a> {
     document: Document<'a>,
@@ -26,7 +26,7 @@ impl<'a> Node<'a> {
         Node { document, index }
     }
 
-    /// The local name, without prefix; empty for character data.
+    /// Returns the local name, without prefix; empty for character data.
     #[inline]
     pub fn name(&self) -> &'a str {
         match self.record() {
@@ -35,8 +35,9 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// The number of its name within this image, the same for equal names, below 65,535; that
-    /// number itself for character data. Lets a consumer look each distinct name up once.
+    /// Returns the number of its name within this image. Equal names have the same number, which is
+    /// below 65,535; character data has 65,535. A consumer can thus look each distinct name up
+    /// once.
     #[inline]
     pub fn name_number(&self) -> u16 {
         match self.record() {
@@ -45,22 +46,22 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// One past the index of the last node within it: with [`Document::node`], the way to walk
-    /// elements and character data in one pass.
+    /// Returns one past the index of the last node within it. With [`Document::node`], a caller can
+    /// walk elements and character data in one pass.
     #[inline]
     pub fn subtree_end(&self) -> u32 {
         self.end()
     }
 
-    /// The characters of a run of character data, entities resolved; empty for an element.
+    /// Returns the characters of a run of character data, entities resolved; empty for an element.
     #[inline]
     pub fn character_run(&self) -> &'a str {
         self.record()
             .map_or("", |record| self.document.character_data(record))
     }
 
-    /// Where a run of character data is written in the image's text, entities unresolved; empty for
-    /// an element.
+    /// Returns the range of a run of character data in the image's text, entities unresolved; empty
+    /// for an element.
     pub fn character_range(&self) -> std::ops::Range<u32> {
         let written = self.record().and_then(|record| {
             let start = record.start.get();
@@ -76,7 +77,7 @@ impl<'a> Node<'a> {
         written.unwrap_or(0..0)
     }
 
-    /// The namespace prefix as written, empty when there is none.
+    /// Returns the namespace prefix as written, empty when there is none.
     pub fn prefix(&self) -> &'a str {
         let name = self.name();
         let written = self.record().and_then(|record| {
@@ -95,7 +96,7 @@ impl<'a> Node<'a> {
         written.unwrap_or("")
     }
 
-    /// Whether it is an element with this local name.
+    /// Checks whether it is an element with this local name.
     #[inline]
     pub fn is(&self, name: &str) -> bool {
         self.record().is_some_and(|record| {
@@ -103,33 +104,33 @@ impl<'a> Node<'a> {
         })
     }
 
-    /// Whether it is an element and not character data.
+    /// Checks whether it is an element and not character data.
     #[inline]
     pub fn is_element(&self) -> bool {
         self.record()
             .is_some_and(|record| record.kind.get() == ELEMENT)
     }
 
-    /// Its place in document order, for [`Document::node`].
+    /// Returns its position in document order, for [`Document::node`].
     #[inline]
     pub fn index(&self) -> u32 {
         self.index
     }
 
-    /// The document it belongs to.
+    /// Returns the document it belongs to.
     #[inline]
     pub fn document(&self) -> Document<'a> {
         self.document
     }
 
-    /// The value of an attribute, entities resolved. Prefixed attributes go by their name as
-    /// written (`xsi:type`).
+    /// Returns the value of an attribute, entities resolved. The name of a prefixed attribute
+    /// includes its prefix (`xsi:type`).
     #[inline]
     pub fn attr(&self, name: &str) -> Option<&'a str> {
         self.attribute(name).map(|attribute| attribute.value())
     }
 
-    /// An attribute by its name as written.
+    /// Returns an attribute by its name as written.
     pub fn attribute(&self, name: &str) -> Option<Attribute<'a>> {
         let mut records = self.document.attribute_records(self.index).iter();
         let matcher = self.document.matcher(name);
@@ -137,26 +138,26 @@ impl<'a> Node<'a> {
         Some(Attribute::new(*self, record))
     }
 
-    /// All attributes in the order in which they are written, `xmlns` declarations included.
+    /// Returns all attributes in the order of the text, including `xmlns` declarations.
     #[inline]
     pub fn attributes(&self) -> Attributes<'a> {
         Attributes::new(*self, self.document.attribute_records(self.index))
     }
 
-    /// The attribute's value as a double, in XML Schema's spelling (`INF`, not `inf`), XML white
-    /// space around it ignored. Whether it must be finite is the caller's question.
+    /// Returns the attribute's value as a double, spelt as in XML Schema (`INF`, not `inf`). XML
+    /// white space around it is ignored. The caller decides whether it must be finite.
     ///
     /// # Errors
-    /// When the attribute is missing, is no number, or is beyond what a double holds.
+    /// The attribute is missing, is not a number, or is outside the range of a double.
     pub fn f64(&self, name: &'a str) -> Result<f64, ValueError<'a>> {
         value::parse_f64(self.required(name)?)
     }
 
-    /// The attribute's value as an integer, in XML Schema's spelling, XML white space around it
-    /// ignored.
+    /// Returns the attribute's value as an integer. The value must be spelt as in XML Schema. XML
+    /// white space around it is ignored.
     ///
     /// # Errors
-    /// When the attribute is missing, is no integer, or is beyond 64 bits.
+    /// The attribute is missing, is not an integer, or needs more than 64 bits.
     pub fn i64(&self, name: &'a str) -> Result<i64, ValueError<'a>> {
         value::parse_i64(self.required(name)?)
     }
@@ -166,17 +167,18 @@ impl<'a> Node<'a> {
             .ok_or(ValueError::Missing { node: *self, name })
     }
 
-    /// The element it lies in; `None` for the root.
+    /// Returns the element that contains it; `None` for the root.
     #[inline]
     pub fn parent(&self) -> Option<Node<'a>> {
         let parent = self.record()?.parent.get();
-        // Parents come first; anything else is corrupt and could lead round in circles.
+        // Parents come first. A different order means a corrupt image and could cause an endless
+        // loop.
         (parent < self.index)
             .then(|| Node::new(self.document, parent))
             .filter(Node::is_element)
     }
 
-    /// The elements directly within it.
+    /// Returns the child elements.
     #[inline]
     pub fn children(&self) -> Children<'a> {
         let records = self.document.records(Section::Nodes);
@@ -194,12 +196,12 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// The first element of this name directly within it.
+    /// Returns the first child element of this name.
     pub fn child(&self, name: &str) -> Option<Node<'a>> {
         self.children_named(name).next()
     }
 
-    /// The elements of this name directly within it.
+    /// Returns the child elements of this name.
     pub fn children_named<'s>(&self, name: &'s str) -> ChildrenNamed<'a, 's> {
         ChildrenNamed {
             children: self.children(),
@@ -209,7 +211,7 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// All elements within it, itself excluded, in document order.
+    /// Returns all elements within it, without itself, in document order.
     pub fn descendants(&self) -> Descendants<'a> {
         let children = self.children();
         Descendants {
@@ -219,12 +221,12 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// All elements of this name within it; costs nothing per other element.
+    /// Returns all elements of this name within it. Elements of other names cost no time.
     pub fn descendants_named(&self, name: &str) -> DescendantsNamed<'a> {
         self.document.named(name).within(*self)
     }
 
-    /// The next element with the same parent.
+    /// Returns the next element with the same parent.
     pub fn next_sibling(&self) -> Option<Node<'a>> {
         let parent_end = self.parent()?.end();
         Children {
@@ -236,15 +238,15 @@ impl<'a> Node<'a> {
         .next()
     }
 
-    /// Its parent, that one's parent, and so on up to the root.
+    /// Returns its parent, the parent's parent, and so on up to the root.
     pub fn ancestors(&self) -> Ancestors<'a> {
         Ancestors {
             next: self.parent(),
         }
     }
 
-    /// The character data directly within it (CDATA included), entities resolved. White space
-    /// between child elements is not kept; neither are comments.
+    /// Returns the character data directly within it (including CDATA), entities resolved. White
+    /// space between child elements and comments are left out.
     pub fn text(&self) -> Cow<'a, str> {
         let mut all: Cow<'a, str> = Cow::Borrowed("");
         let children = self.children();
@@ -261,18 +263,18 @@ impl<'a> Node<'a> {
         all
     }
 
-    /// Offset of its `<` in the image's text.
+    /// Returns the offset of its `<` in the image's text.
     #[inline]
     pub fn offset(&self) -> u32 {
         self.record().map_or(0, |record| record.start.get())
     }
 
-    /// One past its last byte in the image's text: past `>` of the end tag.
+    /// Returns the offset one past its last byte in the image's text: past `>` of the end tag.
     pub fn end_offset(&self) -> u32 {
         self.record().map_or(0, |record| record.stop.get())
     }
 
-    /// Where its `<` is.
+    /// Returns the position of its `<`.
     pub fn position(&self) -> Position<'a> {
         self.document.position(self.offset())
     }
@@ -282,7 +284,7 @@ impl<'a> Node<'a> {
         self.document.node_record(self.index)
     }
 
-    /// One past the last node of its subtree, never at or before the node itself.
+    /// Returns one past the last node of its subtree; always greater than the node's index.
     #[inline]
     pub(crate) fn end(&self) -> u32 {
         let end = self.record().map_or(0, |record| record.end.get());
@@ -360,14 +362,14 @@ impl std::fmt::Debug for Node<'_> {
 #[derive(Clone)]
 pub struct Children<'a> {
     document: Document<'a>,
-    /// All of the document: looked up once and not again for every child.
+    /// All node records of the document, looked up once for all children.
     records: &'a [NodeRecord],
     next: u32,
     end: u32,
 }
 
 impl<'a> Children<'a> {
-    /// The next child element with its record.
+    /// Returns the next child element with its record.
     #[inline]
     fn advance(&mut self) -> Option<(u32, &'a NodeRecord)> {
         while self.next < self.end {
@@ -403,8 +405,8 @@ impl<'a> Iterator for Children<'a> {
 pub struct ChildrenNamed<'a, 's> {
     children: Children<'a>,
     matcher: NameMatcher<'a, 's>,
-    /// The number of the name, once a child has borne it, and the last one of another name:
-    /// siblings are mostly alike.
+    /// The number of the name, once a child with this name was found. `other` is the last number of
+    /// a different name. Caching both is fast because siblings mostly have the same name.
     known: Option<u16>,
     other: Option<u16>,
 }
@@ -466,7 +468,7 @@ impl<'a> Iterator for Descendants<'a> {
     }
 }
 
-/// The elements of one name, which is looked up once for many subtrees; made by
+/// The elements of one name, which is looked up once for many subtrees. Made by
 /// [`Document::named`].
 #[derive(Clone, Copy, Debug)]
 pub struct Named<'a> {
@@ -482,7 +484,7 @@ impl<'a> Named<'a> {
         Named { document, postings }
     }
 
-    /// Those within an element of the same document, itself excluded, in document order.
+    /// Returns the elements within an element of the same document, in order, without itself.
     pub fn within(&self, node: Node<'a>) -> DescendantsNamed<'a> {
         let mut postings = self.postings;
         if !postings.is_empty() {
@@ -517,7 +519,7 @@ impl<'a> Iterator for DescendantsNamed<'a> {
     }
 }
 
-/// The way up to the root; made by [`Node::ancestors`].
+/// The ancestors up to the root; made by [`Node::ancestors`].
 #[derive(Clone, Debug)]
 pub struct Ancestors<'a> {
     next: Option<Node<'a>>,

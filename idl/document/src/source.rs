@@ -1,4 +1,4 @@
-//! From an offset of the text back to a file, a row and a column.
+//! Conversion of an offset of the text to a file, a row and a column.
 
 use crate::document::Document;
 use crate::layout::{LINE_STRIDE, LineRecord, Section, SourceRecord};
@@ -7,7 +7,7 @@ use crate::lines::Tally;
 /// A file whose bytes are part of the image's text: the root file, or one that it includes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Source<'a> {
-    /// Its path, as ingest named it.
+    /// Its path, as given by ingest.
     pub path: &'a str,
     /// Offset of its first byte in the image's text.
     pub start: u32,
@@ -15,7 +15,7 @@ pub struct Source<'a> {
     pub len: u32,
 }
 
-/// A place in a file, as people and editors name it.
+/// A place in a file, in the form that people and editors use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Position<'a> {
     /// The file.
@@ -37,25 +37,26 @@ impl std::fmt::Display for Position<'_> {
 }
 
 impl<'a> Document<'a> {
-    /// The file that the image is named after; empty when the image carries no text at all.
+    /// Returns the path of the file that the image is named after; empty when the image has no
+    /// text.
     pub fn path(&self) -> &'a str {
         self.sources().next().map_or("", |source| source.path)
     }
 
-    /// The files whose bytes make up the text, the root file first.
+    /// Returns the files whose bytes make up the text, the root file first.
     pub fn sources(&self) -> impl Iterator<Item = Source<'a>> + use<'a> {
         let document = *self;
         let records: &'a [SourceRecord] = self.records(Section::Sources);
         records.iter().map(move |record| document.source(record))
     }
 
-    /// The text of a source. Looks at every byte of it: whoever needs a line of many asks for
-    /// [`Document::source_bytes`].
+    /// Returns the text of a source. It validates every byte, so use [`Document::source_bytes`] to
+    /// read one line of many.
     pub fn source_text(&self, source: &Source<'a>) -> &'a str {
         self.text_at(source.start, source.len).unwrap_or("")
     }
 
-    /// The bytes of a source; UTF-8, unless the image is damaged.
+    /// Returns the bytes of a source; they are UTF-8 unless the image is damaged.
     pub fn source_bytes(&self, source: &Source<'a>) -> &'a [u8] {
         let text: &'a [u8] = self.section(Section::Text);
         let from = source.start as usize;
@@ -63,8 +64,8 @@ impl<'a> Document<'a> {
             .unwrap_or_default()
     }
 
-    /// Leads an offset of the text to its file, row and column. An offset just past the end of a
-    /// file belongs to that file; one past the end of the text is taken for the end.
+    /// Converts an offset of the text to its file, row and column. An offset just past the end of a
+    /// file belongs to that file. An offset past the end of the text counts as the end.
     pub fn position(&self, offset: u32) -> Position<'a> {
         let text: &'a [u8] = self.section(Section::Text);
         let offset = offset.min(u32::try_from(text.len()).unwrap_or(u32::MAX));
@@ -97,8 +98,8 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// Counts from the nearest checkpoint at or before `offset`, or from the file's start when
-    /// that is nearer.
+    /// Counts from the nearest checkpoint at or before `offset`, or from the file's start when that
+    /// is nearer.
     fn tally(&self, text: &[u8], start: usize, offset: usize) -> Tally {
         let checkpoints = self.records::<LineRecord>(Section::Lines).len();
         let checkpoint = (offset / LINE_STRIDE).min(checkpoints.saturating_sub(1));
@@ -106,7 +107,7 @@ impl<'a> Document<'a> {
             Some(line) if checkpoint * LINE_STRIDE > start => {
                 (Tally::of(line), checkpoint * LINE_STRIDE)
             }
-            // Without a checkpoint the image is corrupt; counting one stride bounds the cost.
+            // The file starts in this stride, or the image is corrupt. One stride limits the cost.
             _ => (
                 Tally::default(),
                 start.max(offset.saturating_sub(LINE_STRIDE)),
@@ -127,5 +128,5 @@ impl<'a> Document<'a> {
     }
 }
 
-/// UTF-8's spelling of U+FEFF, which some editors put first.
+/// UTF-8 encoding of U+FEFF, which some editors write at the start of a file.
 const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";

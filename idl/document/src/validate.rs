@@ -1,7 +1,7 @@
-//! Whether an image tells the truth about the text it carries.
+//! Validation of an image against the text it carries.
 //!
-//! Opening makes an image safe to read; this makes it right: every record says what the builder
-//! would have said, so that each accessor answers rather than saying "absent" or empty.
+//! Opening makes an image safe to read. Validation checks that every record equals the one the
+//! builder would write. Each accessor then returns a correct value instead of "absent" or empty.
 
 use std::ops::Range;
 
@@ -16,8 +16,8 @@ use crate::layout::{
 use crate::lines;
 
 impl Document<'_> {
-    /// Checks every record against the text and against each other; linear in the size of the
-    /// image.
+    /// Checks every record against the text and against the other records. The cost is linear in
+    /// the size of the image.
     ///
     /// # Errors
     /// The first contradiction found.
@@ -35,7 +35,7 @@ impl Document<'_> {
 /// All sections, as slices.
 struct Image<'a> {
     text: &'a [u8],
-    /// No byte of the text is part of a longer character, so no range can cut one.
+    /// True when the text is pure ASCII, so that no range can cut a character.
     is_ascii: bool,
     heap: &'a [u8],
     nodes: &'a [NodeRecord],
@@ -49,7 +49,7 @@ struct Image<'a> {
     document: &'a Document<'a>,
 }
 
-/// A contradiction in the record at `index` of `section`, unless `sound`.
+/// Returns a contradiction error for the record at `index` of `section`, unless `sound`.
 #[inline]
 fn demand(
     sound: bool,
@@ -121,7 +121,8 @@ impl<'a> Image<'a> {
         )
     }
 
-    /// Encoding and line checkpoints, stride by stride, so that each byte is fetched but once.
+    /// Checks encoding and line checkpoints stride by stride, so that each byte is fetched only
+    /// once.
     fn check_text(&mut self) -> Result<(), ImageError> {
         let starts = self
             .sources
@@ -236,7 +237,7 @@ impl<'a> Image<'a> {
             )?;
             check(self.is_nested(index, node), "it is not within its parent")?;
         }
-        // Every element took a place of its own name, so no place left means none too many.
+        // Every element used one posting of its own name, so equal totals exclude extra postings.
         let elements = self
             .nodes
             .iter()
@@ -250,7 +251,7 @@ impl<'a> Image<'a> {
         )
     }
 
-    /// Where the postings of each name are, which follow each other without gap or overlap.
+    /// Returns the postings of each name; the ranges must have neither gap nor overlap.
     fn posting_ranges(&self) -> Result<Vec<Range<usize>>, ImageError> {
         let mut first = 0;
         let mut ranges = Vec::with_capacity(self.names.len());
@@ -275,14 +276,14 @@ impl<'a> Image<'a> {
         Ok(ranges)
     }
 
-    /// Whether the next posting of a name is the element at `index`, which takes it.
+    /// Takes the next posting of a name and checks whether it is the element at `index`.
     fn is_posted(&self, left: &mut Range<usize>, index: usize) -> bool {
         let posting = left.next().and_then(|place| self.postings.get(place));
         posting.is_some_and(|posted| posted.get() as usize == index)
     }
 
-    /// Whether the node's parent is the innermost element that has not ended before it. Looks back
-    /// from the node before; every element is left but once, so all nodes together take one pass.
+    /// Checks whether the node's parent is the innermost element that has not ended before it. The
+    /// search starts at the previous node. It leaves each element once, so all nodes take one pass.
     fn is_nested(&self, index: usize, node: &NodeRecord) -> bool {
         if index == 0 {
             return node.parent.get() == NONE
@@ -290,8 +291,8 @@ impl<'a> Image<'a> {
                 && node.end.get() as usize == self.nodes.len();
         }
         let mut outer = index - 1;
-        // Parents come before their children, or the image is not sound: were that only taken from the
-        // nodes already looked at, an image that changes meanwhile could lead round in circles.
+        // Parents come before their children in a valid image. Each step checks this again.
+        // Otherwise a concurrent change of the image could cause an endless loop.
         loop {
             let Some(before) = self.nodes.get(outer) else {
                 return false;
@@ -353,7 +354,7 @@ impl<'a> Image<'a> {
         Ok(())
     }
 
-    /// Whether the range lies within the text and cuts no character.
+    /// Checks whether the range lies within the text and cuts no character.
     #[inline]
     fn is_text(&self, start: usize, stop: usize) -> bool {
         if self.is_ascii {
@@ -376,7 +377,7 @@ impl<'a> Image<'a> {
         std::str::from_utf8(bytes).ok()
     }
 
-    /// Where the text has a resolved value, if heap and text really have it.
+    /// Returns the text offset of a resolved value, if heap and text contain it.
     fn resolved_from(&self, place: U32) -> Option<u32> {
         let (_, offset, raw_len) = self.document.heap_value(place.get())?;
         self.is_text(offset as usize, offset as usize + raw_len as usize)
@@ -384,7 +385,7 @@ impl<'a> Image<'a> {
     }
 }
 
-/// The records of a section that holds as many as it says.
+/// Returns the records of a section, which must hold a whole number of them.
 fn records<'a, T: Pod>(document: &Document<'a>, section: Section) -> Result<&'a [T], ImageError> {
     let bytes = document.section(section);
     bytemuck::try_cast_slice(bytes).map_err(|_| ImageError::Section {
@@ -392,8 +393,8 @@ fn records<'a, T: Pod>(document: &Document<'a>, section: Section) -> Result<&'a 
     })
 }
 
-/// How many bytes from `start` to `stop` are whole characters; only the text's end may not leave a
-/// part of one.
+/// Returns how many bytes from `start` to `stop` are whole characters. At the end of the text a
+/// partial character is an error.
 fn decodable(text: &[u8], start: usize, stop: usize) -> Result<usize, ImageError> {
     match std::str::from_utf8(&text[start..stop]) {
         Ok(decoded) => Ok(decoded.len()),

@@ -1,38 +1,38 @@
-//! Numbers in attributes, in XML Schema's spelling.
+//! Parsing of numbers in attributes, spelt as in XML Schema.
 
 use std::fmt;
 
 use crate::attribute::Attribute;
 use crate::node::Node;
 
-/// Why an attribute gives no number. Its text says where it stands in the document by element and
-/// attribute; [`node`](ValueError::node) and [`offset`](ValueError::offset) lead to the place.
+/// Reason why an attribute gives no number. Its text names the element and the attribute;
+/// [`node`](ValueError::node) and [`offset`](ValueError::offset) lead to the place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ValueError<'a> {
     /// The element has no such attribute.
     Missing {
         /// The element.
         node: Node<'a>,
-        /// The attribute that it lacks.
+        /// The missing attribute.
         name: &'a str,
     },
-    /// The value is not spelt like a number of that sort.
+    /// The value is not a valid spelling of a number of that kind.
     Malformed {
         /// The attribute.
         attribute: Attribute<'a>,
-        /// The sort of number that was asked for.
+        /// The expected kind of number.
         expected: NumberKind,
     },
-    /// The value is spelt well but too large for the type.
+    /// The value is spelt correctly but too large for the type.
     OutOfRange {
         /// The attribute.
         attribute: Attribute<'a>,
-        /// The sort of number that was asked for.
+        /// The expected kind of number.
         expected: NumberKind,
     },
 }
 
-/// The sorts of numbers that attributes are asked for.
+/// The kinds of numbers that a caller can ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NumberKind {
     /// XML Schema's `double`.
@@ -42,7 +42,7 @@ pub enum NumberKind {
 }
 
 impl<'a> ValueError<'a> {
-    /// The element that was asked.
+    /// Returns the element that should have the attribute.
     pub fn node(&self) -> Node<'a> {
         match self {
             ValueError::Missing { node, .. } => *node,
@@ -52,7 +52,7 @@ impl<'a> ValueError<'a> {
         }
     }
 
-    /// The name of the attribute that was asked for.
+    /// Returns the name of the requested attribute.
     pub fn attribute_name(&self) -> &'a str {
         match self {
             ValueError::Missing { name, .. } => name,
@@ -62,7 +62,7 @@ impl<'a> ValueError<'a> {
         }
     }
 
-    /// Where to point at: the attribute, or the element that lacks it.
+    /// Returns the offset to point at: that of the attribute, or of the element that lacks it.
     pub fn offset(&self) -> u32 {
         match self {
             ValueError::Missing { node, .. } => node.offset(),
@@ -72,7 +72,7 @@ impl<'a> ValueError<'a> {
         }
     }
 
-    /// Whether the attribute is absent rather than wrong.
+    /// Checks whether the attribute is missing rather than wrong.
     pub fn is_missing(&self) -> bool {
         matches!(self, ValueError::Missing { .. })
     }
@@ -147,7 +147,7 @@ impl NumberKind {
     }
 }
 
-/// A value in quotes, cut short when it is long.
+/// A value in quotes, truncated when it is long.
 struct Shown<'a>(&'a str);
 
 impl fmt::Display for Shown<'_> {
@@ -192,7 +192,7 @@ impl Wrong {
     }
 }
 
-/// White space as XML defines it, which is less than Unicode's.
+/// Trims white space as XML defines it; Unicode defines more characters as white space.
 fn trim(value: &str) -> &str {
     let is_space = |byte: Option<&u8>| matches!(byte, Some(b' ' | b'\t' | b'\n' | b'\r'));
     let bytes = value.as_bytes();
@@ -202,7 +202,7 @@ fn trim(value: &str) -> &str {
     value.trim_matches([' ', '\t', '\n', '\r'])
 }
 
-/// The lexical space of XML Schema 1.1's `double` (Datatypes, section 3.3.5.2).
+/// Parses the lexical space of XML Schema 1.1's `double` (Datatypes, section 3.3.5.2).
 fn parse_double(value: &str) -> Result<f64, Wrong> {
     match value {
         "INF" | "+INF" => return Ok(f64::INFINITY),
@@ -210,7 +210,7 @@ fn parse_double(value: &str) -> Result<f64, Wrong> {
         "NaN" => return Ok(f64::NAN),
         _ => {}
     }
-    // Rust's parser reads more than this, such as "inf" and "nan".
+    // Rust's parser also accepts other spellings, such as "inf" and "nan".
     let decimal = value
         .bytes()
         .all(|byte| matches!(byte, b'0'..=b'9' | b'+' | b'-' | b'.' | b'e' | b'E'));
@@ -226,7 +226,7 @@ fn parse_double(value: &str) -> Result<f64, Wrong> {
     }
 }
 
-/// The lexical space of XML Schema's `integer` (Datatypes, section 3.4.13).
+/// Parses the lexical space of XML Schema's `integer` (Datatypes, section 3.4.13).
 fn parse_integer(value: &str) -> Result<i64, Wrong> {
     let digits = value.strip_prefix(['+', '-']).unwrap_or(value);
     if digits.is_empty() || !digits.bytes().all(|byte| byte.is_ascii_digit()) {

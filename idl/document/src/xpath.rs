@@ -1,7 +1,7 @@
-//! XPath expressions of elements: printed for people and tools, and led back to the element.
+//! XPath expressions of elements: printing for people and tools, and evaluation back to elements.
 //!
-//! Names are printed without prefix, as rules know them; an expression with prefixes is read as if
-//! it had none.
+//! Names are printed without prefix, as in rules. Prefixes in an expression are ignored when it is
+//! read.
 
 mod cache;
 mod evaluate;
@@ -15,18 +15,18 @@ use crate::document::Document;
 use crate::node::Node;
 
 impl Node<'_> {
-    /// An XPath that a person recognises the element by:
-    /// `/OpenDRIVE/road[@id='5']/lanes/laneSection[2]`. Each step bears the id (in OpenSCENARIO
-    /// the name) if that tells the element from its equally named siblings, else its number among
-    /// them if it has any. Takes time in proportion to the siblings on the way; whoever prints
-    /// many of one document holds [`XPaths`].
+    /// Returns an XPath by which a person recognises the element:
+    /// `/OpenDRIVE/road[@id='5']/lanes/laneSection[2]`. Each step contains the id (in OpenSCENARIO
+    /// the name) if it is unique among the equally named siblings. Otherwise the step contains the
+    /// element's number among them, if there are any. The cost grows with the number of siblings on
+    /// the way; use [`XPaths`] to print many XPaths of one document.
     ///
     /// Empty for character data.
     pub fn xpath(&self) -> String {
         print::xpath(*self)
     }
 
-    /// The XPath with each element's number among its equally named siblings:
+    /// Returns the XPath with each element's number among its equally named siblings:
     /// `/OpenDRIVE[1]/road[3]`. Empty for character data.
     pub fn positional_xpath(&self) -> String {
         print::positional(*self)
@@ -34,26 +34,26 @@ impl Node<'_> {
 }
 
 impl<'a> Document<'a> {
-    /// The elements that an XPath means, in document order, each once.
+    /// Returns the elements that an XPath selects, in document order, each once.
     ///
-    /// Understands what [`Node::xpath`] prints and what other tools usually do: steps by `/` and
-    /// `//` with a name or `*`, and the predicates `[3]`, `[last()]`, `[@id]`, `[@id='5']`,
-    /// `[@a='x' and @b='y']` and `[local-name()='road']`. A last step `@attribute` or `text()` leads to the element that
-    /// bears it, whether or not it does, for findings often point at what is missing.
+    /// Supports the output of [`Node::xpath`] and common expressions of other tools: steps by `/`
+    /// and `//` with a name or `*`, and the predicates `[3]`, `[last()]`, `[@id]`, `[@id='5']`,
+    /// `[@a='x' and @b='y']` and `[local-name()='road']`. A last step `@attribute` or `text()`
+    /// selects the element itself, even without it, because findings often point at missing items.
     ///
     /// # Errors
-    /// When the expression is malformed or uses more of XPath than this.
+    /// The expression is malformed or uses more of XPath than this.
     pub fn evaluate(&self, xpath: &str) -> Result<Vec<Node<'a>>, XPathError> {
         Ok(evaluate::evaluate(*self, None, &parse::parse(xpath)?))
     }
 }
 
 impl<'a> Node<'a> {
-    /// The elements that an XPath means from here: as [`Document::evaluate`], but a step without `/` before it leads
-    /// to what lies directly within this element, and `.`, `.//` and leading `..` are understood.
+    /// Evaluates an XPath from here, like [`Document::evaluate`]. A first step without `/` selects
+    /// children of this element. `.`, `.//` and leading `..` are supported.
     ///
     /// # Errors
-    /// As [`Document::evaluate`].
+    /// The errors of [`Document::evaluate`].
     pub fn evaluate(&self, xpath: &str) -> Result<Vec<Node<'a>>, XPathError> {
         let mut path = xpath.trim();
         if path.is_empty() || path.starts_with('/') {
@@ -85,7 +85,7 @@ impl<'a> Node<'a> {
     }
 }
 
-/// What follows a leading `.` or `..` (then `true`), with the `/` or `//` behind it if more than one may follow.
+/// Splits off a leading `.` or `..` (then `true`). A `/` or `//` is kept if steps may follow.
 fn leading_dots(path: &str) -> Option<(&str, bool)> {
     let (rest, is_up) = match path.strip_prefix("..") {
         Some(rest) => (rest, true),
@@ -94,7 +94,7 @@ fn leading_dots(path: &str) -> Option<(&str, bool)> {
     match rest.strip_prefix('/') {
         None if rest.is_empty() => Some((rest, is_up)),
         None => None,
-        // Steps follow: `//` stays, and so do further dots.
+        // Steps follow: `//` is kept, and so are further dots.
         Some(further) if further.starts_with('.') => Some((further, is_up)),
         Some(_) => Some((rest, is_up)),
     }

@@ -1,8 +1,10 @@
-//! Bytes that are no image, or a spoilt one: refused or walked, never a panic.
+//! Tests with invalid or corrupted images. They must be rejected or walked, and must never cause a
+//! panic.
 
 use qcbus_document::fuzzing::{self, Outcome, Random, Tree};
 
-/// Seeded, so that a failure can be repeated; `QCBUS_FUZZ_ROUNDS` asks for more than CI does.
+/// Returns the number of rounds. They are seeded, so that a failure can be repeated.
+/// `QCBUS_FUZZ_ROUNDS` sets a larger number than that of CI.
 fn rounds(default: u64) -> u64 {
     std::env::var("QCBUS_FUZZ_ROUNDS")
         .ok()

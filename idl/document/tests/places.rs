@@ -1,4 +1,4 @@
-//! Where things are: files, rows and columns, XPaths; and what numbers in attributes mean.
+//! Tests of positions (files, rows and columns), XPaths, and numbers in attributes.
 
 #![expect(
     clippy::unwrap_used,
@@ -260,7 +260,7 @@ fn what_is_not_understood_is_said_where_it_stands() {
     });
 }
 
-/// A root file and two includes, the second of which is empty.
+/// Returns the image of a root file with two includes. The second include is empty.
 fn three_files() -> Vec<u8> {
     let root = "\u{feff}<OpenDRIVE>\n<include file='b'/></OpenDRIVE>";
     let included = "<OpenDRIVE>\n\n  <road/></OpenDRIVE>";
@@ -317,7 +317,7 @@ fn offsets_lead_to_the_file_that_holds_them() {
         .faults()
         .map(|fault| document.position(fault.offset).to_string())
         .collect();
-    // The end of the root file is a place of the root file, although another file follows.
+    // The end of the root file belongs to the root file, although another file follows.
     assert_eq!(faults, ["c.xml:1:1", "a.xodr:2:32"]);
     assert_eq!(document.position(u32::MAX).path, "c.xml");
 }

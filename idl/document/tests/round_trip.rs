@@ -1,4 +1,4 @@
-//! What goes into an image comes out of it: any tree, any values, any place.
+//! Tests that an image returns its input: any tree, any values, any position.
 
 #![expect(
     clippy::unwrap_used,
@@ -22,7 +22,7 @@ fn name() -> impl Strategy<Value = String> {
     .prop_map(String::from)
 }
 
-/// Letters that matter to XML, to XPath's quotes and to the counting of characters.
+/// Generates characters that matter to XML, to XPath's quotes and to the counting of characters.
 fn value() -> impl Strategy<Value = String> {
     prop::string::string_regex("[a-c0-2<>&'\" äß€😀\n]{0,6}").unwrap()
 }
@@ -60,7 +60,7 @@ fn local(name: &str) -> &str {
     name.rsplit(':').next().unwrap()
 }
 
-/// Compares a view with the tree that it should show, and each place with the XML's own bytes.
+/// Compares a view with its expected tree, and each position with the XML's own bytes.
 fn assert_shows(node: Node<'_>, tree: &Tree, xml: &str) {
     assert_eq!(node.name(), local(&tree.name));
     assert_eq!(
@@ -105,7 +105,7 @@ fn assert_shows(node: Node<'_>, tree: &Tree, xml: &str) {
     assert_eq!(sibling, None);
 }
 
-/// The plain way to a row and a column.
+/// Computes a row and a column in the simple way.
 fn counted(xml: &str, offset: usize) -> (u32, u32) {
     let before = &xml[..offset];
     let line = before.rsplit('\n').next().unwrap();
@@ -175,7 +175,7 @@ proptest! {
 
     #[test]
     fn positions_are_counted_as_a_person_counts(tree in tree(), pad in 0usize..9000) {
-        // Text long enough that checkpoints fall anywhere, also within characters.
+        // The text is long enough for checkpoints at any position, also within characters.
         let tree = Tree::new("road").saying(&"ß\n€".repeat(pad / 6)).holding(tree);
         let (image, xml) = (tree.image("a").unwrap(), tree.xml());
         let document = Document::open(&image).unwrap();

@@ -1,5 +1,6 @@
-//! Every accessor, on an image so small that an interpreter gets through it: what `.ci/run` gives to
-//! miri, which sees reads beyond an image and texts that are none where a test sees nothing.
+//! Tests of every accessor, on an image that is small enough for an interpreter. `.ci/run` runs
+//! them in miri, which detects reads beyond an image and invalid texts that a normal test cannot
+//! see.
 
 #![expect(
     clippy::unwrap_used,
@@ -8,7 +9,7 @@
 
 use qcbus_document::fuzzing::{self, Outcome, Random, Tree};
 
-/// Spoilt images that are walked.
+/// Number of corrupted images that are walked.
 const SPOILT: u64 = if cfg!(miri) { 6 } else { 2_000 };
 
 fn small() -> Vec<u8> {

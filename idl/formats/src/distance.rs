@@ -1,17 +1,17 @@
-//! "Did you mean": the nearest known word to an unknown one.
+//! "Did you mean" hints: the known word nearest to an unknown one.
 
-/// How many letters to insert, remove, replace or swap with their neighbour to get from one word
-/// to the other (optimal string alignment). Letter case counts as equal.
+/// Returns how many letters to insert, remove, replace or swap with their neighbour between two
+/// words (optimal string alignment). Upper and lower case are equal.
 pub fn distance(a: &str, b: &str) -> usize {
     strsim::osa_distance(&a.to_lowercase(), &b.to_lowercase())
 }
 
-/// Words longer than this are compared by their beginning: nobody mistypes a page of text, and
-/// the cost grows with the square.
+/// Only this many characters of a longer word are compared. A very long text is no typing error,
+/// and the cost grows with the square of the length.
 const LONGEST: usize = 128;
 
-/// The candidate nearest to `word`, if one is near enough to have been meant: at most a third of
-/// its letters differ. The first of several equally near ones.
+/// Returns the candidate nearest to `word`, if one is near enough: at most a third of its letters
+/// (at least one) differ. The first of several equally near ones is returned.
 pub fn closest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> Option<&'c str> {
     let word: String = word.chars().take(LONGEST).collect();
     let allowed = (word.chars().count() / 3).max(1);
@@ -28,11 +28,11 @@ pub fn closest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) ->
     best.map(|(_, candidate)| candidate)
 }
 
-/// How a hint of [`did_you_mean`] begins.
+/// Beginning of a hint of [`did_you_mean`].
 pub const DID_YOU_MEAN: &str = "; did you mean ";
 
-/// Some of the names that there are, for a person to choose from: `` `a`, `b` ``, with `…` when there are
-/// more; `None` when there are none.
+/// Lists some of the known names for a person to choose from:
+/// `` `a`, `b` ``, with `…` when there are more. Returns `None` when there are none.
 pub fn some_of<'n>(names: impl IntoIterator<Item = &'n str>) -> Option<String> {
     const MOST: usize = 5;
     let mut names = names.into_iter();
@@ -45,7 +45,7 @@ pub fn some_of<'n>(names: impl IntoIterator<Item = &'n str>) -> Option<String> {
     (!listed.is_empty()).then(|| listed.join(", "))
 }
 
-/// ``; did you mean `x`?`` to be put behind a message, or nothing when no candidate is near.
+/// Returns ``; did you mean `x`?`` to append to a message, or an empty text without a match.
 pub fn did_you_mean<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> String {
     match closest(word, candidates) {
         Some(candidate) => format!("{DID_YOU_MEAN}`{candidate}`?"),

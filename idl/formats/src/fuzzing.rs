@@ -1,10 +1,11 @@
-//! Bodies of fuzz targets: they take any bytes and panic when a promise is broken. Seeded tests
-//! run them on stable; the wrappers for cargo-fuzz call them.
+//! Bodies of fuzz targets, which take any bytes and panic if a guarantee is broken. Seeded tests
+//! run them on stable, and the wrappers for cargo-fuzz call them.
 
 use crate::config::Config;
 use crate::xqar::{self, Dialect};
 
-/// A configuration: reading never panics, and what was read answers every question.
+/// Reads a configuration. Reading never panics, and a configuration that was read answers every
+/// query.
 pub fn config(bytes: &[u8]) {
     let Ok(parsed) = Config::parse(bytes) else {
         return;
@@ -27,8 +28,8 @@ pub fn config(bytes: &[u8]) {
     }
 }
 
-/// A result file: reading never panics, what was read can be written in both forms and read
-/// again, and writing it again gives the same bytes.
+/// Reads a result file. Reading never panics. A result that was read can be written in both forms
+/// and read again, and writing it again gives the same bytes.
 pub fn xqar(bytes: &[u8]) {
     let Ok(results) = xqar::read(bytes) else {
         return;

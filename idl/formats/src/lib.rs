@@ -1,8 +1,8 @@
-//! ASAM's file formats: configuration (`.xml`), manifests (`.json`) and results (`.xqar`), and
-//! the pooling of what bundles found into one result.
+//! ASAM's file formats: configuration (`.xml`), manifests (`.json`) and results (`.xqar`). It also
+//! pools the findings of bundles into one result.
 //!
-//! Nothing here does I/O: bytes and values go in, values and text come out. [`manifest`], where
-//! one file leads to others, takes a function that reads files.
+//! This crate performs no I/O: functions take and return bytes, text and values. [`manifest`] takes
+//! a function that reads files, because one file refers to others.
 
 pub mod config;
 pub mod distance;

@@ -1,9 +1,9 @@
-//! Places in other files than the checked one: an include, a catalog, a map, a library scenario.
+//! Locations in other files than the checked one: an include, a catalog, a map, a library scenario.
 //!
-//! Everywhere in qcbus such a place is [`Locations::elsewhere`]. Only a result file, which speaks of one
-//! file, has no element for it: there an issue says the place at the start of its `Locations`
-//! description, `PATH:ROW:COLUMN: text`, and carries it in a `DomainSpecificInfo` named [`NAME`]; its
-//! `FileLocation` is the reference in the checked file. The reader turns both back.
+//! In qcbus such a location is [`Locations::elsewhere`]. A result file has no element for it. Its
+//! `Locations` description starts with the place instead, `PATH:ROW:COLUMN: text`. A
+//! `DomainSpecificInfo` named [`NAME`] also contains it. The `FileLocation` is the reference in the
+//! checked file. The reader converts both back.
 
 use std::borrow::Cow;
 
@@ -23,12 +23,12 @@ pub struct OtherPlace {
     pub row: u64,
     /// Column in characters, from 1.
     pub column: u64,
-    /// The element or attribute there, if there is one.
+    /// The element or attribute at that place, if there is one.
     pub xpath: Option<String>,
 }
 
 impl OtherPlace {
-    /// The description of a `Locations`: the place, then what is to be seen there.
+    /// Returns the description of a `Locations`: the place, then the explanation.
     pub fn describe(&self, text: &str) -> String {
         let OtherPlace {
             path, row, column, ..
@@ -40,7 +40,7 @@ impl OtherPlace {
         }
     }
 
-    /// The text behind this place at the start of a description; `None` when it is not there.
+    /// Returns the text after this place at the start of a description, or `None` without it.
     fn behind<'t>(&self, description: &'t str) -> Option<&'t str> {
         let rest = description.strip_prefix(&self.describe(""))?;
         if rest.is_empty() {
@@ -50,7 +50,7 @@ impl OtherPlace {
         }
     }
 
-    /// The place as a result file carries it.
+    /// Converts the place to its form in a result file.
     pub fn to_info(&self) -> DomainInfo {
         let mut attributes = vec![
             (String::from("path"), self.path.clone()),
@@ -73,7 +73,7 @@ impl OtherPlace {
         }
     }
 
-    /// The place that a `DomainSpecificInfo` holds, when it holds one and nothing else.
+    /// Returns the place in a `DomainSpecificInfo`, if it contains exactly one place.
     pub fn from_info(info: &DomainInfo) -> Option<OtherPlace> {
         let place = from_element(info.content.first()?)?;
         (place.to_info() == *info).then_some(place)
@@ -81,7 +81,8 @@ impl OtherPlace {
 }
 
 impl Locations {
-    /// The description as a result file has it: with the place when it is in another file.
+    /// Returns the description for a result file. It includes the place when that is in another
+    /// file.
     pub fn written(&self) -> Cow<'_, str> {
         match &self.elsewhere {
             Some(place) => Cow::Owned(place.describe(&self.description)),
@@ -91,7 +92,7 @@ impl Locations {
 }
 
 impl Issue {
-    /// The facts as a result file has them: with the places in other files, which come first.
+    /// Returns the facts for a result file. The places in other files come first.
     pub fn written_info(&self) -> impl Iterator<Item = Cow<'_, DomainInfo>> {
         let places = self.locations.iter().filter_map(|it| it.elsewhere.as_ref());
         let places = places.map(|place| Cow::Owned(place.to_info()));
@@ -99,8 +100,8 @@ impl Issue {
     }
 }
 
-/// Turns a fact of a result file back into a place; `false` when it is another fact, or about no
-/// place that is described.
+/// Converts a fact of a result file back to a place. Returns `false` when it is another fact, or no
+/// description contains the place.
 pub(crate) fn turn_back(info: &DomainInfo, locations: &mut [Locations]) -> bool {
     let Some(place) = OtherPlace::from_info(info) else {
         return false;

@@ -1,7 +1,7 @@
-//! Manifests (`.json`): which modules there are and how each is started.
+//! Manifests (`.json`): the available modules and their commands.
 //!
-//! A framework manifest lists module manifests; a module manifest lists modules. Files are read by
-//! a function that the caller gives, environment variables by another.
+//! A framework manifest lists module manifests; a module manifest lists modules. The caller
+//! provides functions that read files and environment variables.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -14,39 +14,39 @@ use crate::distance::{closest, did_you_mean};
 /// A module that can be started.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Module {
-    /// Its name; `application` of a configuration. Unique for each type.
+    /// Its name: `application` of a configuration. Unique for each type.
     pub name: String,
-    /// What it is.
+    /// Type of the module.
     pub module_type: ModuleType,
-    /// The command, for a shell.
+    /// The command for a shell.
     pub exec_command: String,
-    /// How it takes part.
+    /// How it is started.
     pub mode: Mode,
-    /// What it may do besides checking.
+    /// Permissions besides checking.
     pub may: May,
-    /// It looks and has no weight in any verdict: `"shadow": true`.
+    /// Whether it runs as a shadow, with no effect on any verdict: `"shadow": true`.
     pub shadow: bool,
-    /// How one that is started for every file is run.
+    /// Run settings of a module that is started for every file.
     pub once: Once,
-    /// Keys that begin with `qcbus`, for whoever knows them; texts, numbers and truth values as
-    /// text, in the order of their names.
+    /// Keys that begin with `qcbus`, and the keys `version` and `restart`, for other readers. All
+    /// values are stored as text, sorted by name.
     pub extra: Vec<(String, String)>,
-    /// The manifest that it comes from.
+    /// The manifest that contains it.
     pub manifest: PathBuf,
 }
 
-/// What a module is.
+/// Type of a module.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ModuleType {
-    /// It checks.
+    /// A module that checks files.
     CheckerBundle,
-    /// It reports.
+    /// A module that writes reports.
     ReportModule,
-    /// It pools; qcbus pools itself and starts none.
+    /// A module that pools results. qcbus pools results itself and never starts one.
     ResultPooling,
 }
 
-/// How a module takes part.
+/// How a module is started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Mode {
     /// Started once for a file, as ASAM's framework does.
@@ -56,33 +56,33 @@ pub enum Mode {
     Bus,
 }
 
-/// What a module may do although it is confined: the key `may`.
+/// Permissions of a module in the sandbox: the key `may`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 pub struct May {
-    /// Files and directories that it reads.
+    /// Files and directories that it may read.
     pub read: Vec<PathBuf>,
-    /// Files and directories that it writes.
+    /// Files and directories that it may write.
     pub write: Vec<PathBuf>,
-    /// Whether it uses the network.
+    /// Whether it may use the network.
     pub network: bool,
-    /// Whether it starts programs.
+    /// Whether it may start programs.
     pub programs: bool,
 }
 
-/// How a module is run that is started once for a file, beyond its command.
+/// Run settings of a module that is started once for a file, in addition to its command.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
 pub struct Once {
-    /// The name by which it looks for its section of a configuration, where that is another than its own.
+    /// The name of its section in a configuration, if that differs from its own name.
     pub application: Option<String>,
-    /// Where it runs, when that is not its private directory.
+    /// Its working directory, if that is not its private directory.
     pub working_directory: Option<PathBuf>,
-    /// Variables of its environment besides those that there are, by name.
+    /// Additional environment variables, by name.
     pub environment: Vec<(String, String)>,
-    /// The kinds of files that it takes (`xodr`), when they are not to be learned from it.
+    /// The kinds of files that it accepts (`xodr`), if they cannot be queried from the module.
     pub kinds: Vec<String>,
-    /// Every run begins from nothing, whatever could be kept for it: `"warm": false`.
+    /// Whether every run starts from scratch, even if data could be cached: `"warm": false`.
     pub cold: bool,
-    /// What a run may use up, by name: whole numbers above zero.
+    /// Resource limits of a run, by name: whole numbers above zero.
     pub limits: Vec<(String, u64)>,
 }
 
@@ -94,9 +94,9 @@ pub enum ManifestError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         reason: String,
-        /// The framework manifest that names it.
+        /// The framework manifest that lists it.
         listed_in: Option<PathBuf>,
     },
     /// The file is not JSON.
@@ -108,7 +108,7 @@ pub enum ManifestError {
         row: usize,
         /// Column, from 1.
         column: usize,
-        /// What is wrong.
+        /// Description of the error.
         reason: String,
     },
     /// A key is missing or has a wrong value.
@@ -116,9 +116,9 @@ pub enum ManifestError {
     Key {
         /// The file.
         path: PathBuf,
-        /// Which key, such as `module[2].exec_command`.
+        /// Path of the key, such as `module[2].exec_command`.
         key: String,
-        /// What is wrong with it.
+        /// Description of the error.
         reason: String,
     },
 }
@@ -130,11 +130,11 @@ fn named_by(listed_in: &Option<PathBuf>) -> String {
     }
 }
 
-/// What manifests are read with.
+/// Functions to read manifests.
 pub struct Sources<'f> {
-    /// Reads a file; the error says why it could not be.
+    /// Reads a file, or returns the reason why it cannot be read.
     pub read: &'f dyn Fn(&Path) -> Result<Vec<u8>, String>,
-    /// The value of an environment variable.
+    /// Returns the value of an environment variable.
     pub variable: &'f dyn Fn(&str) -> Option<String>,
 }
 
@@ -144,9 +144,9 @@ impl std::fmt::Debug for Sources<'_> {
     }
 }
 
-/// Reads a framework manifest and all that it lists, or a single module manifest. Relative paths
-/// in a framework manifest are handed on as they are: relative to the current directory, as in
-/// ASAM's framework.
+/// Reads a framework manifest and all listed manifests, or a single module manifest. Relative paths
+/// in a framework manifest stay unchanged. They are relative to the current directory, as in ASAM's
+/// framework.
 ///
 /// # Errors
 /// A file cannot be read or is not JSON, a key is missing or wrong, a name is used twice.
@@ -166,7 +166,7 @@ pub fn load(path: &Path, sources: &Sources<'_>) -> Result<Vec<Module>, ManifestE
     unique(modules)
 }
 
-/// The paths that a framework manifest lists, environment variables expanded.
+/// Returns the paths that a framework manifest lists, environment variables expanded.
 ///
 /// # Errors
 /// The file is not JSON, or `manifest_file_path` is not a list of texts.
@@ -186,7 +186,7 @@ pub fn parse_framework(
     )
 }
 
-/// The modules of a module manifest.
+/// Returns the modules of a module manifest.
 ///
 /// # Errors
 /// The file is not JSON, or a key is missing or wrong.
@@ -194,7 +194,7 @@ pub fn parse_modules(path: &Path, bytes: &[u8]) -> Result<Vec<Module>, ManifestE
     modules_of(path, &object(path, bytes)?)
 }
 
-/// Expands `$NAME` and `${NAME}`; what is not set stays as it is, and so does a lone `$`.
+/// Expands `$NAME` and `${NAME}`. Unset variables and a single `$` stay unchanged.
 pub fn expand(text: &str, variable: &dyn Fn(&str) -> Option<String>) -> String {
     let mut expanded = String::with_capacity(text.len());
     let mut rest = text;
@@ -360,7 +360,8 @@ impl Keys<'_> {
         ))
     }
 
-    /// What is not understood is no right, and is said: whoever writes `"netwrok"` means something by it.
+    /// Reads the permissions. An unknown key is an error, because it may be a typing error
+    /// (`"netwrok"`).
     fn may(&self) -> Result<May, ManifestError> {
         let rights = match self.object.get("may") {
             None => return Ok(May::default()),
@@ -396,7 +397,7 @@ impl Keys<'_> {
         Ok(shadow)
     }
 
-    /// As in [`Keys::may`], what is not understood is said.
+    /// Reads the run settings. As in [`Keys::may`], an unknown value is an error.
     fn once(&self) -> Result<Once, ManifestError> {
         let mut once = Once::default();
         if self.object.contains_key("application") {
@@ -457,7 +458,7 @@ impl Keys<'_> {
         Ok(once)
     }
 
-    /// The keys of an object that may be there.
+    /// Returns the keys of an optional object.
     fn inner(&self, name: &str) -> Result<impl Iterator<Item = (&String, &Value)>, ManifestError> {
         match self.object.get(name) {
             None => Ok(None.into_iter().flatten()),
@@ -487,7 +488,7 @@ impl Keys<'_> {
     }
 }
 
-/// The key that is written in place of a missing one.
+/// Returns a hint about a similar key that is written instead of a missing one.
 fn misspelt<'k>(name: &str, written: impl Iterator<Item = &'k str>) -> String {
     match closest(name, written) {
         Some(near) => format!("; `{near}` is no key, should it be `{name}`?"),
@@ -495,7 +496,7 @@ fn misspelt<'k>(name: &str, written: impl Iterator<Item = &'k str>) -> String {
     }
 }
 
-/// Keys of ours beside `mode`, handed on as they are.
+/// qcbus's own keys besides `mode`, passed on unchanged.
 const OWN_KEYS: [&str; 2] = ["version", "restart"];
 
 const MODULE_KEYS: [&str; 13] = [
@@ -514,16 +515,16 @@ const MODULE_KEYS: [&str; 13] = [
     "warm",
 ];
 
-/// What stands in `limits`.
+/// Valid keys of `limits`.
 const LIMIT_KEYS: [&str; 3] = ["seconds", "memory_mb", "output_mb"];
 
-/// What stands in `kinds`: what a module can be asked about.
+/// Valid values of `kinds`: the kinds of files that a module can check.
 const KINDS: [&str; 2] = ["xodr", "xosc"];
 
-/// What stands in `may`.
+/// Valid keys of `may`.
 const MAY_KEYS: [&str; 4] = ["read", "write", "network", "programs"];
 
-/// The keys of an object that have no meaning here: candidates for a mistyped one.
+/// Returns the unknown keys of an object, which may be typing errors.
 fn others(object: &Map<String, Value>) -> impl Iterator<Item = &str> {
     object
         .keys()

@@ -1,7 +1,7 @@
-//! Texts that many results have in common.
+//! Texts that many results share.
 
 use std::sync::Arc;
 
-/// A text that is shared, not copied. What the catalogue of a bundle says of its hundreds of checkers
-/// stands in the result of every file.
+/// A text that is shared, not copied. The result of every file contains the catalogue texts of
+/// hundreds of checkers.
 pub type Text = Arc<str>;

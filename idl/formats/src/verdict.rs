@@ -1,4 +1,4 @@
-//! The verdict on a file, and the one rule by which a result gets it.
+//! The verdict on a file, and the single rule to derive it from a result.
 
 use std::fmt;
 
@@ -7,29 +7,29 @@ use serde::{Deserialize, Serialize};
 use crate::pool::{BLOCKED, OWN_BUNDLE};
 use crate::xqar::{Checker, CheckerBundle, Level, Results, Status};
 
-/// What a farm may do with a file. `Undetermined` is never `Accepted`.
+/// Decision on how a file may be used. `Undetermined` is never `Accepted`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// Every demanded checker ran or did not apply, at least one ran, and none of the issues kept is
-    /// an error.
+    /// Every requested checker ran or did not apply, and at least one ran. No issue kept is an
+    /// error.
     Accepted,
     /// At least one of the issues kept is an error.
     Rejected,
-    /// A demanded checker crashed, hung, was absent or could not look, or none of them applied, and
-    /// no error was found.
+    /// No error was found, but a requested checker crashed, hung, was missing or was blocked, or
+    /// none of them applied.
     Undetermined,
 }
 
 impl Verdict {
-    /// The verdict that a result stands for: rejected by an error; undetermined by a checker that
-    /// should have answered and did not, and when nobody looked; else accepted. A checker without
-    /// status, as other tools write it, is taken at its issues.
+    /// Returns the verdict for a result. It is rejected if there is an error. It is undetermined if
+    /// a checker's answer is missing or no checker examined the file. Otherwise it is accepted. For
+    /// a checker without status, as other tools write it, only its issues count.
     pub fn of(results: &Results) -> Verdict {
         Verdict::of_those(results, |_| true)
     }
 
-    /// The verdict that a result would stand for without one of its checkers.
+    /// Returns the verdict for a result without one of its checkers.
     pub fn without(results: &Results, checker: &str) -> Verdict {
         Verdict::of_those(results, |it| &*it.id != checker)
     }
@@ -47,8 +47,8 @@ impl Verdict {
         }
     }
 
-    /// What one bundle adds to the verdict of others: rejected by an error, undetermined by a checker that should have
-    /// answered and did not. One that has nothing to say, be it that it did not look, adds nothing: accepted.
+    /// Returns the contribution of one bundle to the verdict of others: rejected by an error,
+    /// undetermined by a missing answer. Otherwise it adds accepted, even if it examined nothing.
     pub fn added_by(bundle: &CheckerBundle) -> Verdict {
         let mut issues = bundle.checkers.iter().flat_map(|checker| &checker.issues);
         if issues.any(|issue| issue.level == Level::Error) {
@@ -60,7 +60,7 @@ impl Verdict {
         }
     }
 
-    /// The verdict when this is said as well.
+    /// Combines two verdicts; the worse one wins.
     #[must_use]
     pub fn and(self, other: Verdict) -> Verdict {
         match (self, other) {
@@ -70,7 +70,7 @@ impl Verdict {
         }
     }
 
-    /// The word written to reports and verdict files.
+    /// Returns the word for reports and verdict files.
     pub fn as_str(self) -> &'static str {
         match self {
             Verdict::Accepted => "accepted",
@@ -86,14 +86,13 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// Whether a checker owes an answer. ASAM's format calls one that could not look `skipped`, like one
-/// that does not apply: what tells them apart is its metadata.
+/// Checks whether a checker's answer is missing. ASAM's format calls a blocked checker `skipped`,
+/// like one that does not apply; only its metadata distinguish them.
 fn is_open(checker: &Checker) -> bool {
     checker.status == Some(Status::Error) || checker.metadata.iter().any(|fact| fact.key == BLOCKED)
 }
 
-/// Whether one of the bundle's checkers has looked at the file. What qcbus says of a check is no
-/// look at the file.
+/// Checks whether one of the bundle's checkers examined the file. Remarks of qcbus do not count.
 pub(crate) fn has_looked(bundle: &CheckerBundle) -> bool {
     let looked = |checker: &Checker| matches!(checker.status, None | Some(Status::Completed));
     bundle.name != OWN_BUNDLE && bundle.checkers.iter().any(looked)

@@ -1,6 +1,5 @@
-//! A small, strict tree reader over quick-xml for files of a few elements: every element and
-//! attribute knows its place, and what is not well-formed is refused at the place where a person
-//! has to look.
+//! A small, strict tree reader over quick-xml for files of a few elements. Every element and
+//! attribute knows its position. Errors in the syntax point at the place that a person must fix.
 
 mod attributes;
 mod decode;
@@ -8,24 +7,24 @@ mod tree;
 
 pub(crate) use tree::{Document, Element, Node, parse};
 
-/// Elements nested deeper than this are refused: no file of these formats needs more, and every
-/// later step may then recurse without fear for the stack.
+/// Maximum nesting depth of elements. No file of these formats needs more, and later recursion
+/// cannot overflow the stack.
 pub(crate) const MAX_DEPTH: usize = 96;
 
-/// Not well-formed, and where.
+/// Syntax error and its position.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct XmlError {
     /// Line, from 1.
     pub row: u64,
     /// Column in characters, from 1.
     pub column: u64,
-    /// What is wrong.
+    /// Description of the error.
     pub text: String,
-    /// What to do about it; may be empty.
+    /// How to fix it; may be empty.
     pub hint: &'static str,
 }
 
-/// What is wrong at a byte offset of the text.
+/// An error at a byte offset of the text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Fault {
     offset: usize,
@@ -47,12 +46,12 @@ impl Fault {
     }
 }
 
-/// Whether XML 1.0 allows the character in a document.
+/// Checks whether XML 1.0 allows the character in a document.
 pub(crate) fn is_xml_char(c: char) -> bool {
     matches!(c, '\t' | '\n' | '\r' | '\u{20}'..='\u{D7FF}' | '\u{E000}'..='\u{FFFD}' | '\u{10000}'..)
 }
 
-/// Whether the text is a name (XML 1.0, fifth edition, productions 4 and 4a).
+/// Checks whether the text is a name (XML 1.0, fifth edition, productions 4 and 4a).
 pub(crate) fn is_name(text: &str) -> bool {
     let mut chars = text.chars();
     chars.next().is_some_and(is_name_start) && chars.all(is_name_char)

@@ -1,4 +1,4 @@
-//! Configurations: what is understood, what is told, what is refused.
+//! Tests of configurations: accepted content, reported content, rejected content.
 
 #![expect(
     clippy::unwrap_used,
@@ -271,8 +271,8 @@ fn number(name: &str) -> KnownParam {
     }
 }
 
-/// A checker that cannot read its parameter checks nothing, so whoever looks at a configuration
-/// beforehand hears of it: at the checker, in the bundle and beside the bundles.
+/// Checks that an unreadable value is reported at the checker, in the bundle and beside the
+/// bundles. A checker cannot check anything if it cannot read its parameter.
 #[test]
 fn value_that_no_checker_can_read_is_told_at_every_place() {
     let flag = KnownParam {

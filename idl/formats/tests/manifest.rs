@@ -1,4 +1,4 @@
-//! Manifests: what they give, and how they say what is wrong with them.
+//! Tests of manifests: their values and their error messages.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};

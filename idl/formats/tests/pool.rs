@@ -1,4 +1,4 @@
-//! Pooling: nothing lost without a word, and always the same bytes.
+//! Tests of pooling: every loss is reported, and the bytes are always the same.
 
 #![expect(
     clippy::unwrap_used,
@@ -58,7 +58,7 @@ fn outline(results: &Results) -> String {
     lines.join("\n")
 }
 
-/// What must hold for every pooled result.
+/// Checks the properties of every pooled result.
 fn assert_sound(pooled: &Pooled) {
     let mut next = 0;
     let mut counts = Counts::default();
@@ -326,7 +326,8 @@ fn blocked(by: &[&str]) -> Option<Ending> {
 
 const ONLY_LANES: &str = "<Config><CheckerBundle application='xodr'><Checker checkerId='lanes'/></CheckerBundle></Config>";
 
-/// `lanes` rests on `ids`, which rests on `xml`; `signs` is nobody's business.
+/// Returns a bundle in which `lanes` depends on `ids`, and `ids` depends on `xml`. Nothing depends
+/// on `signs`.
 fn resting(xml: Vec<Issue>) -> Vec<BundleOutcome> {
     let [mut lanes, mut ids] = ["lanes", "ids"].map(|id| checker(id, Vec::new()));
     lanes.ending = blocked(&["ids"]);

@@ -1,5 +1,6 @@
-//! ASAM's own Python library reads what is written. Needs `python3` and the package
-//! `asam-qc-baselib`; says so and skips when one of them cannot be had.
+//! Tests that ASAM's own Python library can read the written files. They need `python3` and the
+//! package `asam-qc-baselib`. If one of them is not available, they print a message and are
+//! skipped.
 
 #![expect(
     clippy::unwrap_used,
@@ -30,14 +31,15 @@ for path in sys.argv[1:]:
                       len(issue.locations), sep='|')
 ";
 
-/// The interpreter of a virtual environment with the package, or why there is none.
+/// Returns the interpreter of a virtual environment with the package, or the reason why there is
+/// none.
 fn interpreter() -> Result<PathBuf, String> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("baselib");
     let python = folder.join("bin/python");
     if run(Command::new(&python).args(["-c", "import qc_baselib"])).is_ok() {
         return Ok(python);
     }
-    // Whatever a run that was cut off has left is cleared and built again.
+    // Remains of an interrupted run are deleted, and the environment is built again.
     let parent = folder.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(parent).map_err(|error| error.to_string())?;
     run(Command::new("python3")
@@ -74,7 +76,7 @@ fn run(command: &mut Command) -> Result<String, String> {
     }
 }
 
-/// Results that exercise what the library is strict about.
+/// Returns results that cover the strict checks of the library.
 fn results() -> Vec<Results> {
     let text = "<Config><CheckerBundle application='b'><Checker checkerId='c' minLevel='1' \
                 maxLevel='2'/><Checker checkerId='gone'/></CheckerBundle>\

@@ -1,4 +1,4 @@
-//! What is written reads back the same, whatever it is.
+//! Tests that written data can be read back unchanged.
 
 use proptest::collection::vec;
 use proptest::option;
@@ -9,7 +9,7 @@ use qcbus_formats::xqar::{
     Metadata, Param, Results, Status, read, write,
 };
 
-/// Text that XML can carry, with everything that needs escaping.
+/// Generates text that XML can contain, with everything that needs escaping.
 fn text() -> impl Strategy<Value = String> {
     vec(
         prop_oneof![
@@ -86,7 +86,8 @@ fn elsewhere() -> impl Strategy<Value = OtherPlace> {
     )
 }
 
-/// Places as this project writes them: road positions last, places of nothing else at the end.
+/// Generates places in the order of this project: road positions are last in a place, and places
+/// with only roads come at the end.
 fn locations() -> impl Strategy<Value = Vec<Locations>> {
     let mixed = (
         text(),
@@ -218,7 +219,7 @@ fn results() -> impl Strategy<Value = Results> {
     ("[0-9.]{1,5}", vec(bundle, 0..3)).prop_map(|(version, bundles)| Results { version, bundles })
 }
 
-/// Elements with any names and texts at all, as a careless or hostile bundle may send them.
+/// Generates elements with any names and texts, as a careless or hostile bundle may send them.
 fn wild_element() -> impl Strategy<Value = InfoElement> {
     let name = || prop_oneof![anything(), "[a-z:]{0,4}", Just(String::from("xmlns:a"))];
     let attributes = move || vec((name(), anything()), 0..4);

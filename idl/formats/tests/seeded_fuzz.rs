@@ -1,4 +1,5 @@
-//! The fuzz targets' bodies on stable, from good files bent by a fixed pseudo-random sequence.
+//! Runs the fuzz targets' bodies on stable, with good files that a fixed pseudo-random sequence
+//! damages.
 
 mod common;
 
@@ -31,7 +32,7 @@ const MARKUP: [&[u8]; 14] = [
     b" a='b'",
 ];
 
-/// Bytes removed, doubled, replaced and inserted.
+/// Removes, duplicates, replaces and inserts bytes.
 fn damage(bytes: &mut Vec<u8>, random: &mut Rng) {
     for _ in 0..=random.usize(..4) {
         let at = random.usize(..bytes.len().max(1));

@@ -1,4 +1,4 @@
-//! Result files: what is written, and what is understood.
+//! Tests of result files: the written form, and the accepted forms.
 
 mod common;
 
@@ -20,7 +20,7 @@ fn a_full_result_in_the_form_of_2023() {
 #[test]
 fn the_current_form_reads_back_whole() {
     let mut expected = full();
-    // The one thing XML cannot carry.
+    // XML cannot contain this character.
     expected.bundles[0].checkers[0].issues[0].domain_info[0].content[0].children[0].text =
         "a < b\u{FFFD}".into();
     assert_eq!(
@@ -39,7 +39,7 @@ fn the_old_form_keeps_rules_and_road_positions() {
     assert_eq!(old.status, None);
 }
 
-/// As tools of 2023 wrote it: no status, no rules, no build date, angles, empty attributes.
+/// A file as tools of 2023 wrote it: no status, no rules, no build date, angles, empty attributes.
 const OLD: &str = r#"<?xml version="1.0" encoding="UTF-8" standalone="no" ?>
 <CheckerResults version="1.0.0">
 

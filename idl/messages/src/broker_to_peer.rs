@@ -1,4 +1,4 @@
-//! What the broker says to one bundle or reporter.
+//! Messages from the broker to one bundle or reporter.
 
 use std::collections::BTreeMap;
 
@@ -11,86 +11,86 @@ use crate::{Digest, DocId, DocumentRole, JobId, MissingDocument, Verdict};
 /// Broker → bundle or reporter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum ToPeer {
-    /// The session is open. A bundle answers with its catalogue, a reporter with nothing.
+    /// The session is open. A bundle answers with its catalogue; a reporter does not answer.
     Welcome {
         /// Broker generation that this session belongs to.
         generation: u64,
         /// Digest of the configuration in force.
         config: Digest,
     },
-    /// The peer may not take part; the text says why. The session ends.
+    /// The peer is refused; the text says why. The session ends.
     Refused {
-        /// For a person: what does not fit, and what to do.
+        /// For a person: the reason and the fix.
         reason: String,
     },
-    /// Check this.
+    /// Check this file.
     Job(Job),
-    /// Stop checking this; nothing sent for it counts any more. Unknown jobs are ignored.
+    /// Stop checking this job; later messages for it are ignored. Unknown jobs are ignored too.
     Cancel {
         /// The job.
         job: JobId,
     },
-    /// Report this.
+    /// Report this result.
     Result(Box<ResultMessage>),
-    /// The file of a result has gone: take back what was reported about it.
+    /// The file of a result was deleted: withdraw its reports.
     Withdrawn(Withdrawn),
-    /// No further jobs: finish what is there, say `Leaving`, and go.
+    /// No further jobs: finish the current work, send `Leaving`, and exit.
     Drain,
 }
 
-/// Why a broker refuses who comes while it goes: nobody's fault, and of no interest to who was started by it.
+/// Refusal reason of a stopping broker. A peer started by the broker ends without an error.
 pub const IS_STOPPING: &str = "this broker is stopping";
 
-/// One file to check.
+/// A file to check.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Job {
     /// Its number.
     pub job: JobId,
-    /// The configuration to check under. A bundle that has not seen it yet waits for it.
+    /// The configuration of the check. A bundle without this configuration waits for it.
     pub config: Digest,
-    /// What the root's name promises.
+    /// Kind of file according to the root's name.
     pub kind: FileKind,
     /// The documents, the root first.
     pub documents: Vec<JobDocument>,
-    /// What the root refers to and could not be had.
+    /// Documents that the root refers to and that are missing.
     pub missing: Vec<MissingDocument>,
 }
 
 /// A document of a job.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct JobDocument {
-    /// Under which it was or will be published.
+    /// Id under which it was or will be published.
     pub doc: DocId,
-    /// What it is to the job.
+    /// Its role in the job.
     pub role: DocumentRole,
-    /// Absolute path; for a member of an archive, the archive's path, `!` and the member's name.
+    /// Absolute path. For a member of an archive: the archive's path, `!` and the member's name.
     pub path: String,
     /// Digest of the bytes on disk; for an image of several files, see the image's sources.
     pub digest: Digest,
-    /// Byte offset of the element in the root's image that leads here, perhaps through other
+    /// Byte offset of the element in the root's image that leads here, directly or through other
     /// documents; 0 for the root.
     pub referred_at: u32,
-    /// Where its own references to maps and scenarios lead.
+    /// Targets of its own references to maps and scenarios.
     pub links: Vec<Link>,
 }
 
-/// A reference that was followed.
+/// A resolved reference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Link {
-    /// Byte offset of the referring element in the image of the document that refers.
+    /// Byte offset of the referring element in the image of its document.
     pub at: u32,
-    /// The document that is meant, by its place among the job's documents.
+    /// Index of the target among the job's documents.
     pub to: u32,
 }
 
 /// A finished job, for reporters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ResultMessage {
-    /// The job: the same job may be sent again after a crash, so writing must be idempotent.
+    /// The job. It may be sent again after a crash, so writing must be idempotent.
     pub job: JobId,
     /// Absolute path of the checked file.
     pub input: String,
-    /// Path for people, relative to the directory given or watched.
+    /// Path for people, relative to the given or watched directory.
     pub display_path: String,
     /// Absolute path of the `.xqar`.
     pub xqar: String,
@@ -100,34 +100,34 @@ pub struct ResultMessage {
     pub digest: Digest,
     /// Digest of the configuration.
     pub config: Digest,
-    /// Root document, readable as long as it stays on the bus.
+    /// Root document, readable while it is on the bus.
     pub document: Option<DocId>,
     /// The pooled result.
     pub results: Results,
-    /// What the rules that were broken are about, by rule UID, from the bundles' pages.
+    /// Explanations of the violated rules, by rule UID, from the bundles' pages.
     pub rules: BTreeMap<String, String>,
-    /// Parameters for this reporter from the configuration.
+    /// Parameters of this reporter from the configuration.
     pub params: Vec<Param>,
 }
 
-/// A checked file that has gone, for reporters.
+/// A deleted checked file, for reporters.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Withdrawn {
     /// Absolute path of the file, as in the result.
     pub input: String,
     /// Path for people, as in the result.
     pub display_path: String,
-    /// Absolute path where the `.xqar` was.
+    /// Absolute path of the former `.xqar`.
     pub xqar: String,
-    /// Parameters for this reporter from the configuration.
+    /// Parameters of this reporter from the configuration.
     pub params: Vec<Param>,
 }
 
-/// What a reporter did with a result.
+/// How a reporter processed a result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PeerReport {
-    /// Written and safe.
+    /// The report is written and safe.
     Written,
-    /// Not written, with the reason; tried again by the next broker.
+    /// The report is not written, with the reason. The next broker tries again.
     Failed(String),
 }

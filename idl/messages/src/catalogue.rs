@@ -1,4 +1,4 @@
-//! How a peer introduces itself.
+//! Registration of a peer.
 
 use qcbus_document::FileKind;
 use qcbus_formats::Text;
@@ -6,7 +6,7 @@ use qcbus_formats::pool::RuleUids;
 use qcbus_formats::xqar::Level;
 use serde::{Deserialize, Serialize};
 
-/// Which side of the checking a peer is on.
+/// Role of a peer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Role {
@@ -16,7 +16,7 @@ pub enum Role {
     Reporter,
 }
 
-/// The first words of a peer, repeated until it is welcomed. Small: it must fit one slot.
+/// First message of a peer, repeated until it is welcomed. It must fit one slot.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Hello {
     /// [`crate::PROTOCOL_VERSION`] of the peer.
@@ -31,24 +31,24 @@ pub struct Hello {
     pub incarnation: u64,
     /// Process id.
     pub pid: u32,
-    /// Given by whoever started the process (`--launch`), so that a supervisor knows its own.
+    /// Number from the start of the process (`--launch`), by which a supervisor recognises it.
     pub launch: Option<u64>,
-    /// How many jobs or results it takes at once.
+    /// Maximum number of jobs or results at once.
     pub capacity: u16,
-    /// How many threads it works with, for people who look at its status.
+    /// Number of worker threads, shown in the status.
     pub threads: u16,
 }
 
-/// What a bundle can do; sent after the welcome, before its first job.
+/// Capabilities of a bundle, sent after the welcome and before its first job.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Catalogue {
-    /// The bundle's short name, such as `xodr`; a configuration may use it for the name.
+    /// The bundle's short name, such as `xodr`. A configuration may use it instead of the name.
     pub alias: String,
     /// What the bundle checks.
     pub description: String,
     /// Date of the build, `YYYY-MM-DD`.
     pub build_date: String,
-    /// Root files that it takes.
+    /// Root files that it accepts.
     pub kinds: Vec<FileKind>,
     /// Its checkers in the order of the result.
     pub checkers: Vec<CheckerInfo>,
@@ -59,15 +59,15 @@ pub struct Catalogue {
 pub struct CheckerInfo {
     /// Identifier, unique in the bundle.
     pub id: Text,
-    /// What it checks, in a sentence.
+    /// Subject of the check, in a sentence.
     pub description: Text,
-    /// The rules that it answers for.
+    /// The rules that it checks.
     pub rule_uids: RuleUids,
     /// Root files that it applies to.
     pub kinds: Vec<FileKind>,
-    /// Whether it runs when no configuration asks for it.
+    /// Whether it runs when no configuration requests it.
     pub default_on: bool,
-    /// Severity of its issues when it leaves nothing else to say.
+    /// Default severity of its issues.
     pub level: Level,
     /// Parameters that it reads.
     pub params: Vec<ParamInfo>,
@@ -78,7 +78,7 @@ pub struct CheckerInfo {
 pub struct ParamInfo {
     /// Name.
     pub name: String,
-    /// Value unless the configuration says otherwise.
+    /// Value if the configuration does not set it.
     pub default: String,
     /// Meaning and unit.
     pub description: String,

@@ -1,20 +1,20 @@
-//! How messages become bytes. The only file that names bincode.
+//! Encoding of messages as bytes. This is the only file that uses bincode.
 
 use bincode::config::{Configuration, Fixint, Limit, LittleEndian};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// Largest encoded message, in bytes. A result with its issues is the largest thing said.
+/// Maximum size of an encoded message in bytes. A result with its issues is the largest message.
 pub const MAX_MESSAGE: usize = 64 << 20;
 
-/// Largest encoded message that a bundle or reporter may send, in bytes: what it says is small, and
-/// findings come in any number of batches. Decoded it takes up to four times as much.
+/// Maximum size of an encoded message from a bundle or reporter, in bytes. Their messages are
+/// small, and findings come in batches. Decoding takes up to four times as much memory.
 pub const MAX_FROM_PEER: usize = 4 << 20;
 
-/// Why bytes could not be read as a message, or a message not be written.
+/// Reason why bytes cannot be decoded to a message, or a message cannot be encoded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CodecError {
-    /// The bytes are not such a message.
+    /// The bytes are not a valid message.
     #[error("not a valid message: {0}")]
     Malformed(String),
     /// Bytes were left over after the message.
@@ -23,20 +23,20 @@ pub enum CodecError {
     /// The message is larger than [`MAX_MESSAGE`].
     #[error("the message has {0} bytes, more than the {MAX_MESSAGE} allowed")]
     TooLarge(usize),
-    /// The message cannot be written.
+    /// The message cannot be encoded.
     #[error("cannot encode the message: {0}")]
     Unencodable(String),
 }
 
 type Config = Configuration<LittleEndian, Fixint, Limit<MAX_MESSAGE>>;
 
-/// The limit also bounds what a hostile length prefix can make the decoder reserve.
+/// The limit also bounds the memory that the decoder reserves for a hostile length prefix.
 const CONFIG: Config = bincode::config::legacy().with_limit::<MAX_MESSAGE>();
 
 /// Encodes a message.
 ///
 /// # Errors
-/// [`CodecError::TooLarge`] above [`MAX_MESSAGE`], [`CodecError::Unencodable`] when serde refuses.
+/// [`CodecError::TooLarge`] above [`MAX_MESSAGE`], [`CodecError::Unencodable`] when serde fails.
 pub fn encode<T: Serialize>(message: &T) -> Result<Vec<u8>, CodecError> {
     let bytes = bincode::serde::encode_to_vec(message, CONFIG)
         .map_err(|error| CodecError::Unencodable(error.to_string()))?;
@@ -46,11 +46,11 @@ pub fn encode<T: Serialize>(message: &T) -> Result<Vec<u8>, CodecError> {
     Ok(bytes)
 }
 
-/// Decodes one message that fills `bytes` entirely.
+/// Decodes one message that fills `bytes` entirely. It never panics and never reserves more memory
+/// than the limit.
 ///
 /// # Errors
-/// [`CodecError::Malformed`] or [`CodecError::TrailingBytes`]; never panics, never reserves more
-/// than the limit.
+/// [`CodecError::Malformed`] or [`CodecError::TrailingBytes`].
 pub fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, CodecError> {
     if bytes.len() > MAX_MESSAGE {
         return Err(CodecError::TooLarge(bytes.len()));
@@ -82,7 +82,7 @@ mod tests {
 
     #[test]
     fn whoever_moves_a_message_raises_the_version() {
-        // A message put in before the last one moves its number, and old peers read another one.
+        // A message inserted before the last one changes its number, so old peers misread it.
         let drain = encode(&ToPeer::Drain).unwrap();
         let leaving = encode(&FromPeer::Leaving).unwrap();
         let numbers = (drain.first().copied(), leaving.first().copied());
@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn a_hostile_length_is_refused_before_memory_is_reserved() {
-        // Variant 3 is `Job`; what follows claims 2^60 documents.
+        // The third variant, number 2, is `Job`; the bytes after it declare 2^60 documents.
         let mut bytes = vec![2, 0, 0, 0];
         bytes.extend([0; 8 + 8 + 32 + 4]);
         bytes.extend((1_u64 << 60).to_le_bytes());

@@ -1,4 +1,4 @@
-//! What short-lived commands say to the broker over `control.sock`: one JSON object per line.
+//! Messages of short-lived commands to the broker over `control.sock`: one JSON object per line.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -12,61 +12,61 @@ use crate::{Catalogue, Verdict, path_text};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "request", rename_all = "kebab-case")]
 pub enum Request {
-    /// How are things?
+    /// Request the status.
     Status,
-    /// Answer when the file's present bytes have a verdict.
+    /// Wait for a verdict on the file's current bytes.
     Wait {
         /// Absolute path of the file.
         #[serde(with = "path_text::one")]
         file: PathBuf,
-        /// Give up after this many milliseconds; never, when absent.
+        /// Maximum waiting time in milliseconds; `None` means no limit.
         timeout_ms: Option<u64>,
     },
-    /// Answer when the file's present bytes have a verdict, and every reporter has said that its report of it is
-    /// written. A request of its own: a broker that does not know it must not answer without the reports.
+    /// Wait for a verdict on the file's current bytes, and until every reporter has written its
+    /// report. It is a separate request: a broker without it must not answer before the reports.
     WaitReported {
         /// Absolute path of the file.
         #[serde(with = "path_text::one")]
         file: PathBuf,
-        /// Give up after this many milliseconds; never, when absent.
+        /// Maximum waiting time in milliseconds; `None` means no limit.
         timeout_ms: Option<u64>,
     },
-    /// Check a file for me, watched or not, and give me the result; nothing of it is kept.
+    /// On-demand check of any file. The response contains the result; the broker stores nothing.
     Check {
         /// Absolute path of the file.
         #[serde(with = "path_text::one")]
         file: PathBuf,
-        /// Under what.
+        /// The required check context.
         check_context: CheckContext,
     },
     /// Drain and stop.
     Down,
     /// Read the configuration and the bundle manifests again.
     Reload,
-    /// Demand a bundle no longer that no manifest names: one that joined by hand and is gone for
-    /// good.
+    /// Stop requiring a bundle that no manifest names: one that was started by hand and will not
+    /// return.
     RemoveBundle {
         /// Its name.
         name: String,
     },
-    /// How does this bundle stand that I have added or changed?
+    /// Request the readiness of a bundle that was added or changed.
     Bundle {
         /// Its name.
         name: String,
     },
-    /// What has this shadow found?
+    /// Request the trials of a shadow.
     Trials {
         /// Its name.
         name: String,
     },
-    /// What do the bundles offer that are there?
+    /// Request the catalogues of the running bundles.
     Offers {
-        /// All but these, which whoever asks knows.
+        /// Bundles to leave out, because the client knows them.
         without: Vec<String>,
     },
 }
 
-/// The broker's answer.
+/// Response of the broker.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "response", rename_all = "kebab-case")]
 pub enum Response {
@@ -74,106 +74,108 @@ pub enum Response {
     Status(Box<Status>),
     /// Answer to `Wait` and `WaitReported`.
     Verdict(FileVerdict),
-    /// Answer to `Wait` and `WaitReported`: the time is over.
+    /// Answer to `Wait` and `WaitReported`: the time limit has expired.
     TimedOut,
-    /// Answer to `WaitReported`: the time is over, there is a verdict, and reports are missing.
+    /// Answer to `WaitReported`: the time limit has expired, and reports on the verdict are
+    /// missing.
     Unreported {
         /// The verdict.
         verdict: FileVerdict,
-        /// The reporters that have not written theirs, each with why, for a person.
+        /// The reporters with a missing report, each with the reason, for a person.
         reporters: Vec<String>,
     },
-    /// Answer to `Wait`: the file cannot be looked at, or one that it refers to; it lies on a disk that does not answer,
-    /// for instance.
+    /// Answer to `Wait`: the file, or one that it refers to, cannot be accessed. For instance, its
+    /// disk does not respond.
     Unanswered {
-        /// For a person.
+        /// The reason, for a person.
         reason: String,
     },
-    /// Answer to `Wait`: nobody watches this file, and why.
+    /// Answer to `Wait`: the file is not watched, with the reason.
     Unwatched {
-        /// For a person.
+        /// The reason, for a person.
         reason: String,
     },
     /// Answer to `Check`.
     Checked(Box<Checked>),
-    /// Answer to `Check`: this broker would not find what whoever asks would find, or cannot say; he is to check the
-    /// file himself.
+    /// Answer to `Check`: this broker would return a different result than the client's own check,
+    /// or cannot rule that out. The client must check the file itself.
     Elsewhere {
-        /// For a person.
+        /// The reason, for a person.
         reason: String,
     },
-    /// Answer to `Down`, sent when everything has been drained; to any other request, the broker stopped before it had
-    /// an answer.
+    /// Answer to `Down`: all work is drained. For other requests: the broker stopped without an
+    /// answer.
     Stopped,
-    /// Answer to `Reload`: what changed, line by line; nothing when nothing did.
+    /// Answer to `Reload`: the changes, one per line; empty when there are none.
     Reloaded {
-        /// For a person.
+        /// The changes, for a person.
         changes: Vec<String>,
-        /// What is odd about the configuration and the manifests now in force, for a person.
+        /// Oddities of the current configuration and manifests, for a person.
         #[serde(default)]
         notices: Vec<String>,
     },
-    /// Answer to `RemoveBundle`: it is not demanded any more.
+    /// Answer to `RemoveBundle`: the bundle is no longer required.
     Removed {
-        /// What that means, for a person.
+        /// The effect, for a person.
         what: String,
     },
-    /// Answer to `Bundle`; nothing when there is none of this name.
+    /// Answer to `Bundle`; empty when there is no bundle of this name.
     Bundle {
-        /// How it stands.
+        /// Its readiness.
         bundle: Option<Box<BundleReadiness>>,
     },
     /// Answer to `Trials`.
     Trials {
-        /// How many there are of each kind; nothing when there is no such shadow.
+        /// The numbers of each kind; `None` when there is no such shadow.
         counts: Option<TrialCounts>,
-        /// Those that would change a verdict, failed, or found anything: at most a thousand, what changes most first.
+        /// Trials that would change a verdict, failed, or found anything: at most a thousand,
+        /// largest change first.
         trials: Vec<Trial>,
     },
     /// Answer to `Offers`.
     Offers {
-        /// By name.
+        /// The catalogues, sorted by name.
         offers: Vec<Offer>,
     },
-    /// The request could not be carried out, and what stays in force.
+    /// The request failed. The text also says which state remains in force.
     Failed {
-        /// For a person.
+        /// The reason, for a person.
         reason: String,
     },
 }
 
-/// How a bundle stands, of which a manifest says what is wanted.
+/// Readiness of a bundle compared with its manifest.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct BundleReadiness {
     /// Its name.
     pub name: String,
-    /// The command of the manifest that is in force; nothing when it was started by hand or comes with the program.
+    /// The command of the manifest in force; `None` if started by hand or part of the program.
     pub command: Option<String>,
-    /// Tells the files that this command runs, and all else of the manifest, from former ones.
+    /// Value that changes when the files of this command or anything else in the manifest change.
     pub spec: u64,
-    /// How the process of this very command stands.
+    /// Readiness of the process of exactly this command.
     pub readiness: Readiness,
-    /// Who judges at the moment, be it an older process; nothing when nobody does.
+    /// The process that currently judges, possibly an older one; `None` when there is none.
     pub runs: Option<Runs>,
-    /// The last lines that a process of it has said before it ended without having joined, as it said them.
+    /// Final output of a process that ended before it joined: the last lines, unchanged.
     #[serde(default)]
     pub said: Vec<String>,
 }
 
-/// How the process stands that is wanted of a bundle.
+/// Readiness of the process that a bundle's manifest requires.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "readiness", rename_all = "kebab-case")]
 pub enum Readiness {
-    /// It has joined, has said what it checks, and is asked from now on.
+    /// It has joined and sent its catalogue, and receives jobs from now on.
     Ready,
-    /// It is being started, and nothing has gone wrong so far.
+    /// It is starting, and no error has occurred so far.
     Coming {
-        /// It has said hello, and not yet what it checks.
+        /// Whether it has sent its hello; its catalogue is still missing.
         joined: bool,
     },
-    /// It was started in vain; the broker tries again.
+    /// Its start failed; the broker tries again.
     Failing {
-        /// Why, for a person.
+        /// The reason, for a person.
         why: String,
     },
 }
@@ -184,50 +186,50 @@ impl Default for Readiness {
     }
 }
 
-/// A process of a bundle that judges.
+/// A bundle process that judges.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Runs {
     /// Its version.
     pub version: String,
-    /// Its process.
+    /// Its process id.
     pub pid: u32,
-    /// How many checkers it offers.
+    /// Number of its checkers.
     pub checkers: u64,
-    /// The root files that it takes.
+    /// The root files that it accepts.
     pub kinds: Vec<FileKind>,
-    /// How many of its checkers are asked under the configuration in force.
+    /// Number of its checkers that the configuration in force requests.
     pub demanded: u64,
-    /// It has no weight in any verdict.
+    /// Whether it runs as a shadow, with no effect on any verdict.
     #[serde(default)]
     pub shadow: bool,
 }
 
-/// How far a shadow is with its trials, and what they come to.
+/// Progress of a shadow's trials, and their outcomes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct TrialCounts {
-    /// Files that it has been asked about.
+    /// Files that it was asked to check.
     pub tried: u64,
     /// Files that wait for it.
     pub waiting: u64,
-    /// Files that are not rejected, and would be.
+    /// Files that are not rejected, and would be rejected.
     pub would_reject: u64,
     /// Files that are accepted, and would be undetermined.
     pub would_leave_open: u64,
-    /// Files that are undetermined because nobody judges them, and would be accepted.
+    /// Files that are undetermined because no bundle judges them, and would be accepted.
     pub would_accept: u64,
-    /// Files about which it could not say anything.
+    /// Files for which it could not give an answer.
     pub failed: u64,
 }
 
-/// What a shadow said of a file.
+/// A shadow's answer for a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Trial {
     /// Absolute path.
     #[serde(with = "path_text::one")]
     pub file: PathBuf,
-    /// The verdict on it.
+    /// The actual verdict.
     pub verdict: Verdict,
-    /// The verdict that it would have if the shadow judged, too.
+    /// The verdict if the shadow also judged.
     pub would: Verdict,
     /// Issues of level error.
     pub errors: u64,
@@ -235,47 +237,47 @@ pub struct Trial {
     pub warnings: u64,
     /// Issues of level information.
     pub information: u64,
-    /// Its checkers that did not end well and why.
+    /// Its checkers that did not end properly, with reasons.
     pub why: Vec<String>,
-    /// Why it said nothing, if it did not.
+    /// The reason for a missing answer, if it gave none.
     pub failure: Option<String>,
-    /// Where its result lies; empty when there is none.
+    /// Path of its result; empty when there is none.
     #[serde(with = "path_text::one")]
     pub result: PathBuf,
 }
 
-/// What a bundle offers that is there.
+/// Catalogue of a running bundle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Offer {
     /// Its name.
     pub name: String,
     /// Its version.
     pub version: String,
-    /// What it checks.
+    /// Its catalogue.
     pub catalogue: Catalogue,
 }
 
-/// Under what a file is checked. A broker of the same program that works under equal terms finds the same.
+/// Check context of a file. The same program with an equal context gives the same result.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct CheckContext {
-    /// Digest over the configuration, the form of results, and all limits.
+    /// Digest of the configuration, the form of results, and all limits.
     pub general: String,
-    /// The bundles that are to look at the file, each with a digest over how it is started.
+    /// The bundles that must check the file, each with a digest of its start settings.
     pub bundles: BTreeMap<String, String>,
 }
 
-/// A result that was made for whoever asked.
+/// Result of an on-demand check, for the client.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Checked {
     /// The verdict; there is no result file.
     pub verdict: FileVerdict,
-    /// The result, as its file is to have it.
+    /// The content for the result file.
     pub result: String,
-    /// The files that this one rests on, which the verdict knows nothing of.
+    /// The files that this one depends on; they are not part of the verdict.
     pub rests_on: Vec<Referenced>,
 }
 
-/// A file that another one rests on.
+/// A file that another one depends on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Referenced {
     /// Absolute path.
@@ -293,9 +295,9 @@ pub struct FileVerdict {
     pub file: PathBuf,
     /// The verdict.
     pub verdict: Verdict,
-    /// SHA-256 of the bytes that it is about.
+    /// SHA-256 of the judged bytes.
     pub digest: String,
-    /// Where the result lies; empty when there is none.
+    /// Path of the result; empty when there is none.
     #[serde(with = "path_text::one")]
     pub xqar: PathBuf,
     /// Issues of level error.
@@ -304,7 +306,7 @@ pub struct FileVerdict {
     pub warnings: u64,
     /// Issues of level information.
     pub information: u64,
-    /// For undetermined: the checkers that did not end well and why. Otherwise empty.
+    /// For undetermined: the checkers that did not end properly, with reasons. Otherwise empty.
     pub why: Vec<String>,
 }
 
@@ -324,18 +326,18 @@ pub struct Status {
     /// Watched directories.
     #[serde(with = "path_text::many")]
     pub watching: Vec<PathBuf>,
-    /// `notify` or `poll`, and why when it is not what was asked for.
+    /// `notify` or `poll`, and the reason if it differs from the requested mode.
     pub watch_mode: String,
-    /// Where results go.
+    /// Output directory of results.
     #[serde(with = "path_text::one")]
     pub out: PathBuf,
-    /// Where it keeps what must survive a restart.
+    /// Directory of data that must survive a restart.
     #[serde(default)]
     pub state: Option<PathBuf>,
-    /// The directory of bundle manifests that it watches.
+    /// The watched directory of bundle manifests.
     #[serde(default)]
     pub bundles_d: Option<PathBuf>,
-    /// Where accepted files are published, if anywhere.
+    /// Target of published accepted files, if any.
     #[serde(default)]
     pub gate: Option<GateStatus>,
     /// Digest of the configuration in force.
@@ -346,59 +348,59 @@ pub struct Status {
     pub queue: QueueStatus,
     /// Bundles and reporters.
     pub peers: Vec<PeerStatus>,
-    /// Counts up with every change of who must judge, or of what is demanded of them.
+    /// Counter of changes of the required bundles and of the checkers requested from them.
     pub epoch: u64,
-    /// What lies in the watched directories and cannot be looked at now; the first hundred.
+    /// Paths in the watched directories that cannot be accessed now; the first hundred.
     #[serde(default)]
     pub unseen: Vec<Unseen>,
-    /// What is being written to, and is not judged before it has settled; the first hundred.
+    /// Files being written to, which are judged when they no longer change; the first hundred.
     #[serde(default)]
     pub unfinished: Vec<Unfinished>,
-    /// What keeps the broker from its work at this moment, for a person.
+    /// Current failures that keep the broker from its work, for a person.
     #[serde(default)]
     pub troubles: Vec<String>,
-    /// That the program on the disk is another by now than the one that runs, and what to do: for a person.
+    /// Message that the program on disk differs from the running one, with the fix, for a person.
     #[serde(default)]
     pub replaced: Option<String>,
-    /// Where one-shot modules of ASAM's framework have their private directories, as soon as it was looked at.
+    /// Directory of the private directories of one-shot ASAM modules; set after its first check.
     #[serde(default)]
     pub scratch: Option<ScratchStatus>,
-    /// Things a person should look at, newest last.
+    /// Notices for a person, newest last.
     pub notices: Vec<NoticeStatus>,
 }
 
-/// Where one-shot modules of ASAM's framework have their private directories.
+/// Directory of the private directories of one-shot ASAM modules.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ScratchStatus {
-    /// The directory, which is made when it is missing.
+    /// The directory; it is created when it is missing.
     #[serde(with = "path_text::one")]
     pub directory: PathBuf,
-    /// Why nothing can be written there, for a person.
+    /// The reason why it is not writable, for a person.
     pub why: Option<String>,
 }
 
-/// Something that a person should look at.
+/// A notice for a person.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct NoticeStatus {
-    /// What kind of thing happened, for programs: `ended`, `killed`, `no-room` and so on.
+    /// Kind of event, for programs: `ended`, `killed`, `no-room` and so on.
     pub kind: String,
-    /// The bundle or reporter that it is about.
+    /// The bundle or reporter concerned.
     pub about: Option<String>,
-    /// For a person.
+    /// Text for a person.
     pub text: String,
-    /// Seconds since it last happened.
+    /// Seconds since its last occurrence.
     #[serde(default)]
     pub ago_s: u64,
 }
 
-/// Something in a watched or given directory that could not be looked at, so that nothing is known
-/// of what lies there.
+/// A path in a watched or given directory that could not be accessed, so that its content is
+/// unknown.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Unseen {
     /// Absolute path.
     #[serde(with = "path_text::one")]
     pub path: PathBuf,
-    /// Why, for a person.
+    /// The reason, for a person.
     pub why: String,
 }
 
@@ -419,7 +421,7 @@ pub struct Unfinished {
     /// Absolute path.
     #[serde(with = "path_text::one")]
     pub path: PathBuf,
-    /// Why it is not judged yet, for a person.
+    /// The reason why it is not judged yet, for a person.
     pub why: String,
 }
 
@@ -430,7 +432,7 @@ impl std::fmt::Display for Unfinished {
     }
 }
 
-/// What lies behind the gate, and what does not.
+/// Files published behind the gate, and files held back.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct GateStatus {
     /// The directory.
@@ -438,38 +440,38 @@ pub struct GateStatus {
     pub directory: PathBuf,
     /// Accepted files that are published.
     pub published: u64,
-    /// Accepted files that are not, because of something that they depend on.
+    /// Accepted files that are not published because of a dependency.
     pub held_back: u64,
-    /// The first of them.
+    /// The first files held back.
     pub examples: Vec<HeldBack>,
 }
 
-/// A file that is accepted and not published.
+/// A file that is accepted but not published.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct HeldBack {
     /// Absolute path.
     #[serde(with = "path_text::one")]
     pub file: PathBuf,
-    /// Why: for a person.
+    /// The reason, for a person.
     pub why: String,
 }
 
-/// How many files are in which state.
+/// Numbers of files by state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct FileCounts {
-    /// Known and present.
+    /// Known and existing files.
     pub total: u64,
-    /// With a verdict for their present bytes.
+    /// Files with a verdict for their current bytes.
     pub judged: u64,
-    /// Verdict accepted.
+    /// Files with the verdict accepted.
     pub accepted: u64,
-    /// Verdict rejected.
+    /// Files with the verdict rejected.
     pub rejected: u64,
-    /// Verdict undetermined.
+    /// Files with the verdict undetermined.
     pub undetermined: u64,
 }
 
-/// How much waits and how fast it goes.
+/// Length and speed of the queue.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct QueueStatus {
     /// Files that wait to be checked.
@@ -479,7 +481,7 @@ pub struct QueueStatus {
     pub background: u64,
     /// Files that are being checked.
     pub active: u64,
-    /// Seconds that the oldest has waited.
+    /// Waiting time of the oldest file, in seconds.
     pub oldest_waiting_s: f64,
     /// Verdicts per second over the last ten seconds.
     pub rate: f64,
@@ -500,35 +502,35 @@ pub struct PeerStatus {
     pub pid: u32,
     /// `starting`, `ready`, `busy`, `silent`, `draining`, `down` or `gave up`.
     pub state: String,
-    /// Checkers that it offers.
+    /// Number of its checkers.
     pub checkers: u64,
-    /// Jobs that it is working on.
+    /// Jobs in progress.
     pub active: u64,
-    /// Threads that it works with, as it says itself.
+    /// Number of its worker threads, as reported by itself.
     #[serde(default)]
     pub threads: u64,
     /// Jobs or results done since it joined.
     pub done: u64,
     /// Times that it was started again.
     pub restarts: u64,
-    /// Of a reporter, reports that are not written or not taken back.
+    /// For a reporter: number of reports that are not written or not withdrawn.
     #[serde(default)]
     pub unreported: u64,
-    /// Remarks: why it is down, that it is slow.
+    /// Remarks, such as why it is down, or that it is slow.
     pub note: String,
-    /// How far it is confined; nothing where nobody can tell, and for reporters.
+    /// Its sandbox state; `None` if unknown, and for reporters.
     #[serde(default)]
     pub sandbox: Option<SandboxStatus>,
-    /// Of a shadow, how its trials stand.
+    /// For a shadow: progress of its trials.
     #[serde(default)]
     pub trials: Option<TrialCounts>,
 }
 
-/// How far a bundle is confined, as the broker sees it.
+/// Sandbox state of a bundle, as seen by the broker.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct SandboxStatus {
     /// `confined`, `partly` or `open`.
     pub state: String,
-    /// Why not wholly; empty when it is.
+    /// The reason why it is not fully sandboxed; empty when it is.
     pub why: String,
 }

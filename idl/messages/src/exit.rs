@@ -1,4 +1,4 @@
-//! What an exit code of qcbus means. Scripts depend on these numbers: none is ever changed.
+//! Meaning of qcbus's exit codes. Scripts depend on these numbers, so they never change.
 
 use crate::Verdict;
 
@@ -6,28 +6,29 @@ use crate::Verdict;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum Exit {
-    /// Everything that was checked is accepted, or the command did what it was asked to.
+    /// All checked files are accepted, or the command succeeded.
     Accepted = 0,
-    /// At least one file is rejected; of `doctor` and `status --health`: something needs a look.
+    /// At least one file is rejected. For `doctor` and `status --health`: something needs
+    /// attention.
     Rejected = 1,
-    /// Wrong usage or configuration, nothing to check, or a file that nobody watches.
+    /// Wrong usage or configuration, nothing to check, or a file that is not watched.
     Usage = 2,
-    /// No file is rejected and at least one is undetermined, something could not be looked at, or the
-    /// time is over, also for the reports that `wait --reports` waits for.
+    /// No file is rejected and at least one is undetermined, or something could not be accessed. Or
+    /// the time limit has expired, also for the reports that `wait --reports` waits for.
     Undetermined = 3,
-    /// No broker runs as the instance that was asked for, or it is one of another user.
+    /// No broker runs as the requested instance, or it belongs to another user.
     NoBroker = 4,
-    /// Something went wrong inside qcbus or the system.
+    /// Internal error of qcbus or the system.
     Internal = 5,
 }
 
 impl Exit {
-    /// The number.
+    /// Returns the number.
     pub fn code(self) -> u8 {
         self as u8
     }
 
-    /// The exit code for the verdicts on any number of files; `Usage` when there are none.
+    /// Returns the exit code for the verdicts on any number of files; `Usage` when there are none.
     pub fn of_verdicts(verdicts: impl IntoIterator<Item = Verdict>) -> Exit {
         let mut exit = None;
         for verdict in verdicts {

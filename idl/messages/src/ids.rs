@@ -1,11 +1,11 @@
-//! Identifiers that both sides of the bus use.
+//! Identifiers used on both sides of the bus.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Version of the messages in this crate. Peers of another version are refused by name. Raised with
-/// every change of a message: one from before is read as something else, not as nothing.
+/// Version of the messages in this crate. Peers of another version are refused by name. Raise it
+/// with every change of a message, because old messages would be decoded as different ones.
 pub const PROTOCOL_VERSION: u32 = 5;
 
 /// One check of one file's bytes under one configuration; unique within a broker generation.
@@ -49,7 +49,7 @@ impl std::str::FromStr for Digest {
     }
 }
 
-/// What a document is to the job that carries it.
+/// Role of a document in the job that contains it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum DocumentRole {
@@ -61,11 +61,11 @@ pub enum DocumentRole {
     Catalog,
     /// A scenario that the root refers to, or `main.xosc` of a modular scenario's archive.
     Scenario,
-    /// The members of an archive that a scenario of the job lies in: an element `Archive` with a
+    /// The members of an archive that contains a scenario of the job: an element `Archive` with a
     /// `Member` for each, which has `name`, `size` in bytes and `crc32`.
     Listing,
-    /// The root after modular expansion: its text is that of the files it was made from, so that
-    /// every place in it is one in a file.
+    /// The root after modular expansion. Its text consists of the files it was made from, so all
+    /// positions in it are in these files.
     Expanded,
 }
 

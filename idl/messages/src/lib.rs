@@ -1,7 +1,7 @@
-//! What is said on the bus and on the control socket: plain data, one file per direction.
+//! Messages on the bus and on the control socket: plain data, one file per direction.
 //!
-//! Nothing here does I/O. The bus carries these types as a reliable, ordered stream per peer and
-//! direction (see `qcbus-bus`); documents and the configuration travel on topics of their own.
+//! This crate performs no I/O. The bus carries these types as a reliable, ordered stream per peer
+//! and direction (see `qcbus-bus`). Documents and the configuration have topics of their own.
 
 pub mod broker_to_peer;
 pub mod catalogue;
@@ -15,8 +15,8 @@ pub mod peer_to_broker;
 pub mod services;
 pub mod shown;
 
-/// Day of the build, `YYYY-MM-DD`: that of the commit, so that two builds of one source give the
-/// same results. See `build.rs`.
+/// Day of the build, `YYYY-MM-DD`. It is the day of the commit, so that two builds of one source
+/// give the same results. See `build.rs`.
 pub const BUILD_DATE: &str = env!("QCBUS_BUILD_DATE");
 
 pub use broker_to_peer::{

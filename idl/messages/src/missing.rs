@@ -1,4 +1,4 @@
-//! What a file refers to and could not be had.
+//! Files that a file refers to and that are missing.
 
 use std::fmt;
 
@@ -7,24 +7,24 @@ use serde::{Deserialize, Serialize};
 
 use crate::DocumentRole;
 
-/// A file that the root refers to and that could not be had, or is there and of no use.
+/// A file that the root refers to and that is missing or cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MissingDocument {
-    /// What it would have been.
+    /// Its expected role.
     pub role: DocumentRole,
     /// The reference as written.
     pub reference: String,
-    /// Where it was looked for; empty when it could not be looked for anywhere.
+    /// The path where it was expected; empty when the reference gives no path.
     pub path: String,
-    /// Why it could not be had.
+    /// The reason why it is missing.
     pub why: Absence,
-    /// How much it weighs: an error leads certainly nowhere, a warning leaves open what it leads to,
-    /// an information is no business of the file.
+    /// Severity. Error: the reference certainly leads nowhere. Warning: its target is unknown.
+    /// Information: it is no problem of the file.
     pub level: Level,
-    /// Byte offset of the element in the root's image that leads here, perhaps through other
+    /// Byte offset of the element in the root's image that leads here, directly or through other
     /// documents.
     pub referred_at: u32,
-    /// The reference itself, where another document than the root has it.
+    /// The reference itself, if it is in another document than the root.
     pub within: Option<Within>,
 }
 
@@ -39,60 +39,60 @@ pub struct Within {
     pub column: u32,
 }
 
-/// Why a file that is referred to could not be had.
+/// Reason why a referenced file is missing.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Absence {
-    /// There is nothing of that name.
+    /// No file of this name exists.
     NotThere,
     /// It is a directory.
     Directory,
     /// It is a device, a pipe or a socket.
     NotAFile,
-    /// The system refused, or the bus did.
+    /// The system or the bus refused access.
     Unreadable {
-        /// What was said.
+        /// The error message.
         why: String,
     },
-    /// It lies on another machine, and nothing is fetched.
+    /// It is on another machine. Files are not fetched over a network.
     Remote,
-    /// It is larger than what is read.
+    /// It is larger than the limit.
     TooLarge {
-        /// What it has and what is allowed.
+        /// Its size and the limit.
         why: String,
     },
     /// The reference is empty.
     EmptyPath,
-    /// The reference holds a parameter without a plain default.
+    /// The reference contains a parameter without a plain default.
     Parameter {
-        /// Its name, without `$`.
+        /// Name of the parameter, without `$`.
         name: String,
     },
-    /// The reference is an expression, which is known only when the scenario runs.
+    /// The reference is an expression, and its value is known only when the scenario runs.
     Expression,
-    /// More documents or catalogs belong to the file than are read.
+    /// The file needs more documents or catalogs than the limit.
     TooMany {
-        /// How many are read.
+        /// The limit.
         most: u64,
     },
-    /// No file is meant, but a map that the simulator knows by this name.
+    /// The reference means a map that the simulator knows by this name, not a file.
     SimulatorMap,
-    /// It leads out of the archive that refers to it.
+    /// The reference leads out of the archive that contains it, or into another archive.
     Escapes,
-    /// What it is called is neither a scenario nor an archive of one.
+    /// Its name has neither the suffix of a scenario nor that of an archive of one.
     NotAScenario,
-    /// Scenarios refer to scenarios more deeply than is followed.
+    /// Scenarios refer to scenarios more deeply than the limit.
     TooDeep {
-        /// How deeply they are followed.
+        /// The maximum depth.
         most: u32,
     },
-    /// A modular scenario of which no plain one could be made.
+    /// A modular scenario that cannot be expanded to a plain one.
     NotExpanded {
-        /// What is in the way.
+        /// The reason.
         why: String,
     },
-    /// It is there and read, and cannot be relied on: not well-formed, or without a part of it.
+    /// It was read but is not reliable: it is not well-formed, or a part of it is missing.
     Broken {
-        /// The file with the first fault: itself, or one that it includes.
+        /// The file with the first fault: the document itself, or a file that it includes.
         path: String,
         /// Line of the fault, from 1.
         row: u32,
@@ -104,7 +104,7 @@ pub enum Absence {
 }
 
 impl fmt::Display for Absence {
-    /// Reads on after the name of the file.
+    /// Writes text that continues a sentence after the name of the file.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Absence::NotThere => f.write_str("is not there"),

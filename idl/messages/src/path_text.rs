@@ -1,9 +1,10 @@
-//! Paths as text. On disk a name is bytes; in messages, JSON and the journal it is text.
+//! Conversion of paths to text. On disk a name is bytes; in messages, JSON and the journal it is
+//! text.
 //!
-//! A path that is UTF-8 is written as it is. Any other, and one that would move a cursor or begin a
-//! line, is written as `bytes:` and the path, in which every byte that is no UTF-8 or part of such a
-//! character, and every `%`, stands as `%` and two hexadecimal digits. So two paths never share a text,
-//! every text leads back to its path, and no name can pass for a line of a report.
+//! A path in UTF-8 is written unchanged, unless a character moves a cursor or begins a line. Others
+//! are written as `bytes:` and the path. Invalid bytes, such characters and every `%` become `%`
+//! and two hexadecimal digits per byte. The conversion is unique and reversible. No name can look
+//! like a line of a report.
 
 use std::ffi::OsString;
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
@@ -13,8 +14,8 @@ use qcbus_document::FileKind;
 
 use crate::shown::moves;
 
-/// Where the name of an archive on disk ends in `archive.mosc!member`; `None` for a file that lies in
-/// no archive. A `!` that follows no archive is an ordinary character.
+/// Returns the end of the archive's name in `archive.mosc!member`; `None` for a file outside of
+/// archives. A `!` that does not follow an archive's name is an ordinary character.
 pub fn end_of_archive(path: &[u8]) -> Option<usize> {
     let is_archive = |path: &[u8]| {
         FileKind::of_path(Path::new(std::ffi::OsStr::from_bytes(path))) == Some(FileKind::Mosc)
@@ -23,27 +24,27 @@ pub fn end_of_archive(path: &[u8]) -> Option<usize> {
     marks.find(|&at| is_archive(&path[..at]))
 }
 
-/// The archive on disk and the member in it: `archive.mosc` and `folder/member` of
+/// Returns the archive on disk and the member in it: `archive.mosc` and `folder/member` of
 /// `archive.mosc!folder/member`.
 pub fn split_archive(path: &str) -> Option<(&str, &str)> {
     let end = end_of_archive(path.as_bytes())?;
     Some((path.get(..end)?, path.get(end + 1..)?))
 }
 
-/// What people call a file: its name without the directories, and for a member of an archive the name of
-/// the archive before it, `archive.mosc!folder/member`.
+/// Returns the display name of a file: its name without the directories. For a member of an
+/// archive, the name of the archive precedes it, `archive.mosc!folder/member`.
 pub fn name_of(path: &str) -> &str {
     let file = split_archive(path).map_or(path, |(archive, _)| archive);
     file.rfind('/')
         .map_or(path, |at| path.get(at + 1..).unwrap_or(path))
 }
 
-/// Begins the text of a path that cannot be written as it is.
+/// Prefix of the text of a path that cannot be written unchanged.
 const ESCAPED: &str = "bytes:";
 
-/// The text of a path.
+/// Returns the text of a path.
 pub fn to_text(path: &Path) -> String {
-    // A plain path that looks like an escaped one would be mistaken for it.
+    // An unescaped path with the prefix of an escaped one would be ambiguous.
     let plain = |text: &&str| !text.starts_with(ESCAPED) && !text.chars().any(moves);
     if let Some(plain) = path.to_str().filter(plain) {
         return plain.to_owned();
@@ -68,7 +69,7 @@ fn escape(bytes: &[u8], text: &mut String) {
     }
 }
 
-/// The path of a text. Text that nobody gets from [`to_text`] is taken as it is.
+/// Returns the path of a text. Text that is not an output of [`to_text`] is used unchanged.
 pub fn from_text(text: &str) -> PathBuf {
     let unescaped = text.strip_prefix(ESCAPED).and_then(unescape);
     unescaped.map_or_else(
@@ -88,7 +89,7 @@ fn unescape(text: &str) -> Option<Vec<u8>> {
         }
         let (digits, tail) = tail.split_at_checked(2)?;
         let digits = std::str::from_utf8(digits).ok()?;
-        // `from_str_radix` would take a sign.
+        // `from_str_radix` would accept a sign.
         if !digits.bytes().all(|digit| digit.is_ascii_hexdigit()) {
             return None;
         }
@@ -98,7 +99,7 @@ fn unescape(text: &str) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// For `#[serde(with = "path_text::one")]`: a path as its text.
+/// Serde functions for `#[serde(with = "path_text::one")]`: a path as text.
 pub mod one {
     use std::path::{Path, PathBuf};
 
@@ -107,7 +108,7 @@ pub mod one {
     /// Writes the text of a path.
     ///
     /// # Errors
-    /// The serializer's.
+    /// The errors of the serializer.
     pub fn serialize<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&super::to_text(path))
     }
@@ -115,13 +116,13 @@ pub mod one {
     /// Reads a path from its text.
     ///
     /// # Errors
-    /// When there is no text.
+    /// The value is not a text.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<PathBuf, D::Error> {
         String::deserialize(deserializer).map(|text| super::from_text(&text))
     }
 }
 
-/// For `#[serde(with = "path_text::many")]`: paths as their texts.
+/// Serde functions for `#[serde(with = "path_text::many")]`: paths as texts.
 pub mod many {
     use std::path::PathBuf;
 
@@ -130,7 +131,7 @@ pub mod many {
     /// Writes the texts of paths.
     ///
     /// # Errors
-    /// The serializer's.
+    /// The errors of the serializer.
     pub fn serialize<S: Serializer>(paths: &[PathBuf], serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_seq(paths.iter().map(|path| super::to_text(path)))
     }
@@ -138,7 +139,7 @@ pub mod many {
     /// Reads paths from their texts.
     ///
     /// # Errors
-    /// When there is no list of texts.
+    /// The value is not a list of texts.
     pub fn deserialize<'de, D: Deserializer<'de>>(
         deserializer: D,
     ) -> Result<Vec<PathBuf>, D::Error> {
@@ -220,7 +221,7 @@ mod tests {
         }
     }
 
-    /// Names in which escapes, their prefix and broken UTF-8 meet.
+    /// Generates names that combine escapes, their prefix and broken UTF-8.
     fn mostly_text() -> impl Strategy<Value = Vec<u8>> {
         let part = prop_oneof![
             Just(b"bytes:".to_vec()),

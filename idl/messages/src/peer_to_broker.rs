@@ -1,4 +1,4 @@
-//! What a bundle or reporter says to the broker.
+//! Messages from a bundle or reporter to the broker.
 
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::{Issue, Metadata, Param};
@@ -19,61 +19,61 @@ pub struct CheckerEnd {
     pub metadata: Vec<Metadata>,
 }
 
-/// Bundle or reporter → broker. Nothing said for a job counts before its `JobDone`.
+/// Bundle or reporter → broker. Messages for a job take effect only after its `JobDone`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum FromPeer {
-    /// What the bundle can do; the answer to the welcome.
+    /// Catalogue of the bundle; the answer to the welcome.
     Catalogue(Box<Catalogue>),
-    /// A document that a job needs has not arrived or was let go; please publish it again.
+    /// Request to publish a document again: a job needs it, and it has not arrived or was released.
     NeedDocument {
         /// Its number.
         doc: DocId,
     },
-    /// Findings of one checker; any number of batches.
+    /// Findings of one checker, in any number of batches.
     Issues {
         /// The job.
         job: JobId,
         /// Index into the catalogue.
         checker: u32,
-        /// The findings, ids still 0.
+        /// The findings; their ids are still 0.
         issues: Vec<Issue>,
     },
-    /// Checkers have ended: demanded ones, or others besides that kept them from looking. Any number at
-    /// once: there are hundreds in a job.
+    /// Checkers have ended: requested ones, or others that blocked them. One message contains any
+    /// number of them, because there are hundreds in a job.
     CheckersDone {
         /// The job.
         job: JobId,
         /// The checkers.
         ended: Vec<CheckerEnd>,
     },
-    /// All demanded checkers of the bundle have ended.
+    /// All requested checkers of the bundle have ended.
     JobDone {
         /// The job.
         job: JobId,
         /// Time spent checking, in microseconds.
         micros: u64,
     },
-    /// A reporter is through with a result.
+    /// A reporter has finished a result.
     ResultDone {
         /// The job.
         job: JobId,
-        /// What came of it.
+        /// Outcome of the report.
         report: PeerReport,
     },
-    /// A reporter has taken back what it reported about a file that has gone, or cannot.
+    /// A reporter has withdrawn its reports about a deleted file, or cannot do so.
     WithdrawalDone {
         /// Absolute path of the file.
         input: String,
-        /// What came of it.
+        /// Outcome of the withdrawal.
         report: PeerReport,
     },
     /// Still alive.
     Heartbeat {
-        /// What it is working on.
+        /// The job in progress.
         job: Option<JobId>,
         /// The checker that is running, by index into the catalogue.
         checker: Option<u32>,
     },
-    /// Going, all work done: the answer to `Drain`, or of its own will.
+    /// The peer ends with all work done: the answer to `Drain`, or its own decision.
     Leaving,
 }

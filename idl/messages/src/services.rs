@@ -1,48 +1,48 @@
-//! Every service on the bus and its quality of service, as one table of plain data.
+//! All services on the bus and their quality of service, as one table of plain data.
 //!
-//! iceoryx2's own defaults lose data (buffers of two, overflow on, two publishers), so nothing is
-//! opened with defaults: `qcbus-bus` has one constructor, and it takes a row of this table. The
-//! broker writes its [`Limits`] where peers find them, so both sides compute the same table.
+//! iceoryx2's own defaults lose data (buffers of two, overflow on, two publishers), so no service
+//! is opened with defaults. `qcbus-bus` has only one constructor, and it requires a row of this
+//! table. The broker publishes its [`Limits`] to the peers, so both sides compute the same table.
 
 use serde::{Deserialize, Serialize};
 
 /// Payload bytes of one frame of a message stream.
 pub const FRAME_BYTES: usize = 16 << 10;
-/// Frames that a receiver's buffer takes.
+/// Capacity of a receiver's buffer, in frames.
 pub const FRAME_BUFFER: usize = 64;
-/// Frames that a sender leaves unacknowledged. Half of the buffer: the other half is for resent
-/// frames and for acknowledgements, so that a window never overflows a buffer.
+/// Maximum number of unacknowledged frames of a sender: half of the buffer. The other half is for
+/// resent frames and for acknowledgements, so that a window never overflows a buffer.
 pub const FRAME_WINDOW: usize = FRAME_BUFFER / 2;
-/// Largest introduction, in bytes; it must fit one slot.
+/// Maximum size of a hello message in bytes; it must fit one slot.
 pub const HELLO_BYTES: usize = 4 << 10;
-/// Documents are lent in blocks of this size, so that every image starts on a cache line.
+/// Block size for lent documents, so that every image starts on a cache line.
 pub const BLOCK_BYTES: usize = 64;
-/// Ports kept free on shared services for debugging tools and a tunnel.
+/// Number of ports kept free on shared services for debugging tools and a tunnel.
 pub const SPARE_PORTS: usize = 4;
-/// Bytes by which the memory of a stream grows, and half of which is had ahead of the frames in use:
-/// four frames.
+/// Growth step of a stream's memory in bytes: four frames. Half of it is reserved ahead of the
+/// frames in use.
 pub const STREAM_STEP_BYTES: u64 = 4 * (FRAME_BYTES as u64 + 256);
-/// Sessions beyond the peers allowed, used to tell a peer that there is no room for it.
+/// Sessions beyond the maximum number of peers, to tell a peer that the broker is full.
 pub const SPARE_SESSIONS: usize = 4;
 
-/// What the numbers in the table follow from.
+/// Input values of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Limits {
-    /// Bundles and reporters at once.
+    /// Maximum number of bundles and reporters.
     pub peers: usize,
-    /// Documents of the small class that jobs under way may need: the broker must not exceed it.
+    /// Maximum number of small documents for running jobs; the broker must not exceed it.
     pub small_active: usize,
-    /// Documents of the small class that one process holds at most; at least `small_active`.
+    /// Maximum number of small documents in one process; at least `small_active`.
     pub small_held: usize,
-    /// Largest document of the small class, in bytes.
+    /// Maximum size of a small document, in bytes.
     pub small_bytes: usize,
-    /// Documents of the large class that jobs under way may need.
+    /// Maximum number of large documents for running jobs.
     pub large_active: usize,
-    /// Documents of the large class that one process holds at most; at least `large_active`.
+    /// Maximum number of large documents in one process; at least `large_active`.
     pub large_held: usize,
-    /// Slot size that the large class starts with, in bytes; it grows by powers of two.
+    /// Initial slot size of the large class, in bytes; it grows by powers of two.
     pub large_initial_bytes: usize,
-    /// Documents of a class that worker threads fill at once.
+    /// Documents of a class that worker threads fill at the same time.
     pub loans: usize,
 }
 
@@ -61,12 +61,13 @@ impl Default for Limits {
     }
 }
 
-/// How a publisher's memory grows.
+/// Growth strategy of a publisher's memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Growth {
-    /// Never: what was sent survives the sender.
+    /// No growth; sent data survives the sender.
     Fixed,
-    /// To the next power of two. (Growing to the best fit fails for good at the 256th step.)
+    /// Growth to the next power of two. (Growth to the best fit fails permanently at the 256th
+    /// step.)
     PowerOfTwo,
 }
 
@@ -75,44 +76,44 @@ pub enum Growth {
 pub struct Topic {
     /// Name; services of one session append the session's key.
     pub name: &'static str,
-    /// Publishers at most.
+    /// Maximum number of publishers.
     pub publishers: usize,
-    /// Subscribers at most.
+    /// Maximum number of subscribers.
     pub subscribers: usize,
-    /// Processes at most.
+    /// Maximum number of processes.
     pub nodes: usize,
-    /// Samples that wait in a subscriber's buffer.
+    /// Capacity of a subscriber's buffer, in samples.
     pub buffer: usize,
-    /// Samples that one subscriber holds at once.
+    /// Samples that one subscriber holds at the same time.
     pub borrowed: usize,
-    /// Samples that a late joiner still gets.
+    /// Samples that a late subscriber still receives.
     pub history: usize,
-    /// Samples that a publisher fills at once.
+    /// Samples that a publisher fills at the same time.
     pub loans: usize,
-    /// `true`: a full buffer drops its oldest sample. `false`: the new one is not delivered, and
-    /// the sender is told.
+    /// `true`: a full buffer drops its oldest sample. `false`: the new sample is not delivered, and
+    /// the sender gets an error.
     pub overflow: bool,
-    /// Bytes of one payload element.
+    /// Size of one payload element in bytes.
     pub element: usize,
-    /// Elements of a slot; with [`Growth::PowerOfTwo`] to begin with.
+    /// Elements of a slot; with [`Growth::PowerOfTwo`] the initial number.
     pub elements: usize,
-    /// How slots grow.
+    /// Growth strategy of slots.
     pub growth: Growth,
 }
 
 impl Topic {
-    /// Slots that a publisher needs so that lending never fails: what every subscriber may have
-    /// waiting and hold, the history, and what is being filled.
+    /// Returns the number of slots that a publisher needs so that lending never fails. It is the
+    /// sum of all subscribers' waiting and held samples, the history, and the loans.
     pub const fn slots(&self) -> usize {
         self.subscribers * (self.buffer + self.borrowed) + self.history + self.loans
     }
 
-    /// Bytes of shared memory that a publisher takes, at most, before it has lent anything.
+    /// Returns the maximum shared memory of a publisher in bytes, before it has lent any sample.
     pub const fn publisher_bytes(&self) -> u64 {
         (16 * self.slots() + (64 << 10)) as u64
     }
 
-    /// Bytes of shared memory that a publisher and a subscriber take for knowing each other.
+    /// Returns the shared memory of the connection between a publisher and a subscriber, in bytes.
     pub const fn connection_bytes(&self) -> u64 {
         let each = match self.growth {
             Growth::Fixed => 2,
@@ -121,44 +122,44 @@ impl Topic {
         (each * self.slots() + (16 << 10)) as u64
     }
 
-    /// Bytes of a slot's payload, to begin with.
+    /// Returns the initial payload size of a slot in bytes.
     pub const fn slot_bytes(&self) -> usize {
         self.element * self.elements
     }
 }
 
-/// An event service: it wakes, and says nothing else.
+/// An event service: it wakes its listeners and carries no data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Wake {
     /// Name; services of one session append the session's key.
     pub name: &'static str,
-    /// Notifiers at most.
+    /// Maximum number of notifiers.
     pub notifiers: usize,
-    /// Listeners at most.
+    /// Maximum number of listeners.
     pub listeners: usize,
-    /// Processes at most.
+    /// Maximum number of processes.
     pub nodes: usize,
     /// Largest event id; only 0 is used.
     pub max_event_id: usize,
 }
 
-// What iceoryx2 keeps, measured; `runtime/bus/tests/bus/memory.rs` compares.
-/// Kept of a slot that may grow, for each who reads: a byte for each of the 256 sizes that it may have.
+// Measured memory use of iceoryx2; `runtime/bus/tests/bus/memory.rs` compares it.
+/// Bytes per growing slot and reader: one byte for each of the 256 sizes that it may have.
 const GROWING_SLOT_BYTES: usize = 264;
 const FIXED_BYTES: usize = 96 << 10;
-/// Addresses for the program itself, its threads and what it allocates.
+/// Address space for the program itself, its threads and its allocations, in bytes.
 const ADDRESSES_BESIDE: u64 = 512 << 20;
 
-/// The table.
+/// The table of all services.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Services {
-    /// Document images up to [`Limits::small_bytes`]; broker → all. May drop.
+    /// Document images up to [`Limits::small_bytes`]; broker → all. May lose samples.
     pub document_small: Topic,
-    /// Larger document images; broker → all. May drop.
+    /// Larger document images; broker → all. May lose samples.
     pub document_large: Topic,
-    /// The configuration; broker → all. The latest wins.
+    /// The configuration; broker → all. Only the latest sample counts.
     pub config: Topic,
-    /// Introductions; peers → broker. Repeated until answered.
+    /// Hello messages; peers → broker. Repeated until answered.
     pub hello: Topic,
     /// Frames of the stream to one peer. Never lost.
     pub to_peer: Topic,
@@ -171,10 +172,10 @@ pub struct Services {
 }
 
 impl Services {
-    /// The table for these limits.
+    /// Creates the table for these limits.
     pub const fn new(limits: &Limits) -> Services {
         let sessions = limits.peers + SPARE_SESSIONS;
-        // The broker subscribes as well: that is how it holds what it has published.
+        // The broker also subscribes, because that keeps its published samples in memory.
         let everybody = sessions + 1 + SPARE_PORTS;
         let stream = Topic {
             name: "to",
@@ -259,8 +260,8 @@ impl Services {
         }
     }
 
-    /// Bytes of shared memory that a broker takes for itself, without documents: what is kept of
-    /// every slot that it may lend, of everybody who may join, and some pages.
+    /// Returns the broker's own shared memory in bytes, without documents. It contains the data for
+    /// every slot it may lend and for every possible peer, and some pages.
     pub const fn broker_bytes(&self) -> u64 {
         let small = 16 * self.document_small.slots();
         let large = (16 + GROWING_SLOT_BYTES) * self.document_large.slots();
@@ -268,9 +269,9 @@ impl Services {
         (small + large + 16 * self.config.slots() + everybody + FIXED_BYTES) as u64
     }
 
-    /// Bytes of shared memory that broker and peer together take for a session, without documents:
-    /// what is kept of every slot that the peer may be sent, introductions, the first frames of both
-    /// streams, and some pages.
+    /// Returns the shared memory that broker and peer need for a session, in bytes, without
+    /// documents. It contains the data for all slots that the peer may receive and hello messages.
+    /// It also contains the first frames of both streams, and some pages.
     pub const fn peer_bytes(&self) -> u64 {
         let growing = GROWING_SLOT_BYTES * (self.document_large.slots() + self.config.slots());
         let hello = self.hello.slots() * (self.hello.slot_bytes() + 128);
@@ -278,9 +279,9 @@ impl Services {
         (growing + small + hello + FIXED_BYTES) as u64 + 2 * STREAM_STEP_BYTES
     }
 
-    /// Bytes of addresses that a broker needs for the bus. Segments are mapped in full, although
-    /// hardly anything of them is ever touched; the broker reads what it publishes, so that it maps
-    /// them twice.
+    /// Returns the address space that a broker needs for the bus, in bytes. Segments are mapped in
+    /// full, although only a small part is ever accessed. The broker also reads its own samples, so
+    /// it maps them twice.
     pub const fn address_bytes(&self) -> u64 {
         let documents = self.document_small.slots() * self.document_small.slot_bytes()
             + self.document_large.slots() * self.document_large.slot_bytes();
@@ -288,7 +289,7 @@ impl Services {
         (2 * documents + streams) as u64 + ADDRESSES_BESIDE
     }
 
-    /// All publish-subscribe services.
+    /// Returns all publish-subscribe services.
     pub const fn topics(&self) -> [Topic; 6] {
         [
             self.document_small,

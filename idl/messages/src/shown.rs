@@ -1,15 +1,15 @@
-//! Text of others, made safe to show to people and to programs that read line by line.
+//! Makes foreign text safe to show to people and to programs that read line by line.
 //!
-//! Names, reasons, descriptions and source lines come from files and processes that nobody has to
-//! trust. Printed as they are, an escape sequence could recolour or rewrite a terminal, a bidirectional
-//! override could show another text than there is, and a line break could pass for a line of ours.
-//! Paths have a form of their own, which leads back to the path: [`crate::path_text`]. JSON, results and
-//! the journal hold texts as they are.
+//! Names, reasons, descriptions and source lines come from untrusted files and processes. If they
+//! were printed unchanged, an escape sequence could recolour or rewrite a terminal. A bidirectional
+//! override could show a different text, and a line break could imitate a line of qcbus. Paths have
+//! a reversible form of their own: [`crate::path_text`]. JSON, results and the journal store texts
+//! unchanged.
 
 use std::borrow::Cow;
 
-/// Whether a terminal or a reader line by line takes this for more than a character: control
-/// characters, line and paragraph separators, changes of the direction of writing.
+/// Checks whether a terminal or a line-based reader interprets this as more than a character:
+/// control characters, line and paragraph separators, changes of the writing direction.
 pub fn moves(c: char) -> bool {
     let directed = ['\u{202a}'..='\u{202e}', '\u{2066}'..='\u{2069}'];
     c.is_control()
@@ -17,12 +17,14 @@ pub fn moves(c: char) -> bool {
         || directed.iter().any(|it| it.contains(&c))
 }
 
-/// The text on one line: whatever [`moves`] is written as `\n`, `\u{1b}` and so on.
+/// Returns the text on one line. Every character that [`moves`] is written as `\n`, `\u{1b}` and so
+/// on.
 pub fn line(text: &str) -> Cow<'_, str> {
     escaped(text, moves)
 }
 
-/// The text with its own lines and tabs; whatever else [`moves`] is written as by [`line()`].
+/// Returns the text with its own lines and tabs. All other characters that [`moves`] matches are
+/// written as by [`line()`].
 pub fn lines(text: &str) -> Cow<'_, str> {
     escaped(text, |c| moves(c) && c != '\n' && c != '\t')
 }

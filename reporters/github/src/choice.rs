@@ -1,4 +1,4 @@
-//! Which entries are annotated.
+//! Selection of the entries that become annotations.
 
 use std::collections::BTreeMap;
 
@@ -6,16 +6,16 @@ use qcbus_formats::xqar::Level;
 
 use crate::{Entry, MOST_ANNOTATIONS};
 
-/// What is annotated, and how much there is of each level.
+/// The annotated entries and the counts for each level.
 pub(crate) struct Chosen<'e> {
-    /// The worst first.
+    /// Annotated entries, the most severe first.
     pub(crate) chosen: Vec<&'e Entry>,
-    /// By level: annotated, and all there are.
+    /// For each level: number of annotated entries and total number of entries.
     counts: BTreeMap<Level, (usize, usize)>,
 }
 
 impl<'e> Chosen<'e> {
-    /// As many of each level as the host takes.
+    /// Selects as many entries of each level as the host accepts.
     pub(crate) fn of(entries: &[&'e Entry]) -> Chosen<'e> {
         let mut levels: BTreeMap<Level, Vec<&Entry>> = BTreeMap::new();
         for entry in entries {
@@ -27,7 +27,8 @@ impl<'e> Chosen<'e> {
             counts: BTreeMap::new(),
         };
         for (level, all) in levels {
-            // The line that says what was cut is a notice as well.
+            // The line that reports the cut is a notice too, so one slot of this level is reserved
+            // for it.
             let taken = usize::from(is_cut && level == Level::Information);
             let chosen = spread(&all, MOST_ANNOTATIONS - taken);
             choice.counts.insert(level, (chosen.len(), all.len()));
@@ -36,7 +37,7 @@ impl<'e> Chosen<'e> {
         choice
     }
 
-    /// What was cut, in a sentence; `None` when nothing was.
+    /// Returns a sentence about the entries that were cut, or `None` if none were cut.
     pub(crate) fn cut(&self) -> Option<String> {
         let cut = |(chosen, all): &(usize, usize)| chosen < all;
         let is_cut = self.counts.values().any(cut);
@@ -58,8 +59,8 @@ impl<'e> Chosen<'e> {
     }
 }
 
-/// So many of these, from as many files and rules as can be: the next one is always of the file and the
-/// rule that were taken least, and the first of those.
+/// Selects at most `most` entries from as many files and rules as possible. The next entry is
+/// always the first one of the file and rule that have been selected least.
 fn spread<'e>(entries: &[&'e Entry], most: usize) -> Vec<&'e Entry> {
     if entries.len() <= most {
         return entries.to_vec();

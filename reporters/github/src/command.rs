@@ -1,14 +1,14 @@
-//! Workflow commands: how they are written, and how text of others is kept from being one.
+//! Workflow commands: writes them and prevents untrusted text from becoming one.
 
 use qcbus_formats::xqar::Level;
 use qcbus_reporter_sdk::{one_line, rule_name};
 
 use crate::Entry;
 
-/// Numbers of lines and columns that the host can take.
+/// Largest line or column number that the host accepts.
 const LARGEST_NUMBER: u64 = i32::MAX as u64;
 
-/// The command that annotates a place in a file; without a line feed.
+/// Returns the command that annotates a place in a file, without a line feed.
 pub(crate) fn annotation(entry: &Entry) -> String {
     let mut properties = format!("file={}", property(&entry.path));
     let numbers = [("line", entry.row), ("col", entry.row.and(entry.column))];
@@ -30,7 +30,7 @@ fn name(level: Level) -> &'static str {
     }
 }
 
-/// What stands behind the second `::`.
+/// Escapes the text after the second `::` of a command.
 pub(crate) fn data(text: &str) -> String {
     let escape = |c| match c {
         '%' => Some("%25"),
@@ -41,7 +41,7 @@ pub(crate) fn data(text: &str) -> String {
     escaped(text, escape)
 }
 
-/// A value between the command's name and the second `::`.
+/// Escapes a value between the command's name and the second `::`.
 fn property(text: &str) -> String {
     let escape = |c| match c {
         '%' => Some("%25"),
@@ -65,8 +65,8 @@ fn escaped(text: &str, escape: impl Fn(char) -> Option<&'static str>) -> String 
     out
 }
 
-/// A path in a line of the log: without a colon, so that it ends where the first one stands and no
-/// line begins with two, and without two `#` together.
+/// Escapes a path for a line of the log. The result has no colon and no two `#` in sequence. So the
+/// path ends at the first colon of the line, and no line begins with two colons.
 pub(crate) fn place_path(path: &str) -> String {
     let mut out = String::with_capacity(path.len());
     for (c, begins) in beginnings(path) {
@@ -80,7 +80,7 @@ pub(crate) fn place_path(path: &str) -> String {
     out
 }
 
-/// What [`place_path`], or [`data`], was given.
+/// Returns the text that was passed to [`place_path`] or [`data`].
 pub(crate) fn unescaped(text: &str) -> String {
     let mut parts = text.split('%');
     let mut out = parts.next().unwrap_or_default().to_owned();
@@ -109,8 +109,8 @@ pub(crate) fn unescaped(text: &str) -> String {
     out
 }
 
-/// Text of others on one line of at most `most` characters and the sign that something was cut,
-/// without the begin of a command of the older form.
+/// Returns untrusted text on one line, cut after `most` characters. A sign marks a cut. The
+/// beginning of a command of the older form is broken up.
 pub(crate) fn tame(text: &str, most: usize) -> String {
     let line = one_line(text);
     let end = line.char_indices().nth(most).map(|(end, _)| end);
@@ -128,8 +128,8 @@ pub(crate) fn tame(text: &str, most: usize) -> String {
     out
 }
 
-/// The characters, and whether each is a `#` that another follows. What is not ASCII between them does
-/// not count: some of it weighs nothing when strings are compared by the rules of a language.
+/// Returns the characters, each with a flag for a `#` before another `#`. Non-ASCII characters
+/// between them are ignored, because a comparison by the rules of a language may ignore some.
 fn beginnings(text: &str) -> impl Iterator<Item = (char, bool)> {
     let mut follower = None;
     let backwards = text.chars().rev().map(move |c| {

@@ -1,4 +1,4 @@
-//! One line of the log, which may be an annotation too.
+//! One line of the log, which may also become an annotation.
 
 use std::fmt;
 
@@ -6,25 +6,25 @@ use qcbus_formats::xqar::Level;
 
 use crate::command::{place_path, unescaped};
 
-/// Something that a report says about a place.
+/// A statement of a report about a place.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Entry {
     /// Severity.
     pub level: Level,
-    /// Path of the file for people.
+    /// Display path of the file.
     pub path: String,
     /// Line, from 1, if known.
     pub row: Option<u64>,
     /// Column in characters, from 1, if known.
     pub column: Option<u64>,
-    /// What was found: one line, nothing in it is a command.
+    /// Text of the finding: one line without any command.
     pub text: String,
-    /// The rule's UID, or `bundle/checker`: without blanks, never empty.
+    /// UID of the rule, or `bundle/checker`. It has no spaces and is never empty.
     pub rule: String,
 }
 
 impl fmt::Display for Entry {
-    /// `path:row:column: level: text [rule]`, as far as known.
+    /// Writes `path:row:column: level: text [rule]`; unknown parts are left out.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&place_path(&self.path))?;
         for number in [self.row, self.row.and(self.column)].iter().flatten() {
@@ -36,7 +36,7 @@ impl fmt::Display for Entry {
 }
 
 impl Entry {
-    /// The entry of a line; `None` when the line is none.
+    /// Returns the entry of a line, or `None` if the line is not an entry.
     pub(crate) fn read(line: &str) -> Option<Entry> {
         let (place, said) = line.split_once(": ")?;
         let (word, said) = said.split_once(": ")?;

@@ -1,4 +1,5 @@
-//! Results as annotations of GitHub: workflow commands, which a runner reads from the log of a step.
+//! Results as annotations of GitHub: workflow commands, which a runner reads from the log of a
+//! step.
 //!
 //! ```text
 //! maps/ring.xodr: accepted: no findings
@@ -11,23 +12,24 @@
 //! ::notice title=qcbus::3 of 40 findings are annotated …
 //! ```
 //!
-//! * **The log has everything**, a line for each finding in a group for each file. A host takes
-//!   [`MOST_ANNOTATIONS`] of each level from a step and drops the others without a word, so as many are
-//!   chosen here, spread over files and rules, and a last notice says how many there are. That is 30 at
-//!   most, below the 50 of a job. Reports in files of their own have these limits each: who prints
-//!   several in one step loses some, so one report of all files (`OutputFile`) is what a step should
-//!   print.
-//! * **No answer is an error.** Checkers that failed, one error for each reason, and verdicts that are
-//!   undetermined for other reasons. A checker without a status, as ASAM's first form of results has it,
-//!   is taken at its issues, as the verdict takes it.
-//! * **Text of others is no command.** A runner knows two forms: `::error::` at the begin of a line, after
-//!   blanks, and the older `##[error]` anywhere in it. No line begins with text of others: findings
-//!   begin with a path, in which a colon is written as `%3A`. Two `#` one after the other get a blank
-//!   between them (`%23` in a path), also where only characters lie between that a comparison by the rules of
-//!   a language may pass over. That each line is harmless by itself is why `::stop-commands::` is not
-//!   used: a log that ends before its token would leave the rest of the step without commands, and what
-//!   is copied from it would have no protection.
-//! * Paths are those for people, from the directory that was given: run it from the root of the repository.
+//! * **The log contains all findings**: a group for each file, with a line for each finding. A host
+//!   takes [`MOST_ANNOTATIONS`] of each level from a step and silently drops the others. So this
+//!   reporter selects that many of each level, spread over files and rules. A last notice gives the
+//!   total. That is 30 at most, below the 50 of a job. If each report has its own file, these
+//!   limits apply to each of them. Several of them in one step exceed the limits. A step should
+//!   print one report of all files (`OutputFile`).
+//! * **Missing answers are errors.** Failed checkers give one error for each reason. So do verdicts
+//!   that are undetermined for other reasons. A checker without a status, as in ASAM's first result
+//!   format, is judged by its issues, as in the verdict.
+//! * **Untrusted text never becomes a command.** A runner knows two forms: `::error::` at the
+//!   beginning of a line, after spaces, and the older `##[error]` anywhere in it. No line begins
+//!   with untrusted text: findings begin with a path, in which a colon is written as `%3A`. Two `#`
+//!   in sequence get a space between them (`%23` in a path). This also applies if only characters
+//!   lie between them that a comparison by the rules of a language may ignore. Each line is
+//!   harmless by itself, so `::stop-commands::` is not used. A log that ends before its token would
+//!   disable commands for the rest of the step. Text copied from the log would be unprotected.
+//! * Paths are display paths, relative to the given directory. Run the reporter from the root of
+//!   the repository.
 //!
 //! Parameter: `OutputFile` (see [`Output`]).
 
@@ -48,7 +50,7 @@ pub use section::Section;
 /// The reporter's name on the bus and in configurations.
 pub const NAME: &str = "qc-report-github";
 
-/// What this crate offers.
+/// Registration of this reporter.
 pub static REPORTER: Registration = Registration {
     alias: "github",
     name: NAME,
@@ -57,8 +59,8 @@ pub static REPORTER: Registration = Registration {
     make: |setting| Box::new(FormatReporter::new(Annotations, setting)),
 };
 
-/// How many annotations of one level GitHub takes from a step.
+/// Maximum number of annotations of one level that GitHub takes from a step.
 pub const MOST_ANNOTATIONS: usize = 10;
 
-/// How many characters of a finding's text are said.
+/// Maximum number of characters of a finding's text.
 pub const LONGEST_TEXT: usize = 1000;

@@ -1,4 +1,4 @@
-//! Sections of checked files as the log of a step, and back.
+//! Conversion of sections of checked files into the log of a step, and back.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,7 @@ impl ReportFormat for Annotations {
     type Section = Section;
     const SUFFIX: &'static str = "github.txt";
 
-    /// Annotations know a file by its path in the repository, so sections do as well.
+    /// Returns the display path, because annotations use the path in the repository.
     fn key(&self, subject: Subject<'_>) -> String {
         shown::line(subject.display_path).into_owned()
     }
@@ -51,7 +51,7 @@ impl ReportFormat for Annotations {
         let mut sections = BTreeMap::new();
         let mut open: Option<(String, Section)> = None;
         for line in text.split_inclusive('\n') {
-            // What was torn does not end in a line feed, or in no end of its group.
+            // A truncated log lacks the final line feed or the end of its group.
             let Some(line) = line.strip_suffix('\n') else {
                 break;
             };
@@ -69,7 +69,7 @@ impl ReportFormat for Annotations {
     }
 }
 
-/// The lines of a file: a group, unless there is nothing but its summary.
+/// Appends the lines of a file: a group, or a single line if there is only a summary.
 fn log(lines: &mut Vec<String>, key: &str, section: &Section) {
     let head = format!("{}: {}", place_path(key), section.summary);
     if section.entries.is_empty() {
@@ -81,7 +81,7 @@ fn log(lines: &mut Vec<String>, key: &str, section: &Section) {
     lines.push(END_OF_GROUP.to_owned());
 }
 
-/// The key and the section without its entries; `None` when this is no line of ours.
+/// Returns the key and the section without entries, or `None` for a line of other origin.
 fn read_head(line: &str) -> Option<(String, Section)> {
     let (path, summary) = line.split_once(": ")?;
     let (word, _) = summary.split_once(": ")?;

@@ -1,4 +1,4 @@
-//! What is said of a checked file.
+//! Section of a checked file in the log.
 
 use qcbus_formats::xqar::{Checker, CheckerBundle, Issue, Level};
 use qcbus_messages::{ResultMessage, Verdict, shown};
@@ -9,13 +9,13 @@ use qcbus_reporter_sdk::{
 use crate::command::tame;
 use crate::{Entry, LONGEST_TEXT};
 
-/// What is said of a checked file.
+/// The summary and the entries of a checked file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Section {
-    /// The verdict and how much was found: `rejected: 2 errors, 1 warning`.
+    /// The verdict and the number of findings, for example `rejected: 2 errors, 1 warning`.
     pub summary: String,
-    /// What there is to say in particular: what keeps the verdict open, then the findings along the
-    /// file.
+    /// Entries of the file: first the reasons for an undetermined verdict, then the findings in
+    /// file order.
     pub entries: Vec<Entry>,
 }
 
@@ -30,7 +30,7 @@ impl Section {
     }
 }
 
-/// The checkers that could not look, whatever their status.
+/// Returns the blocked checkers, whatever their status.
 fn blocked(result: &ResultMessage) -> Vec<&Checker> {
     let checkers = checkers(result).map(|(_, checker)| checker);
     checkers.filter(|it| is_blocked(it)).collect()
@@ -64,7 +64,7 @@ fn number_of(checkers: usize) -> String {
     format!("{checkers} checker{plural}")
 }
 
-/// What gave no answer, an entry for each reason.
+/// Returns an entry for each reason of a missing answer.
 fn unanswered(result: &ResultMessage) -> Vec<Entry> {
     let about = match result.verdict {
         Verdict::Undetermined => "the file is undetermined, not accepted",
@@ -90,7 +90,7 @@ fn of_the_file(result: &ResultMessage, text: &str, rule: String) -> Entry {
     }
 }
 
-/// The findings along the file. What is in other files goes by where it is referred to.
+/// Returns the findings in file order. For another file, the place of the reference counts.
 fn findings(result: &ResultMessage) -> Vec<Entry> {
     let mut entries = Vec::new();
     for (bundle, checker) in checkers(result) {
@@ -98,7 +98,8 @@ fn findings(result: &ResultMessage) -> Vec<Entry> {
             let place = issue_locations(issue).into_iter().next();
             let place = place.unwrap_or_default();
             let here = place.row.map(|row| (row, place.column.unwrap_or(0)));
-            // Another file's path is relative to the same directory as that of the checked file.
+            // The path of another file is relative to the same directory as the path of the checked
+            // file.
             let (path, order) = match &place.path {
                 None => (&*result.display_path, here),
                 Some(path) => (path_for_people(result, path), place.referred_at),
@@ -118,7 +119,7 @@ fn findings(result: &ResultMessage) -> Vec<Entry> {
     entries.into_iter().map(|(_, entry)| entry).collect()
 }
 
-/// What was found; without a row the element stands behind.
+/// Returns the text of the finding, followed by the element if the row is unknown.
 fn text_of(issue: &Issue, place: &IssueLocation) -> String {
     let text = match tame(&issue.description, LONGEST_TEXT) {
         text if text.is_empty() => "(no description)".to_owned(),
@@ -141,7 +142,7 @@ fn checker_name(bundle: &CheckerBundle, checker: &Checker) -> String {
     without_blanks(&format!("{}/{}", bundle.name, checker.id))
 }
 
-/// A name in which nothing ends it: the last blank of a line stands before it.
+/// Replaces all spaces in a name. So the name begins after the last space of a line.
 fn without_blanks(name: &str) -> String {
     tame(name, LONGEST_TEXT).replace(' ', "_")
 }

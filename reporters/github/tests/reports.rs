@@ -1,4 +1,4 @@
-//! The log and the annotations of whole reports.
+//! Tests of the log and the annotations of whole reports.
 
 #![expect(
     clippy::unwrap_used,
@@ -106,7 +106,7 @@ fn numbers_that_no_host_takes_stay_in_the_log() {
     assert!(!error.properties.contains_key("line"));
 }
 
-/// Text that tries to be a command.
+/// Texts that try to be commands.
 const HOSTILE: &[&str] = &[
     "::error::x",
     "  ::set-output name=a::b",
@@ -159,7 +159,8 @@ fn text_of_others_is_no_command_wherever_it_stands() {
             let mut result = result(hostile, checkers);
             result.results.bundles[0].name = (*hostile).to_owned();
             let commands = runner::run(&report(&[result]));
-            // Group and its end, three findings, and those who failed, for one reason or for two.
+            // The commands are the group and its end, three findings, and the failed checkers,
+            // which have one reason or two.
             assert!((6..=7).contains(&commands.len()), "{commands:?}");
         }
     }

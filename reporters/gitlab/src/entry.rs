@@ -1,8 +1,8 @@
-//! The objects of the format.
+//! The objects of the GitLab code quality format.
 
 use serde::{Deserialize, Serialize};
 
-/// One entry.
+/// One entry of the report.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Entry {
     pub description: String,
@@ -13,7 +13,7 @@ pub(crate) struct Entry {
     pub qcbus: Own,
 }
 
-/// The worst comes first.
+/// Severity of an entry; the most severe comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Severity {
@@ -34,11 +34,11 @@ pub(crate) struct Lines {
     pub begin: u64,
 }
 
-/// What the format has no field for.
+/// Data for which the format has no field.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Own {
-    /// The checked file; empty for an entry about the report.
+    /// Path of the checked file; empty for an entry about the report.
     pub path: String,
-    /// Its verdict.
+    /// Verdict of the checked file.
     pub verdict: String,
 }

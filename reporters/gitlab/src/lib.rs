@@ -9,21 +9,22 @@
 //! }]
 //! ```
 //!
-//! * An error is `major`, a warning `minor`, information `info`. `critical` and `blocker` are left to
-//!   what is worse than a faulty file: a file of which nobody knows. A checker that gave no answer is a
-//!   `blocker`, and so is a file that is undetermined for another reason.
-//! * `path` is relative to the directory that was given or watched, which GitLab wants to be the root of
-//!   the repository. An entry is always about the checked file; what is wrong in another file stands at
-//!   the reference to it and names the place. A finding without a line is at line 1.
-//! * Of equal fingerprints GitLab shows one, so those that would be equal are numbered.
-//! * `qcbus` is ours; GitLab passes over it. The format has no place for files without findings: an
-//!   accepted file is one of which nothing is said.
+//! * An error is `major`, a warning `minor`, information `info`. `critical` and `blocker` are
+//!   reserved for something worse than a faulty file: a file with unknown state. A checker without
+//!   an answer is a `blocker`. A file that is undetermined for another reason is also a `blocker`.
+//! * `path` is relative to the given or watched directory. GitLab requires this to be the root of
+//!   the repository. An entry is always about the checked file. A finding in another file stands at
+//!   the reference to that file and names the place. A finding without a line is at line 1.
+//! * GitLab shows only one of several equal fingerprints, so equal fingerprints are numbered.
+//! * `qcbus` is an extension, and GitLab ignores it. The format cannot list files without findings:
+//!   an accepted file without findings does not appear.
 //!
-//! GitLab names no limit of entries, but a job's artifacts have a size, and pages with very many are
-//! slow. The report holds the most severe [`MOST_ENTRIES`] and one more that says what was left out.
-//! Entries are sorted by severity, then file by file.
+//! GitLab documents no limit of entries, but the artifacts of a job have a maximum size. Pages with
+//! very many entries are slow. The report holds the most severe [`MOST_ENTRIES`] and one more about
+//! the entries that were left out. Entries are sorted by severity, then by file.
 //!
-//! Parameter: `OutputFile` (see [`Output`]); GitLab takes one file per job, so one for all is best.
+//! Parameter: `OutputFile` (see [`Output`]). GitLab takes one file per job, so use one file for all
+//! results.
 
 mod entry;
 mod report;
@@ -39,7 +40,7 @@ pub use section::Section;
 /// The reporter's name on the bus and in configurations.
 pub const NAME: &str = "qc-report-gitlab";
 
-/// What this crate offers.
+/// Registration of this reporter.
 pub static REPORTER: Registration = Registration {
     alias: "gitlab",
     name: NAME,

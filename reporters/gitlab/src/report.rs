@@ -1,4 +1,4 @@
-//! Sections, and the one array that they make.
+//! Conversion of sections into one JSON array, and back.
 
 use std::collections::BTreeMap;
 
@@ -10,13 +10,13 @@ use qcbus_reporter_sdk::{
 use crate::entry::{Entry, Lines, Location, Own, Severity};
 use crate::section::Section;
 
-/// Entries of a report, besides one that says what was left out: about 10 MB of text.
+/// Maximum number of entries, about 10 MB of text. The entry about left-out ones is extra.
 pub const MOST_ENTRIES: usize = 25_000;
 
-/// The name of the entry that says what was left out, and the key of its section: no path is like it.
+/// Name of the entry about left-out entries, and key of its section. It differs from every path.
 const LEFT_OUT: &str = "qcbus/left_out";
 
-/// Results as code quality of GitLab.
+/// Results as a GitLab code quality report.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CodeQuality;
 
@@ -58,7 +58,7 @@ impl ReportFormat for CodeQuality {
             if let Some((bare, _)) = entry.fingerprint.split_once('-') {
                 entry.fingerprint = bare.to_owned();
             }
-            // What was left out once is not here to be counted again, so that stays said.
+            // Entries left out earlier cannot be counted again, so their entry is kept.
             let key = match entry.check_name.as_str() {
                 LEFT_OUT if entry.qcbus.path.is_empty() => LEFT_OUT,
                 _ => &entry.qcbus.path,
@@ -70,8 +70,8 @@ impl ReportFormat for CodeQuality {
     }
 }
 
-/// An entry about what is too much, by severity; it belongs to no file, and stands at the first one that
-/// has something left out, because GitLab shows no entry without a place.
+/// Returns an entry with the number of left-out entries by severity. It belongs to no file. GitLab
+/// shows no entry without a place, so it stands at the first file with left-out entries.
 fn left_out(entries: &[Entry]) -> Option<Entry> {
     let rest = entries
         .get(MOST_ENTRIES..)

@@ -1,4 +1,4 @@
-//! What one checked file gives.
+//! Entries of one checked file.
 
 use qcbus_formats::xqar::{Checker, CheckerBundle, Issue, Level};
 use qcbus_messages::{ResultMessage, Verdict, shown};
@@ -9,16 +9,16 @@ use qcbus_reporter_sdk::{
 
 use crate::entry::{Entry, Lines, Location, Own, Severity};
 
-/// Characters of a description that are kept.
+/// Maximum number of characters of a description.
 const LONGEST_TEXT: usize = 2000;
 
-/// The largest line that is written; 32 bits are what readers have.
+/// Largest line number that is written; readers use 32 bits.
 const LARGEST_LINE: u64 = i32::MAX as u64;
 
-/// What one checked file gives to a report: nothing when it is accepted without findings.
+/// Entries of one checked file in a report; empty if the file is accepted without findings.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Section {
-    /// The worst first, else in the order of the result; fingerprints without numbers.
+    /// Entries, the most severe first, then in result order. Fingerprints have no numbers.
     pub(crate) entries: Vec<Entry>,
 }
 
@@ -34,7 +34,7 @@ impl Section {
     }
 }
 
-/// An entry for each reason why somebody gave no answer.
+/// Returns an entry for each reason of a missing answer.
 fn unanswered(result: &ResultMessage) -> Vec<Entry> {
     let about = match result.verdict {
         Verdict::Undetermined => "the file is undetermined, not accepted",
@@ -94,7 +94,7 @@ fn finding(
     }
 }
 
-/// The text, with the place where it is in another file, or the element where no line is known.
+/// Returns the text with the place in another file, or with the element if the line is unknown.
 fn described(issue: &Issue, main: Option<&IssueLocation>) -> String {
     let text = match issue.description.trim() {
         "" => "(no description)",
@@ -135,7 +135,7 @@ fn own(result: &ResultMessage) -> Own {
     }
 }
 
-/// One line, and not a long one.
+/// Returns the text on one line, cut to the maximum length.
 fn short(text: &str) -> String {
     let line = one_line(text);
     match line.char_indices().nth(LONGEST_TEXT) {

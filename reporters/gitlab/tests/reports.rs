@@ -1,4 +1,4 @@
-//! Whole reports, held against the rules of the format
+//! Compares whole reports with the rules of the format
 //! (<https://docs.gitlab.com/ci/testing/code_quality/>, "Code Quality report format").
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
@@ -91,10 +91,10 @@ fn sections(results: &[ResultMessage]) -> BTreeMap<String, Section> {
     results.iter().map(section).collect()
 }
 
-/// A report that keeps the rules of the format.
+/// Returns a report. Asserts that it follows the rules of the format.
 fn whole(results: &[ResultMessage]) -> String {
     let text = CodeQuality.whole(&sections(results)).unwrap();
-    // GitLab refuses a byte order mark.
+    // GitLab rejects a byte order mark.
     assert!(text.starts_with('['));
     for entry in &entries(&text) {
         for field in ["description", "check_name", "fingerprint"] {
@@ -163,7 +163,7 @@ fn nobody_takes_silence_for_success() {
             format!("the file is undetermined, not accepted: {why}")
         );
     }
-    // Beside an error, too.
+    // A file with an error is undetermined, too.
     let mut partly = undetermined("p.xodr");
     let wrong = checker(
         "c",
@@ -217,7 +217,7 @@ fn thirty_thousand_findings_lose_the_least_severe_and_say_it() {
         (of("major"), of("minor"), of("info")),
         (10_000, 10_000, 5_000)
     );
-    // A daemon that starts again has what was kept, and still says what was not.
+    // A restarted daemon has the listed entries and still reports the omitted ones.
     let again = entries(&CodeQuality.whole(&CodeQuality.split(&text)).unwrap());
     let said = |entry: &Value| entry["description"] == all[0]["description"];
     assert!(again.iter().any(said));
@@ -269,7 +269,7 @@ fn a_report_comes_apart_into_what_it_was_made_of() {
         assert_eq!(CodeQuality.whole(&CodeQuality.split(&text)).unwrap(), text);
         results.pop();
     }
-    // Nothing is known of accepted files, and nothing of what is not ours.
+    // Accepted files have no entries, and texts in another form are ignored.
     let accepted = whole(&[found("fine.xodr", Vec::new())]);
     for text in [
         accepted.as_str(),

@@ -1,11 +1,12 @@
-//! Results as pages to look at: what was found, and where on the road it is.
+//! Results as HTML pages: shows the findings and their places on the road.
 //!
-//! A page is one file that opens from anywhere, also from a mail: nothing is loaded, and its content
-//! security policy lets nothing be. `docs/html-report.md` says what is in it. The road network is drawn
-//! from [`qcbus_plan`]; nothing is parsed again in the browser.
+//! A page is one file that opens from anywhere, also from a mail. It loads nothing, and its content
+//! security policy forbids loading. `docs/html-report.md` describes its contents. The road network
+//! is drawn from [`qcbus_plan`]; the browser parses no map.
 //!
-//! Parameters: `OutputFile` (see [`Output`]). A file of one name is, for one result, its page; for
-//! several, the page of the run, with the pages of the results in the directory `NAME-files` beside it.
+//! Parameters: `OutputFile` (see [`Output`]). For one result, a file with a fixed name is the page
+//! of the result. For several results it is the page of the run. The result pages are then in the
+//! directory `NAME-files` beside it.
 
 mod page;
 mod placing;
@@ -23,7 +24,7 @@ use qcbus_reporter_sdk::Registration;
 /// The reporter's name on the bus and in configurations.
 pub const NAME: &str = "qc-report-html";
 
-/// What this crate offers.
+/// Registration of this reporter.
 pub static REPORTER: Registration = Registration {
     alias: "html",
     name: NAME,

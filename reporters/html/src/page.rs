@@ -1,4 +1,4 @@
-//! The file around the data.
+//! The HTML file around the data.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -10,14 +10,14 @@ use flate2::write::GzEncoder;
 use qcbus_reporter_sdk::ReportError;
 use sha2::{Digest as _, Sha256};
 
-/// The scripts that both pages have, in their order.
+/// Scripts of both kinds of pages, in loading order.
 const SHARED: &[&str] = &[
     include_str!("../assets/shared.js"),
     include_str!("../assets/markdown.js"),
     include_str!("../assets/list.js"),
 ];
 
-/// The scripts of the page of a result, after the shared ones.
+/// Scripts of the page of a result, loaded after the shared ones.
 const OF_RESULT: &[&str] = &[
     include_str!("../assets/plan-data.js"),
     include_str!("../assets/plan-grid.js"),
@@ -39,7 +39,7 @@ const OF_RESULT: &[&str] = &[
     include_str!("../assets/report.js"),
 ];
 
-/// The scripts of the page of a run, after the shared ones.
+/// Scripts of the page of a run, loaded after the shared ones.
 const OF_RUN: &[&str] = &[
     include_str!("../assets/filters.js"),
     include_str!("../assets/run-files.js"),
@@ -48,12 +48,12 @@ const OF_RUN: &[&str] = &[
 
 const STYLE: &str = include_str!("../assets/style.css");
 
-/// The `id` of the block that [`stored`] finds again.
+/// The `id` of the data block that [`stored`] searches for.
 const DATA: &str = "data";
 
-/// A page that is to be written.
+/// Content of a page to be written.
 pub struct Page<'d> {
-    /// What a browser shows as its name.
+    /// Title that a browser shows.
     pub title: &'d str,
     /// The data, as JSON.
     pub data: &'d [u8],
@@ -64,7 +64,7 @@ pub struct Page<'d> {
 }
 
 impl Page<'_> {
-    /// The whole file.
+    /// Returns the whole file.
     ///
     /// # Errors
     /// [`ReportError::Form`] when the data cannot be packed.
@@ -104,7 +104,7 @@ impl Page<'_> {
     }
 }
 
-/// The data of a page that was written earlier; `None` when it is none of ours.
+/// Returns the data of a page that was written earlier, or `None` if qcbus did not write the page.
 pub(crate) fn stored(page: &str) -> Option<Vec<u8>> {
     use std::io::Read as _;
     let (_, rest) = page.split_once(&opening(DATA))?;
@@ -131,13 +131,13 @@ fn block(id: &str, bytes: &[u8]) -> Result<String, ReportError> {
     Ok(block)
 }
 
-/// What a content security policy calls a script or style by.
+/// Returns the hash of a script or style as a content security policy writes it.
 fn digest(text: &str) -> String {
     let digest = Sha256::digest(text.as_bytes());
     format!("sha256-{}", STANDARD.encode(digest))
 }
 
-/// Text between tags.
+/// Escapes text between tags.
 fn escaped(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {

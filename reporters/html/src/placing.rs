@@ -1,4 +1,4 @@
-//! Where findings lie on the plan of the road network.
+//! Places of findings on the plan of the road network.
 
 use qcbus_document::Document;
 use qcbus_messages::ResultMessage;
@@ -8,16 +8,16 @@ use qcbus_reporter_sdk::{IssueLocation, Sources, road_network};
 
 use crate::result_data::{MapData, PlaceData};
 
-/// The plan of a result's road network, and who places findings on it.
+/// The plan of a result's road network and the facts about it.
 pub(crate) struct Drawn {
-    /// The plan, as it goes into the page.
+    /// The plan in the form that the page embeds.
     pub(crate) plan: Vec<u8>,
-    /// What is said about it.
+    /// Facts about the road network.
     pub(crate) map: MapData,
 }
 
-/// Draws the road network of a result, and gives each place its point on it: `places` are those of the
-/// findings in their order.
+/// Draws the road network of a result and sets the point of each place on it. `places` are the
+/// places of the findings in their order.
 pub(crate) fn draw(
     result: &ResultMessage,
     sources: &dyn Sources,
@@ -35,8 +35,8 @@ pub(crate) fn draw(
         }
         let locator = Locator::new(&map);
         for (place, data) in places.iter_mut() {
-            // Places in other files than the map have nothing to do with its elements, but may
-            // name a road.
+            // Places in other files are not related to elements of the map, but they may name a
+            // road.
             let of_map = place.path.as_deref().unwrap_or(&result.input) == path;
             let said = Said {
                 xpath: place.xpath.as_deref().filter(|_| of_map),

@@ -1,4 +1,4 @@
-//! The daemon: which page goes where.
+//! The HTML reporter: decides the path of each page.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use crate::page::{Page, stored};
 use crate::result_data::ResultData;
 use crate::run_data::{RunData, Section};
 
-/// Writes pages.
+/// Reporter that writes HTML pages.
 pub struct HtmlReporter {
     keep: bool,
     is_run: bool,
@@ -23,14 +23,14 @@ pub struct HtmlReporter {
     runs: BTreeMap<PathBuf, Run>,
 }
 
-/// The page of a run, and what is on it.
+/// The page of a run with its sections.
 struct Run {
     path: PathBuf,
     sections: BTreeMap<String, Section>,
 }
 
 impl HtmlReporter {
-    /// A reporter that has written nothing yet.
+    /// Creates a reporter that has not written any page.
     pub fn new(setting: &Setting) -> HtmlReporter {
         HtmlReporter {
             keep: setting.keep,
@@ -73,7 +73,7 @@ impl Reporter for HtmlReporter {
         let link = format!("{}/{}", run.directory_name(), to_text(&below));
         let section = Section::of(result, &data, link);
         run.sections.insert(key, section);
-        // In a run nobody looks before the end.
+        // The page of a run is needed only at the end, so it is not written after each result.
         if is_run { Ok(()) } else { run.write() }
     }
 
@@ -102,7 +102,7 @@ impl Reporter for HtmlReporter {
     }
 }
 
-/// What the names of pages end with.
+/// Suffix of the page names.
 const SUFFIX: &str = "html";
 
 impl Run {
@@ -122,7 +122,7 @@ impl Run {
         Ok(run)
     }
 
-    /// Where the pages of the results lie.
+    /// Returns the directory of the result pages.
     fn directory(&self) -> PathBuf {
         self.path.with_file_name(self.directory_name())
     }
@@ -132,7 +132,7 @@ impl Run {
         format!("{}-files", stem.to_string_lossy())
     }
 
-    /// Where the page of a result lies in there.
+    /// Returns the path of a result page below that directory.
     fn below(&self, display_path: &str) -> PathBuf {
         qcbus_reporter_sdk::inside(&from_text(&format!("{display_path}.{SUFFIX}")))
     }
@@ -147,7 +147,7 @@ impl Run {
         write_named(&self.path, page.as_bytes())
     }
 
-    /// One result needs no page around it.
+    /// Writes the page of the run. If there is only one result, its page is used instead.
     fn finish(&self) -> Result<(), ReportError> {
         let Some(only) = self
             .sections
@@ -164,7 +164,7 @@ impl Run {
         })?;
         write_named(&self.path, &bytes)?;
         remove_file(&page)?;
-        // The directories above it, as far as they are empty: others may use them.
+        // Only empty parent directories are removed, because others may use the rest.
         let mut above = page.parent();
         while let Some(directory) = above.filter(|it| it.starts_with(self.directory())) {
             if std::fs::remove_dir(directory).is_err() {

@@ -1,4 +1,4 @@
-//! What the page of a result is about, as `docs/html-report.md` says.
+//! Data of the page of a result, as `docs/html-report.md` describes it.
 
 use std::collections::HashMap;
 
@@ -13,14 +13,14 @@ use serde::Serialize;
 
 use crate::placing::{Drawn, draw};
 
-/// Findings that a page holds: more than anybody reads, and a browser still is at ease.
+/// Maximum number of findings on a page: more than a person reads, but fine for a browser.
 pub(crate) const MOST_FINDINGS: usize = 20_000;
 
-/// Characters of a line that are shown before and after the place.
+/// Number of characters of a line that are shown before and after the place.
 const BEFORE: usize = 60;
 const AFTER: usize = 200;
 
-/// Everything on the page of a result.
+/// All data on the page of a result.
 #[derive(Serialize)]
 pub(crate) struct ResultData<'r> {
     schema: u32,
@@ -54,7 +54,7 @@ struct CheckerData<'r> {
     findings: usize,
 }
 
-/// A rule that was broken.
+/// A violated rule.
 #[derive(Serialize, Clone, serde::Deserialize, PartialEq)]
 pub(crate) struct RuleData {
     pub(crate) uid: String,
@@ -100,7 +100,7 @@ struct LineData {
     mark: Option<(usize, usize)>,
 }
 
-/// What a finding is about: indices into the lists of the plan.
+/// Target of a finding: indices into the lists of the plan.
 #[derive(Serialize, Default)]
 struct TargetData {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -117,7 +117,7 @@ struct TargetData {
     object: Option<usize>,
 }
 
-/// What is said about the road network.
+/// Facts about the road network.
 #[derive(Serialize)]
 pub(crate) struct MapData {
     pub(crate) path: String,
@@ -126,7 +126,7 @@ pub(crate) struct MapData {
 }
 
 impl<'r> ResultData<'r> {
-    /// The data of a result, and the plan of its road network.
+    /// Returns the data of a result and the plan of its road network.
     pub(crate) fn of(
         result: &'r ResultMessage,
         sources: &dyn Sources,
@@ -185,12 +185,12 @@ impl<'r> ResultData<'r> {
     }
 }
 
-/// Who made a page.
+/// Returns the name and version of the program that wrote a page.
 pub(crate) fn generator() -> String {
     format!("qcbus {}", env!("CARGO_PKG_VERSION"))
 }
 
-/// Findings on their way to the page.
+/// Findings collected for the page.
 struct Collected<'r, 's> {
     result: &'r ResultMessage,
     sources: &'s dyn Sources,
@@ -198,12 +198,13 @@ struct Collected<'r, 's> {
     rules: Vec<RuleData>,
     known: HashMap<(&'r str, &'r str), usize>,
     findings: Vec<FindingData>,
-    /// Of every place of every finding, in their order.
+    /// Locations of all places of all findings, in their order.
     locations: Vec<IssueLocation>,
 }
 
 impl<'r> Collected<'r, '_> {
-    /// Takes the findings, the worst first and those of one level along the file; says how many there are.
+    /// Collects the findings, the most severe first and within a level in file order. Returns their
+    /// total number.
     fn collect(&mut self) -> usize {
         let bundles = self.result.results.bundles.iter();
         let checkers = bundles.flat_map(|bundle| &bundle.checkers).enumerate();
@@ -248,7 +249,7 @@ impl<'r> Collected<'r, '_> {
         }
     }
 
-    /// The index of a rule, which is listed when it is met first.
+    /// Returns the index of a rule. A new rule is added to the list.
     fn rule(&mut self, checker: &'r Checker, uid: &'r str) -> i64 {
         let index = match self.known.get(&(uid, &*checker.id)) {
             Some(index) => *index,
@@ -298,7 +299,7 @@ impl<'r> Collected<'r, '_> {
 }
 
 impl LineData {
-    /// The part of a line around a column.
+    /// Returns the part of a line around a column.
     fn of(line: &Line, column: Option<u64>) -> LineData {
         let chars: Vec<char> = printable(&line.text).chars().collect();
         let at = column.map(|column| {
@@ -324,7 +325,7 @@ impl LineData {
 }
 
 impl PlaceData {
-    /// Takes where the place lies on the plan.
+    /// Stores the position of the place on the plan.
     pub(crate) fn put(&mut self, spot: Spot) {
         self.at = spot.at;
         self.how = spot.how.map(|how| match how {
@@ -389,7 +390,7 @@ fn checkers_of(result: &ResultMessage) -> Vec<CheckerData<'_>> {
     data.collect()
 }
 
-/// What else is said of an issue, apart from what its places say.
+/// Returns further facts about an issue that are not in its places.
 fn facts(issue: &Issue) -> Vec<(String, String)> {
     let infos = issue.domain_info.iter();
     let others = infos.filter(|info| info.name != qcbus_formats::location::NAME);
@@ -405,7 +406,7 @@ fn facts(issue: &Issue) -> Vec<(String, String)> {
     others.map(fact).collect()
 }
 
-/// Another file's path, for people.
+/// Returns the display path of another file.
 fn shown(result: &ResultMessage, path: &str) -> String {
     one_line(path_for_people(result, path))
 }

@@ -1,4 +1,4 @@
-//! What the page of a run is about, as `docs/html-report.md` says.
+//! Data of the page of a run, as `docs/html-report.md` describes it.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -9,15 +9,15 @@ use serde::{Deserialize, Serialize};
 
 use crate::result_data::{ResultData, RuleData, generator};
 
-/// Findings that the page of a run holds; the pages of the results have the rest.
+/// Maximum number of findings on the page of a run; the pages of the results have the others.
 pub(crate) const MOST_FINDINGS: usize = 20_000;
 
-/// What the page of a run says of one file.
+/// A checked file on the page of a run.
 #[derive(Serialize, Deserialize, Clone, PartialEq)]
 pub(crate) struct FileRow {
     path: String,
     verdict: String,
-    /// Relative to the page of the run; empty when there is none.
+    /// Path of the result page relative to the run page; empty if there is no result page.
     page: String,
     error: usize,
     warning: usize,
@@ -37,7 +37,7 @@ struct FindingRow {
     id: u64,
 }
 
-/// Everything on the page of a run.
+/// All data on the page of a run.
 #[derive(Serialize, Deserialize)]
 pub(crate) struct RunData {
     schema: u32,
@@ -50,7 +50,7 @@ pub(crate) struct RunData {
     cuts: Vec<String>,
 }
 
-/// What one result gives to the page of a run.
+/// The part of one result on the page of a run.
 #[derive(Clone, PartialEq)]
 pub(crate) struct Section {
     entry: FileRow,
@@ -58,7 +58,7 @@ pub(crate) struct Section {
 }
 
 impl Section {
-    /// What a result gives. `page` leads from the page of the run to that of the result.
+    /// Returns the section of a result. `page` is the link from the run page to the result page.
     pub(crate) fn of(result: &ResultMessage, data: &ResultData<'_>, page: String) -> Section {
         let count = |level: Level| {
             let issues = checkers(result).flat_map(|(_, checker)| &checker.issues);
@@ -94,14 +94,14 @@ impl Section {
     }
 }
 
-/// Why a verdict is not known.
+/// Returns the reasons for an undetermined verdict.
 fn why(result: &ResultMessage) -> String {
     let silences: Vec<String> = silences(result).iter().map(ToString::to_string).collect();
     silences.join("; ")
 }
 
 impl RunData {
-    /// The page of these sections, in the order of their paths.
+    /// Returns the data of the page for these sections, in the order of their paths.
     pub(crate) fn of(title: &str, sections: &BTreeMap<String, Section>) -> RunData {
         let mut rules = Rules::default();
         let mut all: Vec<(usize, &FindingRow, Option<&RuleData>)> = Vec::new();
@@ -110,7 +110,7 @@ impl RunData {
             all.extend(findings.map(|(finding, rule)| (file, finding, rule.as_ref())));
         }
         let total = all.len();
-        // Stable: those of one level stay in the order of files and places.
+        // The sort is stable, so findings of one level stay in the order of files and places.
         all.sort_by_key(|(_, finding, _)| Level::from_word(&finding.level));
         all.truncate(MOST_FINDINGS);
         let findings = all.into_iter().map(|(file, finding, rule)| FindingRow {
@@ -139,7 +139,7 @@ impl RunData {
         }
     }
 
-    /// The sections of a page that was written earlier, by their paths.
+    /// Returns the sections of a page that was written earlier, by their paths.
     pub(crate) fn into_sections(self) -> BTreeMap<String, Section> {
         let rules = self.rules;
         let mut sections: Vec<Section> = self
@@ -162,7 +162,7 @@ impl RunData {
     }
 }
 
-/// Each rule once.
+/// List of rules without duplicates.
 #[derive(Default)]
 struct Rules {
     list: Vec<RuleData>,

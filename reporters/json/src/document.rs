@@ -1,4 +1,4 @@
-//! The document around the issues.
+//! The JSON document around the issues.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,7 +11,7 @@ use crate::SCHEMA;
 use crate::issue::{IssueJson, issue};
 use crate::ordered::Ordered;
 
-/// One result.
+/// The document of one result.
 #[derive(Serialize)]
 pub(crate) struct Document<'r> {
     version: &'r str,
@@ -20,7 +20,7 @@ pub(crate) struct Document<'r> {
     rules: Rules<'r>,
 }
 
-/// What ASAM's report does not say.
+/// Data that ASAM's report lacks.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 struct Own<'r> {
@@ -85,7 +85,7 @@ struct Rules<'r> {
     violated: Levels<BTreeSet<&'r str>>,
 }
 
-/// The document of a result.
+/// Returns the document of a result.
 pub(crate) fn document(result: &ResultMessage) -> Document<'_> {
     let bundles = result.results.bundles.iter();
     Document {

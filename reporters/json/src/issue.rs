@@ -1,4 +1,4 @@
-//! One issue.
+//! One issue as JSON.
 
 use std::borrow::Cow;
 
@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::xml;
 
-/// An issue as ASAM's report has it, and its places.
+/// An issue in the form of ASAM's report, with its places.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct IssueJson<'r> {
@@ -21,7 +21,7 @@ pub(crate) struct IssueJson<'r> {
     places: Vec<PlaceJson>,
 }
 
-/// ASAM's lists by kind. `road` is ours.
+/// ASAM's lists of locations by kind. `road` is an extension.
 #[derive(Serialize, Default)]
 struct LocationsJson<'r> {
     file: Vec<Described<'r, FileJson>>,
@@ -80,7 +80,7 @@ struct MessageJson<'r> {
     time: Option<f64>,
 }
 
-/// A place with everything that is known about it; unknown fields are left out.
+/// A place with all known data; unknown fields are left out.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 struct PlaceJson {
@@ -113,7 +113,7 @@ struct RowColumn {
     column: u64,
 }
 
-/// The JSON of an issue of the file at `input`.
+/// Returns the JSON of an issue of the file at `input`.
 pub(crate) fn issue<'r>(issue: &'r Issue, input: &str) -> IssueJson<'r> {
     IssueJson {
         issue_id: issue.id,

@@ -1,7 +1,7 @@
 //! Results as JSON, for programs.
 //!
-//! The form is that of ASAM's `qc-report-json` with fields of our own under `qcbus`, so that what
-//! reads ASAM's report reads this one:
+//! The format is that of ASAM's `qc-report-json` with additional fields under `qcbus`. So a reader
+//! of ASAM's report can read this one:
 //!
 //! ```json
 //! {
@@ -46,17 +46,18 @@
 //! }
 //! ```
 //!
-//! * Keys stand in this order; bundles and checkers in the order of the result, rules sorted.
-//!   Equal results give equal bytes.
-//! * `places` is what `locations` cannot say: which of them belong together, and places in other
-//!   files. The first is the main one. Absent fields are unknown.
-//! * Two bundles or checkers of one name do not overwrite each other: the second one's key gets
+//! * Keys are in this order. Bundles and checkers are in the order of the result, and rules are
+//!   sorted. Equal results give equal bytes.
+//! * `places` holds data that `locations` cannot express: which locations belong together, and
+//!   places in other files. The first place is the main one. Absent fields are unknown.
+//! * Bundles or checkers with the same name do not overwrite each other: the second one's key gets
 //!   `#2`.
-//! * A digest that is not known (a report on a result file of another tool) is absent.
+//! * An unknown digest is absent, for example in a report on a result file of another tool.
 //!
 //! Parameters: `OutputFile` (see [`Output`]; one file for several results is a sequence of JSON
-//! documents, as `jq` and streaming readers take it) and `Indent` (0 to 16 blanks, default 2; with
-//! 0, the default on a stream and in one file for several, each document is one line: JSON Lines).
+//! documents, as `jq` and streaming readers take it) and `Indent` (0 to 16 spaces, default 2). With
+//! 0, each document is one line: JSON Lines. 0 is the default on a stream and in one file for
+//! several results.
 
 mod document;
 mod issue;
@@ -74,7 +75,7 @@ use serde::Serialize as _;
 /// The reporter's name on the bus and in configurations.
 pub const NAME: &str = "qc-report-json";
 
-/// What this crate offers.
+/// Registration of this reporter.
 pub static REPORTER: Registration = Registration {
     alias: "json",
     name: NAME,
@@ -83,13 +84,13 @@ pub static REPORTER: Registration = Registration {
     make: |setting| Box::new(FormatReporter::new(report::Documents, setting)),
 };
 
-/// The number under `qcbus.schema`. It changes when a field changes its meaning or goes away.
+/// Schema number under `qcbus.schema`. It changes when a field changes its meaning or is removed.
 pub const SCHEMA: u32 = 1;
 
-/// Blanks per level unless `Indent` says otherwise.
+/// Number of spaces per level unless `Indent` sets another number.
 pub const DEFAULT_INDENT: usize = 2;
 
-/// The report of one result; ends with a line feed. With `indent` 0 it is one line.
+/// Returns the report of one result; it ends with a line feed. With `indent` 0 it is one line.
 ///
 /// # Errors
 /// None that values of these types can cause; serde's interface has one.

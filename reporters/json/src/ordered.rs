@@ -2,12 +2,12 @@
 
 use serde::{Serialize, Serializer};
 
-/// An object: keys in the order in which they were put in.
+/// JSON object with its keys in insertion order.
 #[derive(Debug, Default)]
 pub(crate) struct Ordered<T>(Vec<(String, T)>);
 
 impl<T> Ordered<T> {
-    /// Puts a value in; a key that is taken gets `#2`, `#3` and so on.
+    /// Inserts a value. A key that already exists gets the suffix `#2`, `#3` and so on.
     pub(crate) fn put(&mut self, key: &str, value: T) {
         let taken = |key: &str| self.0.iter().any(|(other, _)| other == key);
         let mut free = key.to_owned();

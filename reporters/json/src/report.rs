@@ -1,4 +1,4 @@
-//! The daemon: where the JSON goes.
+//! The JSON reporter: writes the documents to their target.
 
 use std::collections::BTreeMap;
 
@@ -50,7 +50,7 @@ impl ReportFormat for Documents {
     }
 }
 
-/// Where several documents follow each other, each is one line unless somebody wants otherwise.
+/// Returns the indent. Several documents in sequence have one line each by default.
 fn indent(params: &[Param], place: Destination) -> Result<usize, ReportError> {
     let Some(value) = param(params, "Indent").filter(|value| !value.is_empty()) else {
         return Ok(match place {

@@ -1,8 +1,8 @@
-//! A `DomainSpecificInfo` as XML text, which is how ASAM's report carries it.
+//! A `DomainSpecificInfo` as XML text, the form that ASAM's report uses.
 
 use qcbus_formats::xqar::{DomainInfo, InfoElement};
 
-/// The text, on one line.
+/// Returns the XML text on one line.
 pub(crate) fn text(info: &DomainInfo) -> String {
     let mut out = String::from("<DomainSpecificInfo name=\"");
     escape(&info.name, &mut out);
@@ -45,7 +45,7 @@ fn escape(text: &str, out: &mut String) {
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
-            // A reader would otherwise turn these into blanks inside of attributes.
+            // A reader would otherwise convert these characters to spaces in attributes.
             '\t' => out.push_str("&#9;"),
             '\n' => out.push_str("&#10;"),
             '\r' => out.push_str("&#13;"),

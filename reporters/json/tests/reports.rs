@@ -1,4 +1,4 @@
-//! The JSON of whole reports.
+//! Tests of the JSON of whole reports.
 
 use std::collections::BTreeMap;
 
@@ -162,7 +162,7 @@ fn one_file_holds_the_newest_report_of_each_checked_file() {
     let expected = render(&other, 0).unwrap() + &render(&one, 0).unwrap();
     assert_eq!(std::fs::read_to_string(&path).unwrap(), expected);
 
-    // Started again, after a crash in the middle of a write.
+    // The reporter restarts after a crash in the middle of a write.
     std::fs::write(&path, expected.clone() + "{\"version\": ").unwrap();
     new_reporter(true).report(&one, &NoSources).unwrap();
     assert_eq!(std::fs::read_to_string(&path).unwrap(), expected);

@@ -1,4 +1,4 @@
-//! The case of a checker.
+//! The test case of a checker.
 
 use qcbus_formats::xqar::{Checker, Issue, Level, Status};
 use qcbus_messages::ResultMessage;
@@ -9,17 +9,17 @@ use crate::suite::does_not_apply;
 use crate::text::{counted, path, short};
 use crate::{LONGEST_FINDING, MOST_FINDINGS};
 
-/// How many characters of a text a message has: hosts show it on a line.
+/// Maximum number of characters of a message; hosts show it on one line.
 const LONGEST_MESSAGE: usize = 200;
 
-/// The case of a checker.
+/// Returns the test case of a checker.
 pub(crate) fn case(id: &str, class: &str, checker: &Checker, findings: &Findings<'_>) -> TestCase {
     let mut status = status(checker);
     let mut said = findings.lines(checker);
     if is_unanswered(checker) {
         said = format!("{}\n{said}", reason_of(checker));
     }
-    // Who reads the document back takes blanks around a text away.
+    // A reader of the document trims spaces around a text, so they are trimmed here too.
     let said = said.trim();
     let is_red = matches!(status, TestCaseStatus::NonSuccess { .. });
     if is_red {
@@ -33,15 +33,15 @@ pub(crate) fn case(id: &str, class: &str, checker: &Checker, findings: &Findings
     case
 }
 
-/// A status that a host shows red.
+/// Returns a status that a host shows in red.
 pub(crate) fn red(kind: NonSuccessKind, ty: &str, message: &str) -> TestCaseStatus {
     let mut status = TestCaseStatus::non_success(kind);
     status.set_type(ty).set_message(message);
     status
 }
 
-/// Whether nobody knows what the checker would have found. One without a status, as ASAM's first form
-/// has it, is taken at its issues, as the verdict takes it.
+/// Checks whether the checker gave no answer. A checker without a status, as in ASAM's first result
+/// format, is judged by its issues, as in the verdict.
 fn is_unanswered(checker: &Checker) -> bool {
     checker.status == Some(Status::Error)
 }
@@ -79,7 +79,7 @@ fn rule(issue: &Issue) -> String {
     }
 }
 
-/// The first error in short, and how many findings there are.
+/// Returns the shortened first error and the number of findings.
 fn message(first: &Issue, findings: usize) -> String {
     let text = text_of(first, LONGEST_MESSAGE);
     match findings {
@@ -99,11 +99,12 @@ fn reason_of(checker: &Checker) -> String {
     short(&reason(checker), LONGEST_FINDING)
 }
 
-/// How findings of one result are said.
+/// Text of the findings of one result.
 pub(crate) struct Findings<'r>(pub(crate) &'r ResultMessage);
 
 impl Findings<'_> {
-    /// The findings of a checker, one on a line, the worst first, and how many more there are.
+    /// Returns the findings, one per line and the most severe first, and the number of further
+    /// ones.
     fn lines(&self, checker: &Checker) -> String {
         let mut issues: Vec<&Issue> = checker.issues.iter().collect();
         issues.sort_by_key(|issue| issue.level);
@@ -116,7 +117,7 @@ impl Findings<'_> {
         lines.join("\n")
     }
 
-    /// `path:row:col: level: text`, as far as known; without a row the element stands behind.
+    /// Returns `path:row:col: level: text` as far as known. Without a row, the element follows.
     fn line(&self, issue: &Issue) -> String {
         let place = issue_locations(issue).into_iter().next();
         let place = place.unwrap_or_default();
@@ -132,7 +133,8 @@ impl Findings<'_> {
         line
     }
 
-    /// Another file's path is relative to the same directory as that of the checked file.
+    /// Returns the display path of another file (from the checked file's base) or of the checked
+    /// file.
     fn shortened(&self, other: Option<&str>) -> String {
         let Some(other) = other else {
             return path(&self.0.display_path);

@@ -1,34 +1,37 @@
-//! Results as JUnit, which most CI hosts draw.
+//! Results as JUnit, which most CI hosts can display.
 //!
 //! A test suite is a checked file, a test case one of its checkers:
 //!
-//! | what the checker did | its case |
+//! | state of the checker | its case |
 //! |---|---|
-//! | completed, nothing of level error | passed; other findings are in its `system-out` |
-//! | found something of level error | `failure`; its message is the first of them, its text all findings |
-//! | failed | `error` with the reason: nobody knows what it would have found |
-//! | could not look, because of what others found | `skipped`, type `blocked`, with the reason |
+//! | completed, no finding of level error | passed; other findings are in its `system-out` |
+//! | at least one finding of level error | `failure`; its message is the first of them, its text all findings |
+//! | failed | `error` with the reason; its findings are unknown |
+//! | blocked by findings of other checkers | `skipped`, type `blocked`, with the reason |
 //! | does not apply to the file | left out and counted |
 //!
-//! * **Blocked checkers are no errors of their own.** What blocked them is in the same result, and red
-//!   there. A scenario without a version blocks a hundred checkers: a host that shows a hundred red cases
-//!   hides the one that somebody has to mend. So that a verdict that is not an acceptance never looks green,
-//!   a suite without a red case gets one, `verdict`, which is an `error` and says why.
-//! * **Checkers that do not apply are left out**, because a host draws every case and these tell nobody
-//!   anything: of 323 checkers, 125 are for other versions than that of an OpenDRIVE 1.4 file. Three hundred
-//!   files, maps of several versions and scenarios, have 70,800 cases in 9.9 MB (0.75 MB packed) without
-//!   them, and 91,800 in 15.3 MB with them. How many there are stands in the suite's property
-//!   `qcbus.notApplicable` and its `system-out`. The parameter `Inapplicable` brings them back.
-//! * **A checker without a status is taken at its issues**, as the verdict takes it: ASAM's first form of
-//!   results has none.
-//! * **The class of a case is `BUNDLE.PATH`**, with the file. Hosts tell cases apart by class and name
-//!   alone (GitLab keeps one of each pair), and the same checker looks at every file.
-//! * **The text of a case is bounded**: [`MOST_FINDINGS`] findings, the errors first, and how many more
-//!   there are. All of them are in the `.xqar`.
-//! * The document is valid against `junit-10.xsd`. There are no times, so equal results give equal bytes.
+//! * **Blocked checkers are not errors.** The finding that blocked them is in the same result, and
+//!   red there. A scenario without a version blocks a hundred checkers. A host that shows a hundred
+//!   red cases hides the one that must be fixed. A verdict other than accepted must never look
+//!   green. So a suite without a red case gets the case `verdict`, which is an `error` and gives
+//!   the reason.
+//! * **Checkers that do not apply are left out**, because a host draws every case and these have no
+//!   information. Of 323 checkers, 125 are for other versions than that of an OpenDRIVE 1.4 file.
+//!   Example: three hundred files, maps of several versions and scenarios. They have 70,800 cases
+//!   in 9.9 MB (0.75 MB packed) without these checkers, and 91,800 in 15.3 MB with them. The
+//!   suite's property `qcbus.notApplicable` and its `system-out` give their number. The parameter
+//!   `Inapplicable` adds them again.
+//! * **A checker without a status is judged by its issues**, as in the verdict: ASAM's first result
+//!   format has no status.
+//! * **The class of a case is `BUNDLE.PATH`**, with the file. Hosts identify cases by class and
+//!   name alone (GitLab keeps one of each pair), and the same checker checks every file.
+//! * **The text of a case is bounded**: [`MOST_FINDINGS`] findings, the errors first, and the
+//!   number of further findings. All of them are in the `.xqar`.
+//! * The document is valid against `junit-10.xsd`. It has no times, so equal results give equal
+//!   bytes.
 //!
-//! Parameters: `OutputFile` (see [`Output`]) and `Inapplicable`: `counted` (default), or `listed` for a
-//! skipped case, type `not applicable`, for each checker that does not apply.
+//! Parameters: `OutputFile` (see [`Output`]) and `Inapplicable`: `counted` (default), or `listed`
+//! for a skipped case, type `not applicable`, for each checker that does not apply.
 
 mod case;
 mod report;
@@ -44,7 +47,7 @@ pub use report::Suites;
 /// The reporter's name on the bus and in configurations.
 pub const NAME: &str = "qc-report-junit";
 
-/// What this crate offers.
+/// Registration of this reporter.
 pub static REPORTER: Registration = Registration {
     alias: "junit",
     name: NAME,
@@ -53,8 +56,8 @@ pub static REPORTER: Registration = Registration {
     make: |setting| Box::new(FormatReporter::new(Suites, setting)),
 };
 
-/// How many findings one case says in full.
+/// Maximum number of findings that one case lists in full.
 pub const MOST_FINDINGS: usize = 100;
 
-/// How many characters of a finding's text are said.
+/// Maximum number of characters of a finding's text.
 pub const LONGEST_FINDING: usize = 500;

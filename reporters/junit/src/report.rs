@@ -1,4 +1,4 @@
-//! Suites of checked files as one document, and back.
+//! Conversion of suites of checked files into one document, and back.
 
 use std::collections::BTreeMap;
 
@@ -37,7 +37,7 @@ impl ReportFormat for Suites {
         let text = report
             .to_string()
             .map_err(|error| ReportError::Form(error.to_string()))?;
-        // The schema knows this number of suites and not of the root, whose tag comes first.
+        // The schema allows this number at a suite but not at the root. The root's tag comes first.
         let extension = format!(" skipped=\"{}\"", report.skipped);
         Ok(text.replacen(&extension, "", 1))
     }

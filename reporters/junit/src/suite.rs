@@ -1,4 +1,4 @@
-//! The suite of a checked file.
+//! The test suite of a checked file.
 
 use std::collections::BTreeMap;
 
@@ -11,19 +11,19 @@ use quick_junit::{NonSuccessKind, Property, TestCase, TestCaseStatus, TestSuite}
 use crate::case::{self, Findings};
 use crate::text::{counted, name, path, short};
 
-/// The property by which a suite is found again: absolute path of the checked file.
+/// Property that identifies a suite: absolute path of the checked file.
 pub(crate) const INPUT: &str = "qcbus.inputFile";
 
-/// What becomes of checkers that do not apply to the file.
+/// Treatment of checkers that do not apply to the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Inapplicable {
-    /// The suite says how many there are.
+    /// The suite gives their number.
     Counted,
-    /// Each has a skipped case.
+    /// Each of them has a skipped case.
     Listed,
 }
 
-/// The suite of a result.
+/// Returns the suite of a result.
 pub(crate) fn suite(result: &ResultMessage, inapplicable: Inapplicable) -> TestSuite {
     let shown_path = name(&result.display_path, "(no path)");
     let mut suite = TestSuite::new(shown_path.as_str());
@@ -55,8 +55,8 @@ pub(crate) fn suite(result: &ResultMessage, inapplicable: Inapplicable) -> TestS
     suite
 }
 
-/// Whether the file is none that the checker is for. One that found something all the same, as other
-/// tools may write it, is not passed over.
+/// Checks whether the checker does not apply to the file. A checker with findings is not left out.
+/// Other tools may write such a checker.
 pub(crate) fn does_not_apply(checker: &Checker) -> bool {
     is_inapplicable(checker) && checker.issues.is_empty()
 }
@@ -65,7 +65,7 @@ fn class(bundle: &str, shown_path: &str) -> String {
     format!("{}.{shown_path}", name(bundle, "(no bundle)"))
 }
 
-/// The case of a file that is not accepted though none of its checkers is red.
+/// Returns the case of a file that is not accepted but has no red checker.
 fn verdict(id: &str, class: &str, result: &ResultMessage) -> TestCase {
     let blocked: Vec<&Checker> = checkers(result)
         .map(|(_, checker)| checker)
@@ -105,7 +105,7 @@ fn properties(result: &ResultMessage, left_out: usize) -> Vec<Property> {
     properties
 }
 
-/// What is not among the cases, for a person.
+/// Returns remarks for people about everything without a case.
 fn remarks(result: &ResultMessage, left_out: usize) -> String {
     let mut lines = Vec::new();
     match left_out {
@@ -120,15 +120,15 @@ fn remarks(result: &ResultMessage, left_out: usize) -> String {
     lines.join("\n")
 }
 
-/// The names of cases that are taken, each with its class, and the last number given to it.
+/// Case names in use, each with its class and the last number given to it.
 #[derive(Default)]
 struct Names {
     taken: BTreeMap<(String, String), usize>,
 }
 
 impl Names {
-    /// The name; a second one of its class gets `#2`, so that a host that keeps one of each name
-    /// loses nothing.
+    /// Returns the name, with `#2` for the second one of its class. So a host that keeps one case
+    /// of each name keeps all of them.
     fn free(&mut self, class: &str, name: &str) -> String {
         let of = |name: &str| (class.to_owned(), name.to_owned());
         let mut free = name.to_owned();

@@ -1,9 +1,9 @@
-//! Text of others in the form that XML, and those who read it back, leave as it is.
+//! Conversion of untrusted text into a form that XML writers and readers do not change.
 
 use qcbus_messages::shown;
 use qcbus_reporter_sdk::one_line;
 
-/// The text on one line of at most `most` characters and the sign that something was cut.
+/// Returns the text on one line, cut after `most` characters; a sign marks a cut.
 pub(crate) fn short(text: &str, most: usize) -> String {
     let line = legal(&one_line(text));
     match line.char_indices().nth(most) {
@@ -12,12 +12,12 @@ pub(crate) fn short(text: &str, most: usize) -> String {
     }
 }
 
-/// A path or a name on one line, as exact as XML allows.
+/// Returns a path or a name on one line, as exactly as XML allows.
 pub(crate) fn path(text: &str) -> String {
     legal(&shown::line(text))
 }
 
-/// A name that is never empty: hosts drop a case or a suite without one.
+/// Returns a name that is never empty, because hosts drop a case or a suite without a name.
 pub(crate) fn name(text: &str, otherwise: &str) -> String {
     match path(text) {
         name if name.trim().is_empty() => otherwise.to_owned(),
@@ -25,12 +25,12 @@ pub(crate) fn name(text: &str, otherwise: &str) -> String {
     }
 }
 
-/// Control characters are gone when it comes to this; two more characters are in no XML.
+/// Replaces the two other characters that XML forbids. No control characters are left here.
 fn legal(text: &str) -> String {
     text.replace(['\u{FFFE}', '\u{FFFF}'], "\u{FFFD}")
 }
 
-/// `1 finding`, `2 findings`.
+/// Returns the count with its noun: `1 finding`, `2 findings`.
 pub(crate) fn counted(count: usize, what: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} {what}{plural}")
@@ -44,7 +44,8 @@ mod tests {
 
     #[test]
     fn what_is_written_is_what_is_meant() {
-        // quick-junit takes escape sequences and control characters out; nothing is left for it.
+        // quick-junit removes escape sequences and control characters. None may be left for it
+        // here.
         let all: String = ('\0'..=char::MAX).collect();
         for text in [short(&all, usize::MAX), path(&all)] {
             assert_eq!(XmlString::new(&text).as_str(), text);

@@ -1,4 +1,4 @@
-//! The JUnit of whole reports.
+//! Tests of the JUnit of whole reports.
 
 #![expect(
     clippy::unwrap_used,
@@ -120,7 +120,7 @@ fn hostile_text_stays_text() {
     let written = report(&[hostile.clone(), nameless]);
     assert_eq!(written.matches("<testsuite ").count(), 2);
     assert!(written.contains(r#"name="(no id)#2""#));
-    // The key does not change when it is read back: a newer result replaces the older one.
+    // The key is the same after reading back, so that a newer result replaces the older one.
     let again = sections(&[hostile]).unwrap();
     let read = Suites.split(&written);
     assert!(again.keys().all(|key| read.contains_key(key)));

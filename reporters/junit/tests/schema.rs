@@ -1,7 +1,7 @@
-//! Reports against the schema that Jenkins and others use.
+//! Validates reports against the schema that Jenkins and others use.
 //!
-//! `QCBUS_JUNIT_XSD` names a copy of `junit-10.xsd`; `xmllint` looks at the reports. Without either,
-//! nothing is looked at, and the test says so.
+//! `QCBUS_JUNIT_XSD` names a copy of `junit-10.xsd`, and `xmllint` validates the reports. If either
+//! is missing, the test checks nothing and prints a message.
 
 #![expect(
     clippy::unwrap_used,

@@ -1,7 +1,7 @@
-//! How long the plan of a map takes, how large it is, and how long findings take to be placed:
+//! Measures the time and the size of the plan of a map, and the time for locating findings:
 //! `cargo run --release -p qcbus-plan --example plan_time -- MAP [COPIES [OUTPUT]]`.
 //!
-//! With COPIES the map's roads and junctions are taken so many times, for maps of any size.
+//! COPIES is the number of copies of the map's roads and junctions, for maps of any size.
 
 #![expect(
     clippy::expect_used,
@@ -33,7 +33,7 @@ fn main() {
     let image = prepare_bytes(Path::new(&path), text.into_bytes(), &Limits::default()).build();
     let document = Document::open(&image).expect("the image is sound");
 
-    // Rules have looked at most of a map before it is drawn; here nobody has.
+    // Rules normally access most of a map before it is drawn. No rule runs here.
     let map = RoadMap::new(document);
     let start = Instant::now();
     let plan = Plan::of(&map);

@@ -1,4 +1,5 @@
-//! The borders of a lane section side by side, as polynomials of t between two places where a record begins.
+//! Borders of the lanes of a section, as polynomials of t between two stations at which records
+//! begin.
 
 use qcbus_opendrive::geometry::Cubic;
 use qcbus_opendrive::{LaneRef, SectionRef, Side};
@@ -8,12 +9,12 @@ use crate::frame::valid;
 /// One side of a section.
 pub(crate) struct Flank<'m, 'a> {
     pub(crate) side: Side,
-    /// From the center outward.
+    /// Lanes from the center outward.
     pub(crate) lanes: Vec<LaneRef<'m, 'a>>,
-    /// Whether the ids tell the order of the lanes; else they have no borders.
+    /// Whether the ids give the order of the lanes. Otherwise the lanes have no borders.
     pub(crate) ordered: bool,
     by_width: bool,
-    /// Where the side ends along the road, in metres.
+    /// End of the side along the road, in metres.
     end: f64,
 }
 
@@ -28,13 +29,13 @@ impl<'m, 'a> Flank<'m, 'a> {
         }
     }
 
-    /// The lanes that have borders.
+    /// Returns the lanes that have borders.
     pub(crate) fn bordered(&self) -> &[LaneRef<'m, 'a>] {
         if self.ordered { &self.lanes } else { &[] }
     }
 
-    /// Appends t of the outer borders over the distance from `from`, outward from `center`. Where a lane's width is
-    /// not defined, or the side has ended already, it has none.
+    /// Appends t of the outer borders over the distance from `from`, outward from `center`. A lane
+    /// has no width if the width is undefined or the side has already ended.
     pub(crate) fn push(&self, start: f64, from: f64, center: Cubic, borders: &mut Vec<Cubic>) {
         let mut last = center;
         for lane in self.bordered() {
@@ -52,7 +53,7 @@ impl<'m, 'a> Flank<'m, 'a> {
         }
     }
 
-    /// Where something begins on this side, in metres along the road.
+    /// Appends the stations at which a record of this side begins, in metres along the road.
     pub(crate) fn breaks(&self, start: f64, breaks: &mut Vec<f64>) {
         breaks.push(self.end);
         for lane in self.bordered() {
@@ -68,7 +69,7 @@ impl<'m, 'a> Flank<'m, 'a> {
     }
 }
 
-/// Where the road marks of a lane begin, from the start of its section.
+/// Returns the start of each road mark of a lane, as an offset from the start of its section.
 pub(crate) fn mark_starts<'a>(lane: LaneRef<'_, 'a>) -> impl Iterator<Item = f64> + use<'a> {
     let marks = lane.lane().records_named("roadMark");
     marks.map(|mark| mark.s_offset().unwrap_or(0.0).max(0.0))

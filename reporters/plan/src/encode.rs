@@ -1,4 +1,4 @@
-//! The plan as bytes.
+//! Encoding of the plan as bytes.
 
 use qcbus_opendrive::{ContactPoint, Junction, Road, RoadMap, TrafficRule};
 
@@ -14,7 +14,7 @@ const CANNOT_BE_DRAWN: u64 = 2;
 const DYNAMIC: u64 = 1;
 const NO_PLACE: u64 = 2;
 
-/// Writes a road; one without a plan cannot be drawn.
+/// Writes a road, also one that cannot be drawn and has no plan.
 pub(crate) fn road(
     out: &mut Writer,
     map: &RoadMap<'_>,
@@ -66,14 +66,15 @@ fn link(out: &mut Writer, road: &Road<'_>, end: ContactPoint) {
     out.string(id);
 }
 
-/// A number that is no smaller than the one before, as the difference.
+/// Writes a number as the difference from the previous one, which is never larger.
 fn ascending(out: &mut Writer, value: u64, last: &mut u64) {
     let value = value.max(*last);
     out.unsigned(value - *last);
     *last = value;
 }
 
-/// Values along the road, in centimetres; `steps` when each is written as the difference from the one before.
+/// Writes values along the road, in centimetres. With `steps`, each is written as the difference
+/// from the previous one.
 fn profile(out: &mut Writer, values: &[[f64; 2]], steps: bool) {
     out.count(values.len());
     let (mut last, mut height) = (0, 0);
@@ -90,7 +91,7 @@ fn profile(out: &mut Writer, values: &[[f64; 2]], steps: bool) {
     }
 }
 
-/// The largest height, in centimetres: 10,000 km.
+/// Maximum height, in centimetres: 10,000 km.
 const HIGHEST: i64 = 1_000_000_000;
 
 fn section(out: &mut Writer, section: &SectionPlan<'_>) {

@@ -1,30 +1,32 @@
-//! What the cross section of a road is between two places where one of its records begins.
+//! Cross section of a road between two stations at which records begin.
 
 use qcbus_opendrive::geometry::{Cubic, Curve, Placed, Point, Pose};
 use qcbus_opendrive::{Profile, Road, Station};
 
 use crate::origin::{Shift, Spot};
 
-/// Farther from the reference line than this, in metres, no border lies: such a lane counts as having no width.
+/// Maximum distance of a border from the reference line, in metres. A lane beyond it counts as
+/// having no width.
 const WIDEST: f64 = 10_000.0;
 
-/// How far a place is moved, in metres, where a curve has no direction of its own (its parameter stands still there).
+/// Displacement, in metres, at a point where a curve has no direction because the derivative of its
+/// parameter is zero.
 const NUDGE: f64 = 1e-3;
 
-/// A stretch of road over which every record stays the same: borders are smooth there.
+/// A stretch of road without a change of records, so its borders are smooth.
 pub(crate) struct Piece {
-    /// Where it begins and ends, in metres along the road.
+    /// Start and end, in metres along the road.
     pub(crate) from: f64,
     pub(crate) to: f64,
     placed: Placed,
-    /// Where its geometry starts.
+    /// Station at which its geometry starts.
     start: f64,
     roll: Option<Cubic>,
-    /// t of each border, over the distance from `from`.
+    /// Polynomial for t of each border, over the distance from `from`.
     borders: Vec<Cubic>,
 }
 
-/// A place on a border.
+/// A point on a border.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sample {
     pub(crate) at: Spot,
@@ -32,31 +34,31 @@ pub(crate) struct Sample {
     pub(crate) t: f64,
 }
 
-/// The borders at stations along the road, one row after the other.
+/// The borders at stations along the road, row by row.
 #[derive(Debug, Default)]
 pub(crate) struct Rows {
-    /// The station of each row, in metres along the road.
+    /// Station of each row, in metres along the road.
     pub(crate) s: Vec<f64>,
-    /// How many borders there are.
+    /// Number of borders.
     width: usize,
     samples: Vec<Sample>,
 }
 
 impl Rows {
-    /// Appends a row; all have the same borders.
+    /// Appends a row. All rows have the same borders.
     pub(crate) fn push(&mut self, s: f64, row: &[Sample]) {
         self.width = row.len();
         self.s.push(s);
         self.samples.extend_from_slice(row);
     }
 
-    /// The last row with its station.
+    /// Returns the last row with its station.
     pub(crate) fn last(&self) -> Option<(f64, &[Sample])> {
         let from = self.samples.len().checked_sub(self.width)?;
         Some((*self.s.last()?, self.samples.get(from..)?))
     }
 
-    /// The samples of one border.
+    /// Returns the samples of one border.
     pub(crate) fn column(&self, column: usize) -> impl Iterator<Item = &Sample> {
         let samples = self.samples.get(column..).unwrap_or(&[]);
         samples.iter().step_by(self.width.max(1))
@@ -64,7 +66,8 @@ impl Rows {
 }
 
 impl Piece {
-    /// The stretch from `from` to `to`, with borders at these t; `None` when the reference line has no place there.
+    /// Returns the stretch from `from` to `to` with these borders, or `None` if the reference line
+    /// has no place there.
     pub(crate) fn of(road: &Road<'_>, [from, to]: [f64; 2], borders: Vec<Cubic>) -> Option<Piece> {
         let located = road.plan_view().locate(from)?;
         let placed = located.geometry.placed()?;
@@ -82,27 +85,27 @@ impl Piece {
         })
     }
 
-    /// The reference line's shape.
+    /// Returns the shape of the reference line.
     pub(crate) fn placed(&self) -> &Placed {
         &self.placed
     }
 
-    /// How many borders there are.
+    /// Returns the number of borders.
     pub(crate) fn width(&self) -> usize {
         self.borders.len()
     }
 
-    /// Whether all borders are straight lines.
+    /// Checks whether all borders are straight lines.
     pub(crate) fn is_straight(&self) -> bool {
         let linear = |cubic: &Cubic| cubic.c == 0.0 && cubic.d == 0.0;
         self.placed.curve == Curve::Line && self.roll.is_none() && self.borders.iter().all(linear)
     }
 
-    /// Puts the cross section at `s` into `row`; `None` where it has no place on the plan.
+    /// Writes the cross section at `s` into `row`. Returns `None` if it has no place on the plan.
     pub(crate) fn row(&self, origin: Shift, s: f64, row: &mut Vec<Sample>) -> Option<()> {
         let pose = self.pose((s - self.start).max(0.0))?;
         let ds = s - self.from;
-        // t turns with the superelevation (8.3).
+        // The superelevation rotates the t direction (8.3).
         let roll = self.roll.and_then(|roll| roll.eval(ds));
         let tilt = roll.map_or(1.0, f64::cos);
         let (sin, cos) = pose.hdg.sin_cos();
@@ -110,7 +113,7 @@ impl Piece {
         row.clear();
         for border in &self.borders {
             let t = border.value(ds);
-            // NaN is in no range.
+            // This comparison also excludes NaN.
             let t = if t.abs() <= WIDEST { t } else { last };
             let lateral = t * tilt;
             let point = Point {
@@ -140,7 +143,7 @@ impl Piece {
     }
 }
 
-/// The polynomial of a profile that is valid at a place, seen from there.
+/// Returns the polynomial of a profile that is valid at a place, shifted to that place.
 pub(crate) fn valid(profile: &Profile<'_>, at: impl Into<Station>) -> Option<Cubic> {
     let valid = profile.valid_at(at)?;
     Some(valid.cubic.shifted(valid.ds))

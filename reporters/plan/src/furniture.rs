@@ -1,4 +1,4 @@
-//! Signals and objects in the plan.
+//! Signals and objects on the plan.
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,33 +7,34 @@ use qcbus_opendrive::{Corner, CornerKind, CurveLocal, Object, Outline, Road, Sig
 
 use crate::origin::Shift;
 
-/// A round object is drawn with so many corners.
+/// Number of corners with which a round object is drawn.
 const CORNERS: u32 = 8;
 
-/// A curve of an outline is drawn with so many lines.
+/// Number of lines with which a curve of an outline is drawn.
 const CURVE_STEPS: u32 = 8;
 
-/// A signal and where it stands.
+/// A signal and its place.
 pub(crate) struct SignalPlan<'a> {
     pub(crate) signal: Signal<'a>,
-    /// Its road's place among the roads.
+    /// Index of its road in the list of roads.
     pub(crate) road: usize,
-    /// `None` when it has no finite place.
+    /// Place of the signal; `None` if it is not finite.
     pub(crate) at: Option<[i64; 2]>,
-    /// In radians, from -π to π.
+    /// Heading in radians, from -π to π.
     pub(crate) hdg: f64,
 }
 
 /// An object and its outline.
 pub(crate) struct ObjectPlan<'a> {
     pub(crate) object: Object<'a>,
-    /// Its road's place among the roads.
+    /// Index of its road in the list of roads.
     pub(crate) road: usize,
-    /// One point is the place alone; none when it has no finite place.
+    /// Points of the outline. One point is the place alone; empty if no finite place exists.
     pub(crate) outline: Vec<[i64; 2]>,
 }
 
-/// A signal's part of the plan. It looks along the road, against it where its orientation is `-` (14.1).
+/// Returns the part of a signal in the plan. It faces along the road, or against it if its
+/// orientation is `-` (14.1).
 pub(crate) fn signal<'a>(road: &Road<'a>, signal: Signal<'a>, origin: Shift) -> SignalPlan<'a> {
     let pose = signal_pose(road, signal);
     let spot = pose.and_then(|pose| origin.spot(pose.point()));
@@ -51,18 +52,18 @@ pub(crate) fn signal<'a>(road: &Road<'a>, signal: Signal<'a>, origin: Shift) -> 
     }
 }
 
-/// Where a signal stands, with the heading of the road.
+/// Returns the position of a signal with the heading of the road.
 pub(crate) fn signal_pose(road: &Road<'_>, signal: Signal<'_>) -> Option<Pose> {
     pose(road, signal.s()?, signal.t()?)
 }
 
-/// Where an object stands, with the heading of the road.
+/// Returns the position of an object with the heading of the road.
 pub(crate) fn object_pose(road: &Road<'_>, object: Object<'_>) -> Option<Pose> {
     pose(road, object.s()?, object.t()?)
 }
 
-/// `s`, or the end of the road that it misses: what stands beyond the road is drawn where the road ends, for
-/// that is where somebody has to look.
+/// Returns `s`, limited to the extent of the road. A thing beyond the road is drawn at the nearest
+/// end of the road, because the user must look there.
 pub(crate) fn on_the_road(road: &Road<'_>, s: f64) -> Option<f64> {
     let end = match (road.length(), road.plan_view().end()) {
         (Some(length), Some(end)) => length.max(end),
@@ -81,7 +82,7 @@ fn pose(road: &Road<'_>, s: f64, t: f64) -> Option<Pose> {
     })
 }
 
-/// An object's part of the plan: its outline, else its bounding box or cylinder, else its place.
+/// Returns the object's part of the plan: its outline, else bounding box or cylinder, else place.
 pub(crate) fn object<'a>(road: &Road<'a>, object: Object<'a>, origin: Shift) -> ObjectPlan<'a> {
     let pose = object_pose(road, object).map(|pose| Pose {
         hdg: pose.hdg + object.hdg().unwrap_or(0.0),
@@ -105,7 +106,8 @@ pub(crate) fn object<'a>(road: &Road<'a>, object: Object<'a>, origin: Shift) -> 
     }
 }
 
-/// The corners of a written outline (13.2); `None` when there are fewer than two or one has no place.
+/// Returns the corners of a given outline (13.2), or `None` if there are fewer than two or one has
+/// no place.
 fn corners(road: &Road<'_>, pose: Option<Pose>, outline: Outline<'_>) -> Option<Vec<Point>> {
     let mut points = Vec::new();
     for corner in outline.corners() {
@@ -121,7 +123,7 @@ fn corners(road: &Road<'_>, pose: Option<Pose>, outline: Outline<'_>) -> Option<
     (points.len() > 1).then_some(points)
 }
 
-/// The points along a curve of an outline (13.2.3).
+/// Appends the points along a curve of an outline (13.2.3).
 fn curve(pose: Pose, curve: CurveLocal<'_>, points: &mut Vec<Point>) -> Option<()> {
     let placed = Placed {
         origin: Point::finite(curve.u()?, curve.v()?)?,
@@ -136,7 +138,7 @@ fn curve(pose: Pose, curve: CurveLocal<'_>, points: &mut Vec<Point>) -> Option<(
     Some(())
 }
 
-/// What its length and width, or its radius, say (13.1), else its place.
+/// Returns the shape given by length and width or by radius (13.1), else the object's place.
 fn bounds(pose: Pose, object: Object<'_>) -> Option<Vec<Point>> {
     let positive = |value: Option<f64>| value.filter(|value| *value > 0.0);
     if let Some(radius) = positive(object.radius()) {
@@ -155,7 +157,7 @@ fn bounds(pose: Pose, object: Object<'_>) -> Option<Vec<Point>> {
     corners.into_iter().collect()
 }
 
-/// A point given in u and v of an object at `pose`.
+/// Converts a point given in u and v of an object at `pose`.
 fn local(pose: Pose, u: f64, v: f64) -> Option<Point> {
     let (sin, cos) = pose.hdg.sin_cos();
     Point::finite(pose.x + u * cos - v * sin, pose.y + u * sin + v * cos)

@@ -1,6 +1,7 @@
-//! Outlines around points.
+//! Outlines around points: convex hull and centroid.
 
-/// The convex hull, counter-clockwise (Andrew's monotone chain); fewer than three points where all lie on a line.
+/// Returns the convex hull, counter-clockwise (Andrew's monotone chain). It has fewer than three
+/// points if all points are on a line.
 pub(crate) fn hull(mut points: Vec<[i64; 2]>) -> Vec<[i64; 2]> {
     points.sort_unstable();
     points.dedup();
@@ -29,13 +30,13 @@ fn half<'p>(points: impl Iterator<Item = &'p [i64; 2]>) -> Vec<[i64; 2]> {
     chain
 }
 
-/// Twice the area of a triangle, positive where it is counter-clockwise. No point of the plan is so far out that this
-/// overflows.
+/// Returns twice the area of a triangle, positive if it is counter-clockwise. The points of a plan
+/// are too close together for an overflow.
 fn turn([ax, ay]: [i64; 2], [bx, by]: [i64; 2], [cx, cy]: [i64; 2]) -> i64 {
     (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 }
 
-/// The centroid of the area within an outline; of its points where it has no area.
+/// Returns the centroid of the area within an outline, or of its points if the area is zero.
 pub(crate) fn centroid(outline: &[[i64; 2]]) -> Option<[f64; 2]> {
     let &first = outline.first()?;
     let relative = |point: &[i64; 2]| [0, 1].map(|axis| (point[axis] - first[axis]) as f64);
@@ -76,7 +77,8 @@ mod tests {
 
     #[test]
     fn the_centroid_is_that_of_the_area() {
-        // A corner more on one edge moves the mean of the points, not that of the area.
+        // An additional corner on one edge moves the mean of the points, but not the centroid of
+        // the area.
         let square = [[0, 0], [4, 0], [4, 1], [4, 2], [4, 4], [0, 4]];
         assert_eq!(centroid(&square), Some([2.0, 2.0]));
         assert_eq!(centroid(&[[0, 0], [4, 2]]), Some([2.0, 1.0]));

@@ -7,21 +7,21 @@ use crate::road::RoadPlan;
 use crate::section::{LanePlan, SectionPlan};
 use crate::simplify::Vertex;
 
-/// How many points all outlines together are made of at most. Many junctions may name the same roads.
+/// Maximum number of points of all outlines together. Many junctions may name the same roads.
 const MOST_POINTS: usize = 4_000_000;
 
-/// The roads' part of the plan, as outlines need them.
+/// Access to the plans of the roads, as outlines need it.
 pub(crate) trait Roads {
-    /// The plan of the road with this index; `None` when it cannot be drawn.
+    /// Calls `look` with the plan of this road. Returns `None` if it cannot be drawn.
     fn with<T>(&mut self, road: usize, look: impl FnOnce(&RoadPlan<'_>) -> T) -> Option<T>;
 }
 
-/// Makes outlines as long as there is work left that it may do.
+/// Builder of outlines that stops at the limit of its work.
 pub(crate) struct Outlines {
     left: usize,
-    /// The roads that name a junction as theirs, by the junction's index.
+    /// Roads that belong to a junction by their own attribute, by the index of the junction.
     members: Vec<Vec<usize>>,
-    /// The hulls of roads that were asked for.
+    /// Cached hulls of roads.
     hulls: std::collections::HashMap<usize, Vec<[i64; 2]>>,
 }
 
@@ -42,13 +42,13 @@ impl Outlines {
         }
     }
 
-    /// Whether points were left out because there would have been too many.
+    /// Checks whether points were left out because of the limit.
     pub(crate) fn is_spent(&self) -> bool {
         self.left == 0
     }
 
-    /// The outline of a junction: its boundary (12.10) if it has one that can be drawn, else the convex hull of the
-    /// borders of its connecting roads.
+    /// Returns the outline of a junction: its boundary (12.10) if it can be drawn. Otherwise it is
+    /// the convex hull of the borders of its connecting roads.
     pub(crate) fn outline(
         &mut self,
         map: &RoadMap<'_>,
@@ -101,7 +101,7 @@ impl Outlines {
     }
 }
 
-/// The points of all borders of a road that are not only there for looking at it from near by.
+/// Returns the points of all borders of a road without those of the finest level of detail.
 fn coarse(plan: &RoadPlan<'_>) -> Vec<[i64; 2]> {
     let lanes = plan.sections.iter().flat_map(|section| {
         let lanes = section.left.iter().chain(&section.right);
@@ -113,7 +113,7 @@ fn coarse(plan: &RoadPlan<'_>) -> Vec<[i64; 2]> {
     vertices.map(|vertex| vertex.at).collect()
 }
 
-/// The part of a boundary that a segment describes, in its direction.
+/// Returns the part of a boundary that a segment describes, in the direction of the segment.
 fn along(plan: &RoadPlan<'_>, segment: BoundarySegment<'_>, length: f64) -> Option<Vec<[i64; 2]>> {
     match segment.kind()? {
         "lane" => {
@@ -140,7 +140,7 @@ fn along(plan: &RoadPlan<'_>, segment: BoundarySegment<'_>, length: f64) -> Opti
     }
 }
 
-/// The outer border of a lane within a stretch of road.
+/// Returns the outer border of a lane within a stretch of road.
 fn stretch(plan: &RoadPlan<'_>, lane: i64, [from, to]: [f64; 2]) -> Vec<[i64; 2]> {
     let lines = plan
         .sections
@@ -159,7 +159,7 @@ fn stretch(plan: &RoadPlan<'_>, lane: i64, [from, to]: [f64; 2]) -> Vec<[i64; 2]
     points
 }
 
-/// The place at `s` on the line between two points.
+/// Returns the place at `s` on the line between two points.
 fn between(one: &Vertex, next: &Vertex, s: f64) -> [i64; 2] {
     let length = next.s - one.s;
     let share = if length > 0.0 {
@@ -173,7 +173,7 @@ fn between(one: &Vertex, next: &Vertex, s: f64) -> [i64; 2] {
     })
 }
 
-/// Where the outer border of a lane meets an end of the road.
+/// Returns the point at which the outer border of a lane meets an end of the road.
 fn corner(plan: &RoadPlan<'_>, lane: i64, end: ContactPoint) -> Option<[i64; 2]> {
     let mut lines = plan
         .sections
@@ -186,7 +186,7 @@ fn corner(plan: &RoadPlan<'_>, lane: i64, end: ContactPoint) -> Option<[i64; 2]>
     Some(vertex.at)
 }
 
-/// The outer border of a lane, the center line for lane 0.
+/// Returns the outer border of a lane, or the center line for lane 0.
 fn line<'p>(section: &'p SectionPlan<'_>, lane: i64) -> Option<&'p [Vertex]> {
     let of_id = |lanes: &'p [LanePlan<'_>]| lanes.iter().find(|each| each.id == lane);
     let border = match Side::of_lane_id(lane) {

@@ -1,12 +1,12 @@
-//! A plan view of a road network, small enough to be sent, and where findings lie on it.
+//! A small plan view of a road network for transfer, and the places of findings on it.
 //!
-//! [`Plan::of`] takes a map of the OpenDRIVE model to lines in whole centimetres, each point with the coarsest
-//! level of detail that still needs it, and writes them in the binary form that `docs/html-report.md` describes
-//! (section "`plan`"). [`Locator`] leads what a finding says about its place to a point and to the roads, lanes,
-//! junctions, signals and objects of the same plan.
+//! [`Plan::of`] converts a map of the OpenDRIVE model to lines in whole centimetres. Each point has
+//! the coarsest level of detail that still needs it. The binary format is described in
+//! `docs/html-report.md` (section "`plan`"). [`Locator`] converts the place data of a finding to a
+//! point. It also finds the roads, lanes, junctions, signals and objects of the same plan.
 //!
-//! Maps are hostile: whatever has no finite place, lies too far away or would take too much work is left out, and
-//! [`Plan::cuts`] says so. The work is bounded by the size of the file.
+//! Maps may be hostile. Elements without a finite place, too far away or with too much work are
+//! left out, and [`Plan::cuts`] reports them. The work is bounded by the size of the file.
 
 mod columns;
 mod encode;

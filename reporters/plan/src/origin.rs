@@ -1,12 +1,12 @@
-//! From the map's coordinates to those of the plan.
+//! Conversion of map coordinates to plan coordinates.
 
 use qcbus_opendrive::RoadMap;
 use qcbus_opendrive::geometry::Point;
 
-/// How far from the origin a point of the plan may lie, in metres: no road network is wider.
+/// Maximum distance of a point of the plan from the origin, in metres: no road network is wider.
 const FARTHEST: f64 = 1_000_000.0;
 
-/// A place in the plan, in centimetres from the origin, not yet rounded.
+/// A place on the plan in centimetres from the origin, before rounding.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Spot {
     pub(crate) x: f64,
@@ -14,18 +14,18 @@ pub(crate) struct Spot {
 }
 
 impl Spot {
-    /// In whole centimetres, as the plan is written.
+    /// Returns the place in whole centimetres, as the plan stores it.
     pub(crate) fn rounded(self) -> [i64; 2] {
-        // Saturates, and what is an `Shift`'s lies far within.
+        // The conversion saturates, but values from a `Shift` are far below the limit.
         [self.x.round() as i64, self.y.round() as i64]
     }
 }
 
-/// The line between two places.
+/// A line segment between two places.
 pub(crate) struct Segment {
     from: Spot,
     along: Spot,
-    /// One over the square of its length; zero when it has none.
+    /// Inverse of the squared length; zero if the length is zero.
     inverse: f64,
 }
 
@@ -44,7 +44,7 @@ impl Segment {
         }
     }
 
-    /// The square of the distance to a place, in square centimetres.
+    /// Returns the squared distance to a place, in square centimetres.
     pub(crate) fn square(&self, at: Spot) -> f64 {
         let (x, y) = (at.x - self.from.x, at.y - self.from.y);
         let share = ((x * self.along.x + y * self.along.y) * self.inverse).clamp(0.0, 1.0);
@@ -53,8 +53,8 @@ impl Segment {
     }
 }
 
-/// The middle of the roads, which the plan's coordinates are counted from. Large coordinates (UTM) lose their
-/// digits in single precision and their bytes in a file unless they are shifted first.
+/// The middle of the roads, the origin of the plan coordinates. Large coordinates (UTM) lose digits
+/// in single precision and need more bytes in a file, so they are shifted first.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Shift {
     pub(crate) x: f64,
@@ -62,7 +62,8 @@ pub(crate) struct Shift {
 }
 
 impl Shift {
-    /// The median of the starts of all roads, in whole metres: one road at the end of the world does not move it.
+    /// Returns the median of the starts of all roads, in whole metres. A single road far away does
+    /// not change it.
     pub(crate) fn of(map: &RoadMap<'_>) -> Shift {
         let starts = map.roads().iter();
         let starts = starts.filter_map(|road| road.plan_view().in_order().next()?.start_point());
@@ -73,10 +74,11 @@ impl Shift {
         }
     }
 
-    /// The place of a point in the plan; `None` when it is farther away than any road can be.
+    /// Returns the place of a point on the plan, or `None` if it is farther away than any road can
+    /// be.
     pub(crate) fn spot(self, point: Point) -> Option<Spot> {
         let (x, y) = (point.x - self.x, point.y - self.y);
-        // NaN is in no range.
+        // This comparison also excludes NaN.
         let near = |value: f64| value.abs() <= FARTHEST;
         (near(x) && near(y)).then_some(Spot {
             x: 100.0 * x,
@@ -84,7 +86,7 @@ impl Shift {
         })
     }
 
-    /// Where a place of the plan lies on the map, in metres.
+    /// Converts a place of the plan to map coordinates, in metres.
     pub(crate) fn unshifted(self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.x + x / 100.0, self.y + y / 100.0]
     }

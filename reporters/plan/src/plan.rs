@@ -1,4 +1,4 @@
-//! The plan as a whole.
+//! The whole plan.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -12,31 +12,33 @@ use crate::road::{RoadPlan, road};
 use crate::sample::NotDrawn;
 use crate::writer::{Writer, unsigned};
 
-/// What the bytes begin with.
+/// Magic bytes at the beginning of the plan.
 const MAGIC: &[u8] = b"QCPL";
 const VERSION: u64 = 1;
 
-/// How many points of borders are looked at, for roads that share this equally; besides each has [`PER_BYTE`].
-/// Real maps take about a tenth of a point per byte.
+/// Number of border points that the roads share equally; each road also has [`PER_BYTE`]. Real maps
+/// take about a tenth of a point per byte.
 const SHARED: usize = 8_000_000;
 const PER_BYTE: usize = 1;
 
-/// How many more those roads may take, one after the other, that their share was not enough for.
+/// Number of further points for roads that exceeded their part, used one road after the other.
 const RESERVE: usize = 8_000_000;
 
-/// How many a single road may take besides those for its bytes: they are held in memory until it is drawn.
+/// Maximum number of points of a single road, besides those for its bytes. They stay in memory
+/// until it is drawn.
 const RESERVE_OF_A_ROAD: usize = 2_000_000;
 
-/// Roads are given to threads in portions of so many; maps with no more than this are drawn on one thread.
+/// Number of roads that a thread takes at once. A map with at most this many roads is drawn on one
+/// thread.
 const PORTION: usize = 32;
 
-/// At most so many threads draw roads: the plan is not the only thing that a machine has to do.
+/// Maximum number of threads that draw roads, because the machine has other work too.
 const MOST_THREADS: usize = 4;
 
-/// At most so many names in a sentence.
+/// Maximum number of names in a sentence.
 const NAMED: usize = 5;
 
-/// A name within a sentence is cut after so many characters.
+/// Maximum number of characters of a name within a sentence.
 const LONGEST_NAME: usize = 24;
 
 /// The plan of a road network.
@@ -44,16 +46,17 @@ const LONGEST_NAME: usize = 24;
 pub struct Plan {
     origin: Shift,
     strings: Vec<String>,
-    /// All that follows the strings.
+    /// Everything after the strings.
     body: Vec<u8>,
     cuts: Vec<String>,
 }
 
-/// What became of a road.
+/// Result of drawing a road.
 type Drawn<'a> = Result<RoadPlan<'a>, NotDrawn>;
 
 impl Plan {
-    /// Draws a map. Takes 2 to 10 ms per megabyte of it, and whatever it says time in proportion to its size.
+    /// Draws a map. It takes 2 to 10 ms per megabyte. For any content, the time is proportional to
+    /// the size.
     pub fn of(map: &RoadMap<'_>) -> Plan {
         let origin = Shift::of(map);
         let mut roads = draw(map, origin);
@@ -94,7 +97,7 @@ impl Plan {
         }
     }
 
-    /// The plan as `docs/html-report.md` describes it, not compressed.
+    /// Returns the uncompressed plan as `docs/html-report.md` describes it.
     pub fn bytes(&self) -> Vec<u8> {
         let texts: usize = self.strings.iter().map(|text| text.len() + 2).sum();
         let mut bytes = Vec::with_capacity(self.body.len() + texts + 64);
@@ -111,13 +114,13 @@ impl Plan {
         bytes
     }
 
-    /// Sentences about what was left out.
+    /// Returns sentences about the parts that were left out.
     pub fn cuts(&self) -> &[String] {
         &self.cuts
     }
 }
 
-/// How many points a road may take.
+/// Returns the maximum number of points of a road.
 pub(crate) fn allowance(map: &RoadMap<'_>, road: &Road<'_>) -> usize {
     let node = road.node();
     let bytes = node.end_offset().saturating_sub(node.offset());
@@ -125,7 +128,8 @@ pub(crate) fn allowance(map: &RoadMap<'_>, road: &Road<'_>) -> usize {
     share.min(RESERVE_OF_A_ROAD) + PER_BYTE * bytes as usize
 }
 
-/// All roads, each with its own allowance, so that the result does not depend on the number of threads.
+/// Draws all roads, each with its own limit, so the result does not depend on the number of
+/// threads.
 fn draw<'a>(map: &RoadMap<'a>, origin: Shift) -> Vec<Drawn<'a>> {
     let each = |one: &Road<'a>| road(one, origin, allowance(map, one)).0;
     if map.roads().len() <= PORTION {
@@ -160,7 +164,7 @@ fn draw<'a>(map: &RoadMap<'a>, origin: Shift) -> Vec<Drawn<'a>> {
     taken.into_iter().flat_map(|(_, drawn)| drawn).collect()
 }
 
-/// Gives the roads that have used up their share another try.
+/// Draws the roads again that exceeded their limit.
 fn redraw<'a>(map: &RoadMap<'a>, origin: Shift, roads: &mut [Drawn<'a>]) {
     let mut left = RESERVE;
     for (one, drawn) in map.roads().iter().zip(roads) {
@@ -173,7 +177,7 @@ fn redraw<'a>(map: &RoadMap<'a>, origin: Shift, roads: &mut [Drawn<'a>]) {
     }
 }
 
-/// Roads that were drawn already.
+/// Access to roads that are already drawn.
 struct DrawnRoads<'p, 'a>(&'p [Drawn<'a>]);
 
 impl Roads for DrawnRoads<'_, '_> {
@@ -227,7 +231,7 @@ fn objects(out: &mut Writer, map: &RoadMap<'_>, origin: Shift, cuts: &mut Vec<St
 
 const NO_PLACE: &str = "for want of a place that can be computed from the road";
 
-/// A sentence about things of one kind that are not drawn; `None` when there are none.
+/// Returns a sentence about elements of one kind that are not drawn, or `None` if there are none.
 fn sentence<'a>(ids: impl Iterator<Item = &'a str>, kind: &str, why: &str) -> Option<String> {
     let mut names = Vec::new();
     let mut more = 0_usize;
@@ -247,7 +251,7 @@ fn sentence<'a>(ids: impl Iterator<Item = &'a str>, kind: &str, why: &str) -> Op
     Some(format!("Not drawn, {why}: {kind}{plural} {names}."))
 }
 
-/// An id that can stand in a sentence.
+/// Returns an id in a form suitable for a sentence.
 fn name(id: &str) -> String {
     let shown = |c: char| if c.is_control() { '\u{fffd}' } else { c };
     id.chars().take(LONGEST_NAME).map(shown).collect()

@@ -1,4 +1,4 @@
-//! A road in the plan.
+//! A road on the plan.
 
 use qcbus_opendrive::Road;
 use qcbus_opendrive::geometry::Cubic;
@@ -9,7 +9,7 @@ use crate::sample::{NotDrawn, Sampler};
 use crate::section::{self, SectionPlan, TOLERANCE};
 use crate::simplify::{Vertex, profile};
 
-/// At most so many straight lines stand for one record of the elevation.
+/// Maximum number of straight lines for one record of the elevation.
 const MOST_STEPS: f64 = 256.0;
 
 #[derive(Debug, Default)]
@@ -20,7 +20,7 @@ pub(crate) struct RoadPlan<'a> {
     pub(crate) sections: Vec<SectionPlan<'a>>,
 }
 
-/// The road's part of the plan, and how many points were looked at for it: at most `work`.
+/// Returns the road's part of the plan and the number of computed points, at most `work`.
 pub(crate) fn road<'a>(
     road: &Road<'a>,
     origin: Shift,
@@ -56,7 +56,7 @@ fn draw<'a>(road: &Road<'a>, sampler: &mut Sampler) -> Result<RoadPlan<'a>, NotD
     })
 }
 
-/// Where geometries and superelevations begin.
+/// Returns the starts of geometries and superelevations.
 fn own_starts(road: &Road<'_>) -> Vec<f64> {
     let geometries = road.plan_view().geometries().iter();
     let rolls = road.lateral().superelevation.records().iter();
@@ -66,7 +66,7 @@ fn own_starts(road: &Road<'_>) -> Vec<f64> {
         .collect()
 }
 
-/// The heights of the reference line; none where they are not defined.
+/// Returns the heights of the reference line; empty where they are undefined.
 fn elevation(road: &Road<'_>, [from, to]: [f64; 2]) -> Vec<[f64; 2]> {
     let mut heights = Vec::new();
     for stretch in road.elevation().stretches(to) {

@@ -1,52 +1,54 @@
-//! Points on borders, as many as their curves need.
+//! Sampling of points on borders, as many as their curves need.
 
 use qcbus_opendrive::geometry::{Curve, Placed};
 
 use crate::frame::{Piece, Rows, Sample};
 use crate::origin::{Segment, Shift};
 
-/// How far, in centimetres, borders may lie from the lines between their samples.
+/// Maximum distance, in centimetres, of borders from the lines between their samples.
 pub(crate) const SAMPLED: f64 = 0.3;
 
-/// Where, between its ends, a stretch is looked at. Whatever cubic bends away from the line between the ends is seen
-/// at one of two places; and these are nearly where the stretch is farthest from it.
+/// Positions within a stretch at which it is probed. For every cubic that deviates from the line
+/// between the ends, at least one of the two shows the deviation. They are nearly where the stretch
+/// is farthest from the line.
 const PROBES: [f64; 2] = [0.3, 0.7];
 
-/// How far, in centimetres, a border may lie at the probes from the line between the ends of a stretch: with the
-/// probes as points of the line, a fifth of it remains.
+/// Maximum distance, in centimetres, of a border at the probes from the line between the ends of a
+/// stretch. If the probes become points of the line, a fifth of the distance remains.
 const BENT: f64 = 5.0 * SAMPLED;
 
-/// Stretches of this length, in metres, are not divided.
+/// Stretches of at most this length, in metres, are not divided.
 const SHORTEST: f64 = 1e-3;
 
-/// How far the reference line may turn within a stretch, in radians: else whole circles could hide between probes.
+/// Maximum turn of the reference line within a stretch, in radians. Otherwise the probes could miss
+/// whole circles.
 const TURN: f64 = 1.0;
 
-/// At most so many parts are made of a stretch at once.
+/// Maximum number of parts into which a stretch is divided at once.
 const PARTS: f64 = 32.0;
 
-/// Rows on a curve that has to be measured for each of its points cost as much as so many borders.
+/// Cost of a row on a curve that must be measured for each of its points, in number of borders.
 const MEASURED: usize = 40;
 
-/// Why a road cannot be drawn.
+/// Reasons why a road cannot be drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum NotDrawn {
-    /// A part of it has no finite place or lies too far away.
+    /// A part of the road has no finite place or is too far away.
     Nowhere,
-    /// It has more points than it may have.
+    /// The road has more points than allowed.
     TooLong,
 }
 
-/// Takes samples, as long as there is work left that it may do.
+/// Sampler that stops at its work limit.
 pub(crate) struct Sampler {
     pub(crate) origin: Shift,
-    /// How many more points may be looked at.
+    /// Number of points that may still be computed.
     pub(crate) left: usize,
 }
 
 impl Sampler {
-    /// Appends the rows of a piece to those of the pieces before. A first row that is no other than the last one is
-    /// left out; where something steps, both stay.
+    /// Appends the rows of a piece to those of the previous pieces. The first row is left out if it
+    /// equals the last one. At a step, both rows stay.
     pub(crate) fn take(&mut self, piece: &Piece, rows: &mut Rows) -> Result<(), NotDrawn> {
         let (mut one, mut other, mut end) = (Vec::new(), Vec::new(), Vec::new());
         self.row(piece, piece.from, &mut end)?;
@@ -55,7 +57,7 @@ impl Sampler {
             rows.push(piece.from, &end);
         }
         let parts = turning(piece.placed(), piece.to - piece.from) / TURN;
-        // More parts than points allowed need not be listed.
+        // There are more parts than allowed points, so a list of the parts is not needed.
         if parts.is_nan() || parts > self.left as f64 {
             return Err(NotDrawn::TooLong);
         }
@@ -96,7 +98,7 @@ impl Sampler {
     }
 }
 
-/// Puts the ends of equal parts of a stretch on the stack, the first one on top.
+/// Pushes the ends of equal parts of a stretch onto the stack, with the first one on top.
 fn divide([from, to]: [f64; 2], parts: f64, open: &mut Vec<f64>) {
     open.push(to);
     let mut part = parts - 1.0;
@@ -106,7 +108,7 @@ fn divide([from, to]: [f64; 2], parts: f64, open: &mut Vec<f64>) {
     }
 }
 
-/// How far a reference line turns at most over a length, in radians.
+/// Returns the maximum turn of a reference line over a length, in radians.
 fn turning(placed: &Placed, length: f64) -> f64 {
     match placed.curve {
         Curve::Line => 0.0,
@@ -118,12 +120,13 @@ fn turning(placed: &Placed, length: f64) -> f64 {
                 .max(spiral.curvature(placed.length).abs());
             sharpest * length
         }
-        // Cubics turn about once, whatever their coefficients.
+        // A cubic turns only about once, whatever its coefficients are.
         Curve::ParamPoly3(_) | Curve::Poly3(_) => 2.0 * TURN,
     }
 }
 
-/// The largest distance of a row's samples from the lines between those of two others, in centimetres.
+/// Returns the largest distance of a row's samples from the lines between the samples of two
+/// others, in centimetres.
 fn bend(from: &[Sample], probe: &[Sample], to: &[Sample]) -> f64 {
     let distances = probe.iter().zip(from.iter().zip(to));
     let squares =
@@ -131,7 +134,8 @@ fn bend(from: &[Sample], probe: &[Sample], to: &[Sample]) -> f64 {
     squares.fold(0.0, f64::max).sqrt()
 }
 
-/// Whether two rows lie at the same place: nothing steps between them. A tenth of a millimetre is no step.
+/// Checks whether two rows have the same place, without a step between them. A tenth of a
+/// millimetre is not a step.
 fn is_same(one: &[Sample], other: &[Sample]) -> bool {
     let mut pairs = one.iter().zip(other);
     pairs.all(|(one, other)| {

@@ -1,4 +1,4 @@
-//! A lane section in the plan: its borders, the marks along them, the widths of its lanes.
+//! A lane section on the plan: its borders, the road marks along them, and the widths of its lanes.
 
 use qcbus_opendrive::geometry::Cubic;
 use qcbus_opendrive::{LaneRef, Road, SectionRef, Side};
@@ -9,15 +9,15 @@ use crate::origin::Spot;
 use crate::sample::{NotDrawn, Sampler};
 use crate::simplify::{Vertex, levels, profile};
 
-/// Stations closer together than this, in metres, are one.
+/// Stations closer together than this, in metres, count as equal.
 const SAME_STATION: f64 = 1e-6;
 
-/// How far widths and heights may lie from what is drawn, in centimetres.
+/// Maximum deviation of drawn widths and heights, in centimetres.
 pub(crate) const TOLERANCE: f64 = 1.0;
 
 #[derive(Debug)]
 pub(crate) struct SectionPlan<'a> {
-    /// Its extent along the road, in metres.
+    /// Start and end along the road, in metres.
     pub(crate) s: [f64; 2],
     pub(crate) center: Border<'a>,
     pub(crate) left: Vec<LanePlan<'a>>,
@@ -35,7 +35,7 @@ pub(crate) struct LanePlan<'a> {
     pub(crate) id: i64,
     pub(crate) kind: &'a str,
     pub(crate) border: Border<'a>,
-    /// Distance from the section's start and width, in centimetres.
+    /// Pairs of distance from the section's start and width, in centimetres.
     pub(crate) widths: Vec<[f64; 2]>,
 }
 
@@ -46,12 +46,13 @@ pub(crate) struct MarkPlan<'a> {
     pub(crate) points: usize,
     pub(crate) kind: &'a str,
     pub(crate) color: &'a str,
-    /// In metres; zero when it is not said.
+    /// Width in metres; zero if it is not given.
     pub(crate) width: f64,
 }
 
-/// The section's part of the plan, as far as the reference line reaches (`line`, from where to where in metres).
-/// `starts` are where the records of the road and those of the layer begin, each ascending.
+/// Returns the section's part of the plan, limited to the reference line (`line`, start and end in
+/// metres). `starts` are the starts of the records of the road and of those of the layer, each
+/// ascending.
 pub(crate) fn section<'a>(
     section: SectionRef<'_, 'a>,
     line: [f64; 2],
@@ -103,7 +104,7 @@ pub(crate) fn section<'a>(
     })
 }
 
-/// The cross sections: the center, the left side outward, the right side outward.
+/// Returns the cross sections: the center, then the left side outward, then the right side outward.
 fn rows(
     section: SectionRef<'_, '_>,
     flanks: &[Flank<'_, '_>; 2],
@@ -130,7 +131,7 @@ fn rows(
             .iter()
             .map(|flank| flank.bordered().len())
             .sum::<usize>();
-        // What a piece costs before its first row.
+        // This is the cost of a piece before its first row.
         sampler.left = sampler.left.checked_sub(columns).ok_or(NotDrawn::TooLong)?;
         let offset = section.layer.offset();
         let center = valid(offset, piece[0]).unwrap_or_default();
@@ -145,7 +146,7 @@ fn rows(
     Ok(rows)
 }
 
-/// Visits the pieces into which `breaks` divide a stretch of road.
+/// Calls `visit` for each piece into which `breaks` divide a stretch of road.
 pub(crate) fn each_piece(
     [from, to]: [f64; 2],
     mut breaks: Vec<f64>,
@@ -163,7 +164,7 @@ pub(crate) fn each_piece(
     Ok(())
 }
 
-/// One column of the rows as a line, with the marks of a lane whose offsets count from `start`.
+/// Returns one column of the rows as a line with a lane's marks; offsets count from `start`.
 fn border<'a>(rows: &Rows, column: usize, lane: Option<LaneRef<'_, 'a>>, start: f64) -> Border<'a> {
     if rows.s.is_empty() {
         return Border::default();
@@ -175,7 +176,7 @@ fn border<'a>(rows: &Rows, column: usize, lane: Option<LaneRef<'_, 'a>>, start: 
     let last = rows.s.len() - 1;
     let mut drawn = Vec::new();
     for (at, mark) in marks.iter().enumerate() {
-        // The mark ends at the last row before the next one's step.
+        // The mark ends at the last row before the step of the next mark.
         let end = marks.get(at + 1).map_or(last, |next| end(rows, next.s));
         let (first, end) = (place(begins[at]), place(end));
         if mark.kind != "none" && end > first {
@@ -191,8 +192,8 @@ fn border<'a>(rows: &Rows, column: usize, lane: Option<LaneRef<'_, 'a>>, start: 
     Border { line, marks: drawn }
 }
 
-/// One column as a line that keeps the rows in `forced` (ascending), and for each row the place in the line of the
-/// last point up to it.
+/// Returns one column as a line that keeps the rows in `forced` (ascending). For each row it also
+/// returns the index in the line of the last point up to it.
 fn line(rows: &Rows, column: usize, forced: &[usize]) -> (Vec<Vertex>, Vec<usize>) {
     let spots: Vec<Spot> = rows.column(column).map(|sample| sample.at).collect();
     let mut line = Vec::new();
@@ -211,14 +212,14 @@ fn line(rows: &Rows, column: usize, forced: &[usize]) -> (Vec<Vertex>, Vec<usize
     (line, places)
 }
 
-/// The reference line: the first column.
+/// Returns the reference line, which is the first column.
 pub(crate) fn reference_line(rows: &Rows) -> Vec<Vertex> {
     line(rows, 0, &[]).0
 }
 
-/// A road mark as it is written.
+/// A road mark as given in the map.
 struct Mark<'a> {
-    /// Where it begins, in metres along the road.
+    /// Start in metres along the road.
     s: f64,
     kind: &'a str,
     color: &'a str,
@@ -238,19 +239,20 @@ fn marks<'a>(lane: LaneRef<'_, 'a>, start: f64) -> Vec<Mark<'a>> {
     marks
 }
 
-/// The row at which something that begins at `s` begins: the last one there.
+/// Returns the row at which a thing with start `s` begins: the last row at that station.
 fn begin(rows: &Rows, s: f64) -> usize {
     let after = rows.s.partition_point(|row| *row <= s + 2.0 * SAME_STATION);
     after.saturating_sub(1)
 }
 
-/// The row up to which something lasts that ends at `s`: the first one there.
+/// Returns the row at which a thing with end `s` ends: the first row at that station.
 fn end(rows: &Rows, s: f64) -> usize {
     let at = rows.s.partition_point(|row| *row < s - 2.0 * SAME_STATION);
     at.min(rows.s.len().saturating_sub(1))
 }
 
-/// The width between two columns, in centimetres over the distance from the section's start.
+/// Returns the width between two columns over the distance from the section's start, in
+/// centimetres.
 fn widths(rows: &Rows, [inner, outer]: [usize; 2], sign: f64, start: f64) -> Vec<[f64; 2]> {
     let columns = rows.column(inner).zip(rows.column(outer));
     let both = rows.s.iter().zip(columns).map(|(s, (inner, outer))| {
@@ -260,7 +262,7 @@ fn widths(rows: &Rows, [inner, outer]: [usize; 2], sign: f64, start: f64) -> Vec
     profile(&both.collect::<Vec<_>>(), TOLERANCE)
 }
 
-/// The reference line of a road from where to where it reaches, in metres; `None` when nobody can say.
+/// Returns the start and end of a road's reference line, in metres, or `None` if they are unknown.
 pub(crate) fn reach(road: &Road<'_>) -> Option<[f64; 2]> {
     let first = road.plan_view().in_order().next()?.s()?.max(0.0);
     let end = road.plan_view().end()?;

@@ -1,42 +1,43 @@
-//! Fewer points for the same line, level by level.
+//! Simplification of lines to fewer points, by level of detail.
 
 use crate::origin::{Segment, Spot};
 
-/// How far, in centimetres, a line may lie from the sampled one on the levels of detail from fine to coarse. Near by
-/// 2 cm are allowed, of which the samples themselves take [`SAMPLED`](crate::sample::SAMPLED).
+/// Maximum distance, in centimetres, of a line from the sampled one, for the levels of detail from
+/// fine to coarse. The finest level allows 2 cm, of which the samples themselves use
+/// [`SAMPLED`](crate::sample::SAMPLED).
 const TOLERANCES: [f64; 3] = [2.0 - crate::sample::SAMPLED, 25.0, 200.0];
 
 /// The coarsest level.
 const COARSEST: u8 = 2;
 
-/// From this depth on a line is halved instead of being split at its farthest point: a line that loses one point at a
-/// time would take quadratic time.
+/// From this depth, a line is halved and not split at its farthest point. Otherwise a line that
+/// loses one point at a time would take quadratic time.
 const DEEPEST: u32 = 48;
 
 /// A point of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Vertex {
-    /// In centimetres from the origin.
+    /// Position in centimetres from the origin.
     pub(crate) at: [i64; 2],
-    /// Where it lies along the road, in metres.
+    /// Station along the road, in metres.
     pub(crate) s: f64,
-    /// The coarsest level of detail that still has it.
+    /// Coarsest level of detail that still contains the point.
     pub(crate) level: u8,
 }
 
-/// A stretch of the line between two points that stay.
+/// A stretch of the line between two kept points.
 struct Stretch {
     from: usize,
     to: usize,
-    /// The level of the coarser neighbours, which nothing between them exceeds: so every level keeps what the
-    /// coarser ones have.
+    /// Level of the coarser neighbours and maximum level between them. So every level keeps the
+    /// points of the coarser ones.
     level: u8,
     depth: u32,
 }
 
-/// The coarsest level that needs each point, `None` where no level does (Ramer, Douglas and Peucker, on a stack).
-/// Distances are those from lines between rounded points, so that rounding takes nothing from the tolerance. The
-/// first, the last and those of `forced` (ascending) stay.
+/// Returns the coarsest level that needs each point, `None` for no level (Ramer, Douglas and
+/// Peucker, on a stack). Distances are measured from lines between rounded points, so rounding uses
+/// no tolerance. The first point, the last point and those in `forced` (ascending) stay.
 pub(crate) fn levels(points: &[Spot], forced: &[usize]) -> Vec<Option<u8>> {
     let mut levels = vec![None; points.len()];
     let Some(last) = points.len().checked_sub(1) else {
@@ -68,7 +69,7 @@ pub(crate) fn levels(points: &[Spot], forced: &[usize]) -> Vec<Option<u8>> {
     levels
 }
 
-/// The point at which a stretch has to be split, with its level.
+/// Returns the point at which a stretch must be split, with its level.
 fn split(points: &[Spot], forced: &[usize], stretch: &Stretch) -> Option<(usize, u8)> {
     let &Stretch {
         from, to, level, ..
@@ -106,8 +107,9 @@ fn split(points: &[Spot], forced: &[usize], stretch: &Stretch) -> Option<(usize,
     Some((at, 0))
 }
 
-/// The points of a function that have to stay for straight lines between them to lie within `tolerance` of all of
-/// them; `points` ascend in their first coordinate. Where two share it (a step) both stay.
+/// Returns the points of a function that must stay. Straight lines between them are within
+/// `tolerance` of all points. `points` ascend in their first coordinate. Where two share it (a
+/// step), both stay.
 pub(crate) fn profile(points: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
     let mut kept: Vec<[f64; 2]> = Vec::new();
     let Some((&first, rest)) = points.split_first() else {
@@ -115,12 +117,12 @@ pub(crate) fn profile(points: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
     };
     kept.push(first);
     let (mut anchor, mut last) = (first, first);
-    // Slopes from the anchor that pass all points since then closely enough.
+    // Range of slopes from the anchor that are close enough to all points since then.
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
     for &point in rest {
         let along = point[0] - anchor[0];
         let slope = (point[1] - anchor[1]) / along;
-        // NaN, for a second point at the place of the anchor, is within nothing.
+        // A second point at the place of the anchor gives NaN, which fails every comparison.
         let within = along > 0.0 && slope >= low && slope <= high;
         if !within {
             if last != anchor {
@@ -184,7 +186,8 @@ mod tests {
 
     #[test]
     fn a_line_that_loses_one_point_at_a_time_is_halved() {
-        // The farthest point is always the next one: at this length quadratic time would be hours.
+        // The farthest point is always the next one. At this length, quadratic time would take
+        // hours.
         let point = |at: u32| Spot {
             x: f64::from(at),
             y: 1e9
@@ -209,7 +212,8 @@ mod tests {
             let points: Vec<Spot> = walk.collect();
             let levels = levels(&points, &[]);
             for (level, allowed) in TOLERANCES.into_iter().enumerate() {
-                // Distances were taken from rounded ends, which lie up to half a diagonal away.
+                // The distances are measured from rounded ends, which may be up to half a diagonal
+                // away.
                 prop_assert!(off(&points, &levels, level as u8) <= allowed + 0.71);
             }
         }

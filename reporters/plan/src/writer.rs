@@ -1,21 +1,21 @@
-//! Numbers and strings as the plan writes them.
+//! Encoding of numbers and strings in the plan.
 
 use std::collections::HashMap;
 
-/// The largest number: JavaScript counts no farther exactly.
+/// Largest number that JavaScript represents exactly.
 const LARGEST: u64 = (1 << 53) - 1;
 
-/// Strings are cut after so many characters: a name is read, nothing hangs on its end.
+/// Maximum number of characters of a string. Strings are names only for people.
 const LONGEST_STRING: usize = 300;
 
-/// Bytes in the making, and the strings that they name by number.
+/// The written bytes and the strings to which they refer by number.
 #[derive(Debug, Default)]
 pub(crate) struct Writer {
     pub(crate) bytes: Vec<u8>,
     pub(crate) strings: Strings,
 }
 
-/// Each string once, numbered in the order of first use.
+/// Strings without duplicates, numbered in the order of first use.
 #[derive(Debug, Default)]
 pub(crate) struct Strings {
     pub(crate) list: Vec<String>,
@@ -39,35 +39,36 @@ impl Strings {
 }
 
 impl Writer {
-    /// `u`: an unsigned number.
+    /// Writes `u`: an unsigned number.
     pub(crate) fn unsigned(&mut self, value: u64) {
         unsigned(&mut self.bytes, value);
     }
 
-    /// `u n`: how many follow.
+    /// Writes `u n`: the number of items that follow.
     pub(crate) fn count(&mut self, count: usize) {
         self.unsigned(count as u64);
     }
 
-    /// `u` of a place in a list that may be none: 0, else 1 more.
+    /// Writes `u` for an optional index: 0 for `None`, else the index plus 1.
     pub(crate) fn maybe(&mut self, index: Option<usize>) {
         self.unsigned(index.map_or(0, |index| index as u64 + 1));
     }
 
-    /// `z`: a signed number.
+    /// Writes `z`: a signed number.
     pub(crate) fn signed(&mut self, value: i64) {
         let bound = (LARGEST / 2) as i64;
         let value = value.clamp(-bound, bound);
         self.unsigned(((value << 1) ^ (value >> 63)) as u64);
     }
 
-    /// `s`: a string by its number.
+    /// Writes `s`: a string by its number.
     pub(crate) fn string(&mut self, text: &str) {
         let number = self.strings.number(text);
         self.unsigned(number);
     }
 
-    /// Points, each but the first as the way from the one before; `then` writes what else belongs to a point.
+    /// Writes points, each except the first as the difference from the previous one. `then` writes
+    /// the other data of a point.
     pub(crate) fn points<T>(
         &mut self,
         points: &[T],
@@ -86,7 +87,7 @@ impl Writer {
     }
 }
 
-/// `u` at the end of some bytes.
+/// Appends `u` to some bytes.
 pub(crate) fn unsigned(bytes: &mut Vec<u8>, value: u64) {
     let mut rest = value.min(LARGEST);
     while rest >= 0x80 {
@@ -96,13 +97,13 @@ pub(crate) fn unsigned(bytes: &mut Vec<u8>, value: u64) {
     bytes.push(rest as u8);
 }
 
-/// Metres as whole centimetres that are not negative; zero for what is no number.
+/// Converts metres to whole centimetres that are not negative; NaN becomes zero.
 pub(crate) fn length(metres: f64) -> u64 {
-    // Saturates, and NaN becomes zero.
+    // The conversion saturates, and NaN becomes zero.
     (100.0 * metres).round() as u64
 }
 
-/// Metres as whole centimetres; zero for what is no number.
+/// Converts metres to whole centimetres; NaN becomes zero.
 pub(crate) fn offset(metres: f64) -> i64 {
     (100.0 * metres).round() as i64
 }

@@ -1,4 +1,4 @@
-//! What the plan of a map shows, read back from its bytes.
+//! Tests of the plan of a map, decoded from its bytes.
 
 mod support;
 
@@ -52,7 +52,8 @@ fn the_borders_of_a_straight_road_lie_to_the_centimetre() {
     assert_eq!(plan.cuts, Vec::<String>::new());
 }
 
-/// Farthest distance of points along a circle around `center` from a border, in centimetres.
+/// Returns the largest distance in centimetres between a border and points on a circle around
+/// `center`.
 fn off_circle(
     plan: &Decoded,
     border: &[[i64; 2]],
@@ -100,7 +101,7 @@ fn an_arc_stays_within_its_tolerance_on_every_level() {
             let off = off_circle(&plan, &kept, [3.0, 54.0], radius, 3.0);
             assert!(off <= allowed, "level {level}, radius {radius}: {off} cm");
         }
-        // Chords that are 2 cm off a circle of 50 m are 2.8 m long.
+        // A chord of 2.8 m has a distance of 2 cm from a circle of 50 m.
         assert!(border.points.len() < 90, "{} points", border.points.len());
     }
 }

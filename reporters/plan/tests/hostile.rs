@@ -1,4 +1,4 @@
-//! Maps whose numbers were written by an enemy: no road is lost, and drawing ends.
+//! Tests of maps with hostile numbers. No road is lost, and drawing ends.
 
 mod support;
 

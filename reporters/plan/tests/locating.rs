@@ -1,11 +1,12 @@
-//! Where findings are placed.
+//! Tests of the places of findings.
 
 mod support;
 
 use qcbus_plan::{How, Locator, Said, Spot, Target};
 use support::{line, road, with_map};
 
-/// Two roads of one id, 100 m long, side by side; a junction with an outline and one without.
+/// Returns two roads with the same id, 100 m long, side by side, and two junctions, one of them
+/// with an outline.
 fn network() -> String {
     let lanes = "<laneOffset s='0' a='0' b='0' c='0' d='0'/><laneOffset s='40' a='1' b='0' c='0' d='0'/>\
         <laneSection s='0'><left><lane id='1'><width sOffset='0' a='3' b='0' c='0' d='0'/></lane></left>\
@@ -173,7 +174,7 @@ fn junctions_and_their_connections_have_places() {
         (Some(How::Element), &[junction][..])
     );
     let [x, y] = middle.at.unwrap();
-    // Of the two roads of this id the hull goes around both: both say that they belong to the junction.
+    // Both roads with this id belong to the junction, so the hull surrounds both.
     assert!(
         (45.0..55.0).contains(&x) && (20.0..30.0).contains(&y),
         "{x}, {y}"

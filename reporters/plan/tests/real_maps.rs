@@ -1,4 +1,4 @@
-//! The maps of other projects, where they are at hand: what is drawn lies where the model says.
+//! Tests with the maps of other projects, if they are available. Drawn lines must match the model.
 
 mod support;
 
@@ -8,7 +8,7 @@ use qcbus_opendrive::{Edge, RoadMap, SectionRef};
 use qcbus_plan::{Locator, Plan, Said};
 use support::{Border, Decoded, decode, with_bytes};
 
-/// All maps below a directory, in a fixed order.
+/// Returns all maps below a directory, in a fixed order.
 fn maps(directory: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(directory) else {
         return Vec::new();
@@ -50,7 +50,7 @@ fn borders_lie_within_two_centimetres_of_the_model() {
     assert!(looked_at > 10_000);
 }
 
-/// Looks at some places of all lanes of a map, and returns how many.
+/// Checks some places of all lanes of a map. Returns their number.
 fn borders(map: &RoadMap<'_>, plan: &Decoded, path: &Path) -> usize {
     let mut count = 0;
     for (road, drawn) in map.roads().iter().zip(&plan.roads) {
@@ -77,7 +77,7 @@ fn borders(map: &RoadMap<'_>, plan: &Decoded, path: &Path) -> usize {
     count
 }
 
-/// How far the outer border of a lane lies from what is drawn, in centimetres.
+/// Returns the distance between the outer border of a lane and its drawn line, in centimetres.
 fn off(
     section: SectionRef<'_, '_>,
     lane: i64,
@@ -89,7 +89,7 @@ fn off(
     let ds = share * lane.length()?;
     let t = lane.t(Edge::Outer, ds)?;
     let s = section.s()? + ds;
-    // Beyond the end of the reference line nothing is drawn.
+    // No line is drawn beyond the end of the reference line.
     section.road.plan_view().end().filter(|end| s < *end)?;
     let point = section.road.point(s, t, 0.0)?;
     let at = [100.0 * (point.x - origin[0]), 100.0 * (point.y - origin[1])];
@@ -111,7 +111,7 @@ fn distance([x, y]: [f64; 2], from: [i64; 2], to: [i64; 2]) -> f64 {
     (x - share * dx).hypot(y - share * dy)
 }
 
-/// Every hundredth element of the roads, and that it has a place.
+/// Asserts that every hundredth element of the roads has a place.
 fn everything_has_a_place(map: &RoadMap<'_>, path: &Path) {
     let locator = Locator::new(map);
     let drawable = map

@@ -1,4 +1,4 @@
-//! Files as URIs.
+//! Conversion of file paths to URIs.
 
 use std::os::unix::ffi::OsStrExt as _;
 use std::path::{Component, Path, PathBuf};
@@ -8,17 +8,17 @@ use qcbus_messages::path_text::from_text;
 
 use crate::log::{ArtifactLocation, ROOT};
 
-/// From where the paths of a result are relative.
+/// Base directories for the relative paths of a result.
 pub(crate) struct Paths {
     input: PathBuf,
     display: PathBuf,
-    /// The directory in front of the path for people.
+    /// Directory that precedes the display path.
     root: Option<PathBuf>,
 }
 
 impl Paths {
     pub(crate) fn of(result: &ResultMessage) -> Paths {
-        // The result file of another tool may not say what was checked.
+        // The result file of another tool may lack the path of the checked file.
         let input = match result.input.as_str() {
             "" => from_text(&result.xqar),
             input => from_text(input),
@@ -32,8 +32,8 @@ impl Paths {
         }
     }
 
-    /// The checked file. Where its path for people climbs out of the directory, the absolute one is
-    /// said: hosts take a relative path for one from the root of the repository.
+    /// Returns the location of the checked file. If its display path leaves the directory, the
+    /// absolute path is used. Hosts interpret a relative path from the root of the repository.
     pub(crate) fn checked(&self) -> ArtifactLocation {
         if stays_inside(&self.display) {
             relative(&self.display)
@@ -42,7 +42,7 @@ impl Paths {
         }
     }
 
-    /// Another file: relative where it lies in the directory that the checked file's path starts in.
+    /// Returns the location of another file, relative if it is below the checked file's base.
     pub(crate) fn other(&self, path: &str) -> ArtifactLocation {
         let path = from_text(path);
         let root = self.root.as_ref();
@@ -86,8 +86,8 @@ fn absolute(path: &Path) -> ArtifactLocation {
     }
 }
 
-/// The bytes of a path, of which only unreserved characters (RFC 3986, 2.3) and slashes stand for
-/// themselves: a colon in the first name would otherwise end a scheme.
+/// Encodes the bytes of a path. Only unreserved characters (RFC 3986, 2.3) and slashes stay. A
+/// colon in the first name would otherwise end a scheme.
 fn encoded(path: &Path) -> String {
     let mut uri = String::new();
     for &byte in path.as_os_str().as_bytes() {

@@ -1,4 +1,4 @@
-//! One issue as a SARIF result.
+//! Conversion of one issue into a SARIF result.
 
 use qcbus_formats::xqar::{Checker, Issue, Level};
 use qcbus_reporter_sdk::{IssueLocation, fingerprint, issue_locations};
@@ -11,17 +11,17 @@ use crate::log::{
 };
 use crate::text;
 
-/// Numbers of lines and columns are 32 bits wide in the tools that read SARIF; no file has more.
+/// Largest line or column number. Tools that read SARIF use 32 bits, and no file has more.
 const LARGEST_LINE: u64 = i32::MAX as u64;
 
-/// The id of the rule that an issue breaks.
+/// Returns the id of the rule that an issue violates.
 pub(crate) fn rule_id(checker: &Checker, issue: &Issue) -> String {
     let named = [issue.rule_uid.as_str(), &checker.id].map(text::name);
     let mut named = named.into_iter().filter(|name| !name.is_empty());
     named.next().unwrap_or_else(|| "unnamed".to_owned())
 }
 
-/// The severity of a level.
+/// Returns the severity of a level.
 pub(crate) fn severity(level: Level) -> Severity {
     match level {
         Level::Error => Severity::Error,
@@ -30,7 +30,7 @@ pub(crate) fn severity(level: Level) -> Severity {
     }
 }
 
-/// An issue of the file with this path for people.
+/// Returns an issue of the file with this display path as a SARIF result.
 pub(crate) fn finding(
     display_path: &str,
     paths: &Paths,
@@ -55,7 +55,7 @@ pub(crate) fn finding(
     }
 }
 
-/// A message without Markdown.
+/// Returns a message without Markdown.
 pub(crate) fn plain(text: &str) -> Message {
     Message {
         text: text.to_owned(),
@@ -63,7 +63,7 @@ pub(crate) fn plain(text: &str) -> Message {
     }
 }
 
-/// A whole file.
+/// Returns the location of a whole file.
 pub(crate) fn whole_file(file: ArtifactLocation) -> Location {
     Location {
         physical_location: PhysicalLocation {
@@ -75,7 +75,7 @@ pub(crate) fn whole_file(file: ArtifactLocation) -> Location {
     }
 }
 
-/// The main place in the checked file; for one in another file, the reference to it.
+/// Returns the main place in the checked file, or the reference to it if it is in another file.
 fn main(place: Option<&IssueLocation>, paths: &Paths) -> Location {
     let mut location = whole_file(paths.checked());
     let Some(place) = place else {
@@ -95,7 +95,7 @@ fn main(place: Option<&IssueLocation>, paths: &Paths) -> Location {
     location
 }
 
-/// The other places, as many as hosts take and each once, and how many are left out.
+/// Returns the other places without duplicates, up to the limit, and the number left out.
 fn related(places: &[IssueLocation], paths: &Paths) -> (Vec<Location>, Option<usize>) {
     let mut related = Vec::new();
     let mut left_out = 0;
@@ -108,7 +108,7 @@ fn related(places: &[IssueLocation], paths: &Paths) -> (Vec<Location>, Option<us
             location
         });
         for location in own.into_iter().chain(also) {
-            // One is the main place.
+            // One of the places is reserved for the main place.
             match related.contains(&location) {
                 true => {}
                 false if related.len() + 1 < MOST_PLACES => related.push(location),
@@ -167,11 +167,11 @@ fn properties(place: Option<&IssueLocation>, left_out: Option<usize>) -> Finding
     }
 }
 
-/// To the millimetre. JSON has no number for NaN and infinity, and nothing on Earth is further than
-/// 10^9 m; within these bounds a number reads back as it was written.
+/// Rounds a number to the millimetre. JSON has no representation of NaN and infinity, and no place
+/// on Earth is further than 10^9 m. Within these bounds, a number reads back unchanged.
 fn metres(number: f64) -> Option<f64> {
     let is_place = number.is_finite() && number.abs() < 1e9;
-    // Adding zero makes a zero of the negative one.
+    // Adding zero converts negative zero to zero.
     is_place.then(|| (number * 1000.0).round() / 1000.0 + 0.0)
 }
 

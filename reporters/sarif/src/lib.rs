@@ -2,24 +2,25 @@
 //!
 //! A report is one log with one run of the tool `qcbus`:
 //!
-//! * `results`: the findings, the most severe first. `ruleId` is the rule's UID, which names the rule
-//!   in the standard, in `qcbus rule` and for whoever searches for it, and which no release changes; a
-//!   finding without one goes by its checker. The location is always in the checked file, whose verdict
-//!   it decides: for what is wrong in another file it is the reference to that file. All other places
-//!   are `relatedLocations`.
-//! * `artifacts`: every checked file, also without findings, with its SHA-256, its verdict and what was
-//!   found, so that an accepted file can be told from one that was not looked at.
-//! * `invocations`: `executionSuccessful` is false as soon as a checker failed or a verdict is
-//!   undetermined. Hosts show findings only, and take those that are gone for mended, so there is
-//!   an error in place of the answer, too: the rule [`UNANSWERED`].
+//! * `results`: the findings, the most severe first. `ruleId` is the rule's UID. It names the rule
+//!   in the standard and in `qcbus rule`, is suitable for searches, and does not change between
+//!   releases. A finding without a UID uses the id of its checker. The location is always in the
+//!   checked file, because the finding decides that file's verdict. For a finding in another file,
+//!   it is the reference to that file. All other places are `relatedLocations`.
+//! * `artifacts`: every checked file, also without findings, with its SHA-256, its verdict and its
+//!   number of findings. So an accepted file differs from one that was not checked.
+//! * `invocations`: `executionSuccessful` is false if a checker failed or a verdict is
+//!   undetermined. Hosts show only findings and treat missing ones as fixed. So an error replaces
+//!   the missing answer: the rule [`UNANSWERED`].
 //!
-//! Paths are relative to `%SRCROOT%`, the directory that was given or watched. GitHub wants that to be
-//! the root of the repository, and replaces the findings of an earlier upload of the same category: to
-//! upload reports of several files one by one, give each its category, or better use one file for all.
+//! Paths are relative to `%SRCROOT%`, the given or watched directory. GitHub requires this to be
+//! the root of the repository. GitHub replaces the findings of an earlier upload of the same
+//! category. To upload reports of several files one by one, give each its category. One file for
+//! all results is better.
 //!
-//! What is more than GitHub takes is left out from the least severe on ([`MOST_RESULTS`],
-//! [`MOST_PACKED_BYTES`]) and said in `toolConfigurationNotifications` and in the run's properties. The
-//! order depends on nothing but the findings, so the same are left out again next time.
+//! Findings beyond the limits of GitHub are left out, the least severe first ([`MOST_RESULTS`],
+//! [`MOST_PACKED_BYTES`]). `toolConfigurationNotifications` and the run's properties report this.
+//! The order depends only on the findings, so the same ones are left out next time.
 //!
 //! Parameter: `OutputFile` (see [`Output`]).
 
@@ -45,7 +46,7 @@ pub use unanswered::UNANSWERED;
 /// The reporter's name on the bus and in configurations.
 pub const NAME: &str = "qc-report-sarif";
 
-/// What this crate offers.
+/// Registration of this reporter.
 pub static REPORTER: Registration = Registration {
     alias: "sarif",
     name: NAME,

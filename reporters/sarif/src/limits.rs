@@ -1,6 +1,6 @@
-//! What GitHub takes
+//! Limits of GitHub
 //! (<https://docs.github.com/en/code-security/reference/code-scanning/sarif-files/sarif-support-for-code-scanning>,
-//! November 2026). More than that is refused as a whole, which is worse than a cut that is said.
+//! November 2026). GitHub rejects a larger log as a whole, so a reported cut is better.
 
 use std::io::Write;
 
@@ -11,21 +11,21 @@ use qcbus_reporter_sdk::ReportError;
 use crate::finding::plain;
 use crate::log::{Found, Notification, SarifResult, Severity};
 
-/// Results of a run that are taken.
+/// Maximum number of results of a run that GitHub accepts.
 pub const MOST_RESULTS: usize = 25_000;
 
-/// Results of a run that are shown, the most severe ones.
+/// Maximum number of results of a run that GitHub shows, the most severe ones.
 pub const SHOWN_RESULTS: usize = 5_000;
 
-/// Bytes of a log that are taken, packed with gzip: 10 MB less a tenth, because whoever uploads it packs
-/// it with another library, and rules and files need room, too.
+/// Maximum size of a log in bytes, packed with gzip: 10 MB less a tenth. The uploader packs with
+/// another library, and rules and files need space too.
 pub const MOST_PACKED_BYTES: u64 = 9_000_000;
 
-/// Places of a result that are shown; ten times as many are taken.
+/// Maximum number of places of a result that GitHub shows; it accepts ten times as many.
 pub const MOST_PLACES: usize = 100;
 
-/// How many of these findings, which come in the order of importance, fit into a log that has `around`
-/// besides them.
+/// Returns how many of these findings fit into a log that also contains `around`. The findings are
+/// sorted by importance.
 pub(crate) fn fitting(findings: &[SarifResult], around: &[u8]) -> Result<usize, ReportError> {
     let findings = findings.get(..MOST_RESULTS).unwrap_or(findings);
     if fits_unpacked(findings, around)? {
@@ -42,7 +42,7 @@ pub(crate) fn fitting(findings: &[SarifResult], around: &[u8]) -> Result<usize, 
     Ok(findings.len())
 }
 
-/// Whether they are so few that nobody has to pack them to know.
+/// Checks whether the findings fit even without packing.
 fn fits_unpacked(findings: &[SarifResult], around: &[u8]) -> Result<bool, ReportError> {
     let mut size = Counted(around.len() as u64);
     for finding in findings {
@@ -56,7 +56,7 @@ fn refused(error: impl std::fmt::Display) -> ReportError {
     ReportError::Form(error.to_string())
 }
 
-/// Counts what is written.
+/// Writer that only counts the bytes.
 struct Counted(u64);
 
 impl Write for Counted {
@@ -70,7 +70,7 @@ impl Write for Counted {
     }
 }
 
-/// What there is to say about limits.
+/// Returns the notifications about limits.
 pub(crate) fn notifications(found: Found, left_out: Found) -> Vec<Notification> {
     let total = found.total();
     let written = total.saturating_sub(left_out.total());

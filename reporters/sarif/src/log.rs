@@ -1,16 +1,16 @@
-//! The objects of SARIF 2.1.0 that are written, named as the standard names them
-//! (<https://docs.oasis-open.org/sarif/sarif/v2.1.0/sarif-v2.1.0.html>, section 3). What the standard
-//! lets one leave out and we never write is not here.
+//! The written objects of SARIF 2.1.0 with the names of the standard
+//! (<https://docs.oasis-open.org/sarif/sarif/v2.1.0/sarif-v2.1.0.html>, section 3). Optional
+//! objects that qcbus never writes are missing.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// The schema that a log names.
+/// Schema that a log names.
 pub(crate) const SCHEMA: &str =
     "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json";
 
-/// The base of relative paths, under the name by which GitHub knows it.
+/// Base of relative paths, under GitHub's name for it.
 pub(crate) const ROOT: &str = "%SRCROOT%";
 
 #[derive(Serialize, Deserialize)]
@@ -128,15 +128,15 @@ pub(crate) struct Artifact {
 #[serde(rename_all = "camelCase")]
 pub(crate) struct ArtifactProperties {
     pub verdict: String,
-    /// The checked file's path, under which its part of a report is found again.
+    /// Path of the checked file. It identifies the part of a report that belongs to the file.
     pub path: String,
-    /// How much was found; more than the run has results where some were left out.
+    /// Number of findings. It is larger than the number of results if some were left out.
     pub found: Found,
-    /// Whether all checkers that should have looked did.
+    /// Whether every required checker gave an answer.
     pub answered: bool,
 }
 
-/// Findings by level.
+/// Number of findings by level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub(crate) struct Found {
     pub error: u64,
@@ -149,7 +149,7 @@ pub(crate) struct Found {
 #[serde(rename_all = "camelCase")]
 pub(crate) struct SarifResult {
     pub rule_id: String,
-    /// Where the rule stands; given when the log is put together.
+    /// Index of the rule; set when the log is assembled.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rule_index: Option<usize>,
     pub level: Severity,
@@ -162,8 +162,8 @@ pub(crate) struct SarifResult {
     pub properties: FindingProperties,
 }
 
-/// GitHub reads this key and no other. Without it, it hashes the line of the finding, and the same
-/// `<lane id="-1"` is on a thousand lines of a map.
+/// Fingerprint under the only key that GitHub reads. Without it, GitHub hashes the line of the
+/// finding. The same `<lane id="-1"` is on a thousand lines of a map.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct Fingerprints {
@@ -186,7 +186,7 @@ pub(crate) struct FindingProperties {
     pub y: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub z: Option<f64>,
-    /// Places that are not among the related ones.
+    /// Number of places that are missing in the related locations.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub places_left_out: Option<usize>,
 }
@@ -221,7 +221,7 @@ pub(crate) struct ArtifactLocation {
     pub uri: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uri_base_id: Option<String>,
-    /// Where the artifact stands; given when the log is put together.
+    /// Index of the artifact; set when the log is assembled.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub index: Option<usize>,
 }
@@ -240,7 +240,7 @@ pub(crate) struct LogicalLocation {
     pub fully_qualified_name: String,
 }
 
-/// What there is, and what of it could not be said.
+/// Number of all findings, and of those that were left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(crate) struct RunProperties {

@@ -1,4 +1,4 @@
-//! Sections, and the one log that they make.
+//! Conversion of sections into one log, and back.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use crate::log::{
 use crate::rules::rules;
 use crate::section::{RuleNote, Section};
 
-/// The name of the tool, by which a log of ours is known.
+/// Name of the tool; it identifies a log of qcbus.
 const TOOL: &str = "qcbus";
 
 /// Results as SARIF.
@@ -24,7 +24,7 @@ pub struct Sarif {
 }
 
 impl Sarif {
-    /// A form that has these pages of rules.
+    /// Creates a format with these rule pages.
     pub fn new(pages: Pages) -> Sarif {
         Sarif { pages }
     }
@@ -71,7 +71,7 @@ impl ReportFormat for Sarif {
 }
 
 impl Sarif {
-    /// The run around these findings, without them.
+    /// Returns the run for these findings, without the findings themselves.
     fn run(&self, sections: &BTreeMap<String, Section>, findings: &[SarifResult]) -> Run {
         let artifacts = || sections.values().map(|section| &section.artifact);
         let found = artifacts().map(|artifact| artifact.properties.found);
@@ -111,7 +111,7 @@ fn base() -> Base {
     }
 }
 
-/// The log of a run, on one line: hosts count bytes.
+/// Returns the log of a run on one line, because hosts limit the number of bytes.
 fn written(run: Run) -> Result<String, ReportError> {
     let log = Log {
         schema: SCHEMA.to_owned(),
@@ -123,8 +123,8 @@ fn written(run: Run) -> Result<String, ReportError> {
     Ok(text + "\n")
 }
 
-/// The findings of all sections: the most severe first, then file by file. The first so many of them
-/// are the same ones as long as nothing more severe comes or goes, whatever a host takes.
+/// Returns the findings of all sections: the most severe first, then by file. So the first findings
+/// stay the same for any host limit, unless more severe findings are added or removed.
 fn by_importance(sections: &BTreeMap<String, Section>) -> Vec<SarifResult> {
     let mut repeats = Repeats::default();
     let mut findings = Vec::new();
@@ -162,13 +162,13 @@ fn set_artifact(locations: &mut [Location], index: Option<usize>) {
     }
 }
 
-/// The index of the checked file that a finding or a notification is about.
+/// Returns the index of the checked file of a finding or a notification.
 fn artifact_of(locations: &[Location]) -> Option<usize> {
     let location = locations.first()?;
     location.physical_location.artifact_location.index
 }
 
-/// What [`ReportFormat::whole`] put together, taken apart.
+/// Splits the result of [`ReportFormat::whole`] into its sections.
 fn sections_of(run: Run) -> BTreeMap<String, Section> {
     let notes: BTreeMap<String, RuleNote> = run.tool.driver.rules.into_iter().map(note).collect();
     let mut sections: Vec<Section> = run.artifacts.into_iter().map(bare).collect();

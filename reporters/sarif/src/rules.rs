@@ -1,4 +1,4 @@
-//! What a report says about rules.
+//! Rules of a report.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use crate::log::{Configuration, Message, Rule, RuleProperties, SarifResult, Seve
 use crate::section::{RuleNote, Section};
 use crate::text;
 
-/// The rules of these findings, by id. What two sections say differently is taken from the first.
+/// Returns the rules of these findings, by id. If two sections differ, the first one is used.
 pub(crate) fn rules<'s>(
     sections: impl Iterator<Item = &'s Section>,
     findings: &[SarifResult],
@@ -46,7 +46,7 @@ fn rule(id: &str, note: &RuleNote, level: Severity, pages: Pages) -> Rule {
             said => text::description(&said),
         }),
         help_uri: (!page.link.is_empty()).then_some(page.link),
-        // GitHub demands one.
+        // GitHub requires a help text.
         help: Some(match page.text {
             "" => plain(&note.about),
             text => Message {
@@ -62,7 +62,7 @@ fn rule(id: &str, note: &RuleNote, level: Severity, pages: Pages) -> Rule {
     }
 }
 
-/// The first paragraph of a page, after its title.
+/// Returns the first paragraph of a page, after its title.
 fn beginning(page: &str) -> String {
     let mut lines = page.lines().map(str::trim);
     let text = lines
@@ -72,7 +72,7 @@ fn beginning(page: &str) -> String {
     lines.join(" ")
 }
 
-/// The standard, its version and the field of a rule: `xodr`, `xodr 1.4.0`, `road`.
+/// Returns the standard, its version and the field of a rule: `xodr`, `xodr 1.4.0`, `road`.
 fn tags(uid: &str) -> Vec<String> {
     let parts: Vec<&str> = uid.split(':').collect();
     let [_, standard, version, name] = parts[..] else {

@@ -1,4 +1,4 @@
-//! What one checked file gives.
+//! Section of one checked file.
 
 use std::collections::BTreeMap;
 
@@ -11,23 +11,23 @@ use crate::log::{Artifact, ArtifactProperties, Found, Notification, SarifResult,
 use crate::text;
 use crate::unanswered::{self, UNANSWERED};
 
-/// What one checked file gives to a report.
+/// Part of one checked file in a report.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Section {
     pub(crate) artifact: Artifact,
-    /// The most severe first, else in the order of the result; without indices and repeats, which
-    /// depend on the other sections.
+    /// Findings, the most severe first, otherwise in the order of the result. They have no indices
+    /// and repeat numbers, because these depend on the other sections.
     pub(crate) findings: Vec<SarifResult>,
     pub(crate) notifications: Vec<Notification>,
     pub(crate) rules: BTreeMap<String, RuleNote>,
 }
 
-/// What a section knows of a rule; the rest is on the rule's page.
+/// Data of a rule in a section; the rule's page has the rest.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct RuleNote {
-    /// The id of its checker.
+    /// Id of the rule's checker.
     pub checker: String,
-    /// What it is about.
+    /// Description of the rule.
     pub about: String,
 }
 

@@ -1,15 +1,16 @@
-//! Text of others in messages.
+//! Handling of untrusted text in messages.
 
 use qcbus_reporter_sdk::{one_line, printable};
 
-/// Characters of a message that are kept: more than anybody reads, and a bound for hostile files.
+/// Maximum number of characters of a message: enough for people, and a limit for hostile files.
 const LONGEST_MESSAGE: usize = 2000;
 
-/// Characters that GitHub takes of a rule's descriptions.
+/// Maximum number of characters of a rule's description at GitHub.
 const LONGEST_DESCRIPTION: usize = 1024;
 
-/// A message: one line of plain text. Plain text of SARIF can hold links, `[text](target)` (3.11.6), and
-/// no text of others makes one. Braces stay: they are placeholders only in messages with arguments.
+/// Returns a message: one line of plain text. SARIF plain text can hold links, `[text](target)`
+/// (3.11.6); untrusted text must not create one. Braces stay, because they are placeholders only in
+/// messages with arguments.
 pub(crate) fn message(text: &str) -> String {
     match short(&one_line(text), LONGEST_MESSAGE) {
         text if text.is_empty() => "(no description)".to_owned(),
@@ -17,24 +18,24 @@ pub(crate) fn message(text: &str) -> String {
     }
 }
 
-/// A description of a rule: as a message, and as long as GitHub takes it.
+/// Returns a description of a rule: a message within GitHub's length limit.
 pub(crate) fn description(text: &str) -> String {
     short(&message(text), LONGEST_DESCRIPTION)
 }
 
-/// Several lines: a page of a rule.
+/// Returns the text of a rule page, which may have several lines.
 pub(crate) fn page(text: &str) -> String {
     printable(text)
 }
 
-/// A name, such as the id of a rule: one line without blanks at its ends.
+/// Returns a name, such as the id of a rule: one line without spaces at its ends.
 pub(crate) fn name(text: &str) -> String {
     short(&one_line(text), LONGEST_DESCRIPTION)
 }
 
 fn short(text: &str, most: usize) -> String {
     match text.char_indices().nth(most) {
-        // The sign that something is missing is one of the characters.
+        // The ellipsis counts as one of the characters.
         Some(_) => {
             let kept: String = text.chars().take(most.saturating_sub(1)).collect();
             format!("{}…", kept.trim_end())

@@ -1,4 +1,4 @@
-//! What keeps a verdict open.
+//! Reasons for an undetermined verdict.
 
 use qcbus_messages::{ResultMessage, Verdict};
 use qcbus_reporter_sdk::{fingerprint_of, silences};
@@ -8,14 +8,14 @@ use crate::finding::{plain, whole_file};
 use crate::log::{FindingProperties, Fingerprints, Notification, SarifResult, Severity};
 use crate::text;
 
-/// The rule under which it is said that checkers gave no answer.
+/// Rule that reports checkers without an answer.
 pub const UNANSWERED: &str = "qcbus.dev:qcbus:1.0.0:check.unanswered";
 
-/// What that rule is about.
+/// Description of that rule.
 pub(crate) const ABOUT: &str = "A checker that should have looked at the file gave no answer, so \
     nobody knows what it would have found; findings of it that are gone are not mended.";
 
-/// Why an answer is missing, a sentence for each reason; none when all is answered.
+/// Returns a sentence for each reason of a missing answer; empty if all checkers answered.
 pub(crate) fn reasons(result: &ResultMessage) -> Vec<String> {
     let silences = silences(result).into_iter();
     silences
@@ -23,7 +23,7 @@ pub(crate) fn reasons(result: &ResultMessage) -> Vec<String> {
         .collect()
 }
 
-/// A reason for whoever looks at how the tool ran.
+/// Returns a reason as a notification about the run of the tool.
 pub(crate) fn notification(result: &ResultMessage, paths: &Paths, reason: &str) -> Notification {
     let (path, verdict) = (&result.display_path, result.verdict);
     Notification {
@@ -33,7 +33,7 @@ pub(crate) fn notification(result: &ResultMessage, paths: &Paths, reason: &str) 
     }
 }
 
-/// All reasons for whoever looks at findings only.
+/// Returns all reasons as one finding, for readers that show only findings.
 pub(crate) fn finding(result: &ResultMessage, paths: &Paths, reasons: &[String]) -> SarifResult {
     let said = match result.verdict {
         Verdict::Undetermined => "The file is undetermined, not accepted: ",

@@ -1,4 +1,4 @@
-//! Whole logs, held against the schema.
+//! Validates whole logs against the schema.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
 
@@ -139,12 +139,12 @@ fn sections(results: &[ResultMessage]) -> BTreeMap<String, Section> {
     results.iter().map(section).collect()
 }
 
-/// The text of a log.
+/// Returns the text of a log.
 fn unchecked(results: &[ResultMessage]) -> String {
     form().whole(&sections(results)).unwrap()
 }
 
-/// The text of a log that the schema allows.
+/// Returns the text of a log. Asserts that it matches the schema.
 fn whole(results: &[ResultMessage]) -> String {
     let text = unchecked(results);
     let log: Value = serde_json::from_str(&text).unwrap();
@@ -167,7 +167,7 @@ fn run(results: &[ResultMessage]) -> Value {
     log["runs"][0].take()
 }
 
-/// The log for a snapshot that outlives a version of the program.
+/// Returns the log for a snapshot that does not depend on the version of the program.
 fn pretty(results: &[ResultMessage]) -> String {
     let mut log: Value = serde_json::from_str(&whole(results)).unwrap();
     let driver = &mut log["runs"][0]["tool"]["driver"];
@@ -323,13 +323,13 @@ fn thirty_thousand_findings_lose_the_least_severe_and_say_it() {
         "25000 of 30000 findings are in this report, the most severe ones: code scanning takes no \
          more. Left out: 0 errors, 0 warnings, 5000 notes."
     );
-    // A daemon that starts again has what was kept, and still says what was not.
+    // A restarted daemon has the listed results and still reports the omitted ones.
     assert_eq!(form().whole(&form().split(&text)).unwrap(), text);
 }
 
 #[test]
 fn what_is_too_large_when_packed_is_cut_and_said() {
-    // Text that does not pack: each finding has its own.
+    // Each finding has its own random text, so that the log cannot be compressed well.
     let mut random = numbers(7);
     let issues = (0..9_000).map(|n| {
         let text: String = (0..1900)
@@ -357,7 +357,7 @@ fn what_is_too_large_when_packed_is_cut_and_said() {
     assert_eq!(kept + left_out, 9_000);
 }
 
-/// A generator of the same numbers on every machine (Knuth's linear congruential one).
+/// Returns a generator of the same numbers on every machine (Knuth's linear congruential one).
 fn numbers(seed: u64) -> impl FnMut() -> u64 {
     let mut state = seed;
     move || {

@@ -1,4 +1,4 @@
-//! One file that holds the newest report of every checked file.
+//! One file with the newest report of every checked file.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -7,20 +7,19 @@ use std::path::{Path, PathBuf};
 use crate::output::{clear_place, earlier, write_named};
 use crate::{ReportError, ReportFormat};
 
-/// A file of sections, one per checked file. New sections are appended where the form allows it;
-/// a section that is there already is replaced, and [`ArtifactStore::finish`] brings them in the order of
-/// their paths.
+/// A file of sections, one per checked file. New sections are appended if the format allows it. An
+/// existing section is replaced. [`ArtifactStore::finish`] sorts the sections by their paths.
 pub struct ArtifactStore<F: ReportFormat> {
     path: PathBuf,
     sections: BTreeMap<String, F::Section>,
     sorted: bool,
-    /// Nothing is written before the end.
+    /// Whether all writing waits for the end.
     waits: bool,
 }
 
 impl<F: ReportFormat> ArtifactStore<F> {
-    /// Opens the file. With `keep`, sections written earlier stay (a daemon that was restarted);
-    /// otherwise the file begins empty. With `waits`, it is written when all sections are there.
+    /// Opens the file. With `keep`, sections written earlier stay (for a restarted daemon);
+    /// otherwise the file begins empty. With `waits`, it is written when all sections are present.
     ///
     /// # Errors
     /// [`ReportError::Write`] when the file cannot be read or emptied.
@@ -40,13 +39,13 @@ impl<F: ReportFormat> ArtifactStore<F> {
         if waits {
             clear_place(path)?;
         } else {
-            // What was torn by a crash is gone after this.
+            // This removes sections that were truncated by a crash.
             artifacts.rewrite(format)?;
         }
         Ok(artifacts)
     }
 
-    /// Puts a section in, and returns when it is in the file, unless the shelf waits.
+    /// Inserts a section, and returns after it was written unless `waits` is set.
     ///
     /// # Errors
     /// [`ReportError`].
@@ -72,7 +71,7 @@ impl<F: ReportFormat> ArtifactStore<F> {
         }
     }
 
-    /// Takes a section out, if it is there.
+    /// Removes a section if it exists.
     ///
     /// # Errors
     /// [`ReportError`].
@@ -84,7 +83,7 @@ impl<F: ReportFormat> ArtifactStore<F> {
         }
     }
 
-    /// Brings the sections in the order of their paths, and writes what has waited.
+    /// Sorts the sections by their paths, and writes the delayed ones.
     ///
     /// # Errors
     /// [`ReportError`].
@@ -117,7 +116,7 @@ mod tests {
     use super::*;
     use crate::{Destination, Sources};
 
-    /// One section per line, `path=text`.
+    /// Format with one section per line, `path=text`.
     struct Lines;
 
     impl ReportFormat for Lines {

@@ -1,4 +1,4 @@
-//! What a result says of its checkers, apart from what they found.
+//! State of the checkers in a result, apart from their findings.
 
 use qcbus_formats::pool::{BLOCKED, NOT_LISTED};
 use qcbus_formats::xqar::{Checker, CheckerBundle, Status};
@@ -6,24 +6,24 @@ use qcbus_messages::ResultMessage;
 
 use crate::one_line;
 
-/// The checkers of a result with their bundles, in its order.
+/// Returns the checkers of a result with their bundles, in the order of the result.
 pub fn checkers(result: &ResultMessage) -> impl Iterator<Item = (&CheckerBundle, &Checker)> {
     let bundles = result.results.bundles.iter();
     bundles.flat_map(|bundle| bundle.checkers.iter().map(move |checker| (bundle, checker)))
 }
 
-/// Whether something was in the way of a checker that would have looked: it rests on others, and
-/// those found errors or failed.
+/// Checks whether a checker was blocked: it depends on other checkers that found errors or failed.
 pub fn is_blocked(checker: &Checker) -> bool {
     checker.metadata.iter().any(|fact| fact.key == BLOCKED)
 }
 
-/// Whether a checker was skipped because the file is none that it is for. That is an answer.
+/// Checks whether a checker was skipped as inapplicable to the file. That is an answer.
 pub fn is_inapplicable(checker: &Checker) -> bool {
     checker.status == Some(Status::Skipped) && !is_blocked(checker)
 }
 
-/// How many findings a result does not list: each checker lists so many and counts the rest.
+/// Returns the number of unlisted findings. Each checker lists a limited number and counts the
+/// rest.
 pub fn not_listed(result: &ResultMessage) -> u64 {
     let facts = checkers(result).flat_map(|(_, checker)| &checker.metadata);
     let counts = facts.filter(|fact| fact.key == NOT_LISTED);
@@ -32,13 +32,13 @@ pub fn not_listed(result: &ResultMessage) -> u64 {
         .fold(0, u64::saturating_add)
 }
 
-/// Whether a checker gave no answer: it failed, or something was in its way.
+/// Checks whether a checker gave no answer because it failed or was blocked.
 pub fn is_open(checker: &Checker) -> bool {
     checker.status == Some(Status::Error) || is_blocked(checker)
 }
 
-/// Why a checker ended as it did, on one line: its summary without the status, which is said
-/// already, and without the count that pooling and ASAM's framework append.
+/// Returns the reason for a checker's status on one line: its summary without the status, which is
+/// shown elsewhere, and without the count appended by pooling and ASAM's framework.
 pub fn reason(checker: &Checker) -> String {
     let line = one_line(&checker.summary);
     let bare = ["Skipped: ", "Error: ", "Skipped. ", "Error. "]

@@ -1,13 +1,13 @@
-//! Text of others, made safe to show.
+//! Sanitizing of untrusted text for display.
 //!
-//! Descriptions, paths and source lines come from the files that are checked. Printed as they
-//! are, an escape sequence could recolour or rewrite a terminal, and a bidirectional override
-//! could show another text than the file holds. What steers is known in one place
-//! ([`qcbus_messages::shown`]); here it becomes one character each, so that columns stay.
+//! Descriptions, paths and source lines come from the checked files. In unmodified output, an
+//! escape sequence could recolour or rewrite a terminal. A bidirectional override could show a text
+//! that differs from the file. The control characters are defined in one place
+//! ([`qcbus_messages::shown`]). Here each of them becomes one character, so columns stay the same.
 
 use qcbus_messages::shown::moves;
 
-/// The text with everything that steers a terminal replaced by U+FFFD; tabs and line feeds stay.
+/// Replaces everything that controls a terminal by U+FFFD; tabs and line feeds stay.
 pub fn printable(text: &str) -> String {
     text.replace("\r\n", "\n")
         .chars()
@@ -15,7 +15,7 @@ pub fn printable(text: &str) -> String {
         .collect()
 }
 
-/// The text on one line: white space runs become one blank, the rest as by [`printable`].
+/// Returns the text on one line: white space runs become one space, the rest as in [`printable`].
 pub fn one_line(text: &str) -> String {
     let words: Vec<&str> = text.split_whitespace().collect();
     printable(&words.join(" "))

@@ -7,38 +7,38 @@ use qcbus_messages::{FromPeer, Hello, PROTOCOL_VERSION, ResultMessage, Role, ToP
 
 use crate::{BothSources, FileSources, ImageSources, Reporter, Responder, Sources};
 
-/// How often a reporter says that it lives.
+/// Interval of the reporter's heartbeat.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
-/// Results that the broker may have under way to one reporter.
+/// Maximum number of unacknowledged results that the broker may send to one reporter.
 const CAPACITY: u16 = 32;
 
-/// Who joins.
+/// Identity of a reporter that joins the bus.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Identity {
     /// Name, such as `qc-report-text`.
     pub name: String,
     /// Version of the reporter.
     pub version: String,
-    /// The number that a supervisor gave to this start of the process.
+    /// Number that a supervisor gave to this start of the process.
     pub launch: Option<u64>,
 }
 
-/// Why a reporter could not go on.
+/// Reasons why a reporter stops.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
-    /// There is no broker, or it does not take this reporter.
+    /// A broker is missing or rejects this reporter.
     #[error("join the bus: {0}")]
     Join(#[from] JoinError),
-    /// The session was closed for good.
+    /// The session was closed permanently.
     #[error("stay on the bus: {0}")]
     Closed(String),
 }
 
 /// Runs a reporter on the bus of `instance` until it is drained.
 ///
-/// A result is acknowledged only after it was written. When the broker is lost, the bus waits for
-/// the next one and rejoins; the new broker sends again what was not acknowledged.
+/// A result is acknowledged only after it was written. If the broker is lost, the bus waits for the
+/// next one and rejoins. The new broker sends all unacknowledged results again.
 ///
 /// # Errors
 /// [`RunError`] when no broker takes the reporter, or none came back.
@@ -65,7 +65,7 @@ pub async fn run(
                 responder.finish();
                 return Err(RunError::Closed(reason));
             }
-            // Documents are looked up when a result needs one; reporters read no configuration.
+            // A document is looked up when a result needs one. Reporters read no configuration.
             PeerEvent::Document(_) | PeerEvent::LetGo | PeerEvent::Config(_) => {}
         }
     }
@@ -87,7 +87,7 @@ fn answer(peer: &mut Peer, responder: &mut Responder<'_>, message: ToPeer) {
     }
 }
 
-/// The image on the bus when it is still held, the files on disk otherwise.
+/// Returns the image on the bus if it is still mapped, otherwise the files on disk.
 fn sources_of(peer: &Peer, result: &ResultMessage) -> Box<dyn Sources> {
     let held = result.document.and_then(|doc| peer.document(doc));
     Box::new(BothSources {
@@ -110,7 +110,7 @@ fn hello(identity: &Identity) -> Hello {
     }
 }
 
-/// A number that no other process has: the standard library seeds its hashers at random.
+/// Returns a number that no other process has: the standard library seeds its hashers at random.
 fn incarnation() -> u64 {
     use std::hash::{BuildHasher as _, RandomState};
     RandomState::new().hash_one(std::process::id())

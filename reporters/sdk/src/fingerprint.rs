@@ -1,20 +1,20 @@
-//! By what a finding is known again after its file was edited.
+//! Fingerprints: identify a finding again after its file was edited.
 //!
-//! Hosts keep a history of findings: dismissed here, new there. They need a name for a finding that
-//! outlives an edit elsewhere in the file and a new version of qcbus, and so it is made of what names
-//! the thing that is wrong: the rule, the file, and the element.
+//! Hosts keep a history of findings, for example new and dismissed ones. They need a name that
+//! survives an edit elsewhere in the file and a new version of qcbus. The fingerprint contains only
+//! identifiers of the cause: the rule, the file and the element.
 //!
-//! * Lines, columns and positions are not part of it: they move with every edit above.
-//! * Of the element's XPath, predicates that only count (`road[2]`) are left out, because another road
-//!   before it would change them; those that name (`road[@id='5']`) stay. Where a finding has a place
-//!   on a road, the road's id is a name, too.
-//! * The message is not part of it where there is an element: it holds measured numbers, and a better
-//!   wording must not reopen what people have dismissed. Without an element it is all that there is; its
-//!   numbers are left out.
-//! * A place in another file goes by that file's name alone: the directory is another one on each
-//!   machine.
+//! * Lines, columns and positions are not part of it, because they change with every edit above.
+//! * In the element's XPath, predicates that only count (`road[2]`) are left out, because another
+//!   road before it would change them. Predicates with a name (`road[@id='5']`) stay. If a finding
+//!   has a place on a road, the road's id is a name too.
+//! * The message is not part of it if there is an element. It contains measured numbers, and a
+//!   better wording must not reopen dismissed findings. Without an element only the message is
+//!   available; its numbers are left out.
+//! * A place in another file uses only that file's name, because the directory differs between
+//!   machines.
 //!
-//! Findings that are equal in all of this share a fingerprint; [`Repeats`] tells them apart.
+//! Findings that are equal in all of this share a fingerprint. [`Repeats`] distinguishes them.
 
 use std::collections::BTreeMap;
 
@@ -24,11 +24,11 @@ use sha2::{Digest as _, Sha256};
 
 use crate::IssueLocation;
 
-/// Bytes of the digest that are kept: two findings of a farm meet by chance once in 2^64 farms.
+/// Number of digest bytes used: two findings of a farm collide by chance once in 2^64 farms.
 const KEPT: usize = 16;
 
-/// The fingerprint of a finding in lower-case hexadecimal digits. `file` is the checked file's path for
-/// people, `rule` what the report calls the rule, `place` the finding's main place.
+/// Returns the fingerprint of a finding in lower-case hexadecimal digits. `file` is the display
+/// path, `rule` the report's name of the rule, `place` the finding's main place.
 pub fn fingerprint(file: &str, rule: &str, issue: &Issue, place: Option<&IssueLocation>) -> String {
     let element = place.and_then(|place| place.xpath.as_deref());
     let road = place.and_then(|place| place.road.as_ref());
@@ -48,17 +48,17 @@ pub fn fingerprint(file: &str, rule: &str, issue: &Issue, place: Option<&IssueLo
     ])
 }
 
-/// The fingerprint of something that is no finding, such as a checker that gave no answer.
+/// Returns the fingerprint of something other than a finding, such as a checker without an answer.
 pub fn fingerprint_of(parts: &[&str]) -> String {
     digest(parts)
 }
 
-/// How often each fingerprint has come.
+/// Number of occurrences of each fingerprint.
 #[derive(Debug, Default)]
 pub struct Repeats(BTreeMap<String, u32>);
 
 impl Repeats {
-    /// How often this one has come now: 1 for the first time.
+    /// Counts an occurrence of this fingerprint and returns the count: 1 for the first time.
     pub fn number(&mut self, fingerprint: &str) -> u32 {
         let number = self.0.entry(fingerprint.to_owned()).or_default();
         *number = number.saturating_add(1);
@@ -69,7 +69,7 @@ impl Repeats {
 fn digest(parts: &[&str]) -> String {
     let mut hasher = Sha256::new();
     for part in parts {
-        // With their lengths, so that no two lists of parts run together into one text.
+        // The lengths are included, so two different lists of parts never give the same text.
         hasher.update((part.len() as u64).to_le_bytes());
         hasher.update(part);
     }
@@ -81,7 +81,7 @@ fn digest(parts: &[&str]) -> String {
         .collect()
 }
 
-/// The XPath without predicates that only count.
+/// Returns the XPath without predicates that only count.
 fn by_names(xpath: &str) -> String {
     let mut kept = String::with_capacity(xpath.len());
     let mut rest = xpath;
@@ -98,7 +98,7 @@ fn by_names(xpath: &str) -> String {
     kept
 }
 
-/// How long the predicate at the start of the text is. What is quoted in it ends nothing.
+/// Returns the length of the predicate at the start of the text; quoted brackets do not end it.
 fn end_of_predicate(text: &str) -> usize {
     let mut quote = None;
     for (at, c) in text.char_indices() {

@@ -1,4 +1,4 @@
-//! A form in which results are written.
+//! A format for results.
 
 use std::collections::BTreeMap;
 
@@ -6,26 +6,27 @@ use qcbus_messages::{ResultMessage, Withdrawn};
 
 use crate::{OutputTarget, ReportError, Reporter, Setting, Sources, Subject};
 
-/// A form of reports, such as SARIF: how results become text. Pure; where the text goes is the
-/// [`OutputTarget`]'s affair.
+/// A format of reports, such as SARIF: converts results to text. It has no side effects; the
+/// [`OutputTarget`] decides the target of the text.
 ///
-/// What one result gives is a *section*. A report is made of one section or of those of many files.
+/// The part of one result is a *section*. A report has one section or the sections of many files.
 pub trait ReportFormat: Send {
-    /// What one result gives.
+    /// Part of one result in a report.
     type Section: PartialEq + Send;
 
-    /// What the names of reports in files of their own end with, without a dot.
+    /// Suffix, without a dot, of reports in separate files.
     const SUFFIX: &'static str;
 
-    /// Under what the section of a checked file is found again by [`ReportFormat::split`].
+    /// Returns the key under which [`ReportFormat::split`] finds the section of a checked file
+    /// again.
     fn key(&self, subject: Subject<'_>) -> String {
         subject.input.to_owned()
     }
 
-    /// What a result gives.
+    /// Returns the section of a result.
     ///
     /// # Errors
-    /// [`ReportError`], mostly for parameters that make no sense.
+    /// [`ReportError`], mostly for invalid parameters.
     fn section(
         &self,
         result: &ResultMessage,
@@ -33,13 +34,14 @@ pub trait ReportFormat: Send {
         place: Destination,
     ) -> Result<Self::Section, ReportError>;
 
-    /// A whole report of these sections, in the order of their keys: also of none.
+    /// Returns a whole report of these sections, in the order of their keys. There may be no
+    /// sections.
     ///
     /// # Errors
     /// [`ReportError::Form`].
     fn whole(&self, sections: &BTreeMap<String, Self::Section>) -> Result<String, ReportError>;
 
-    /// A report of one section in a file of its own or on a stream.
+    /// Returns a report of one section for a separate file or a stream.
     ///
     /// # Errors
     /// [`ReportError::Form`].
@@ -47,40 +49,40 @@ pub trait ReportFormat: Send {
         self.whole(&BTreeMap::from([(key, section)]))
     }
 
-    /// The sections of a report that was written earlier, by their keys. What is not of this form is
-    /// dropped.
+    /// Returns the sections of a report that was written earlier, by their keys. Content of another
+    /// format is dropped.
     fn split(&self, text: &str) -> BTreeMap<String, Self::Section>;
 
-    /// How a section is put at the end of a report of many; `None` when such a report is one
-    /// document, which has to be written anew.
+    /// Returns the text that appends a section to a report of many. Returns `None` if such a report
+    /// is one document, which must be rewritten.
     fn appended(&self, key: &str, section: &Self::Section) -> Option<String> {
         let _ = (key, section);
         None
     }
 }
 
-/// For what a section is made.
+/// Target of a section.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Destination {
-    /// A stream that somebody may look at, and whether to colour.
+    /// A stream that may be a terminal.
     Stream {
-        /// Whether to colour.
+        /// Whether to use colour.
         color: bool,
     },
-    /// A file of its own.
+    /// A separate file.
     OwnFile,
-    /// A file for the reports of all files.
+    /// A shared file for the reports of all files.
     SharedFile,
 }
 
-/// The reporter of a form.
+/// Reporter for a format.
 pub struct FormatReporter<F: ReportFormat> {
     output_target: OutputTarget<F>,
     color: bool,
 }
 
 impl<F: ReportFormat> FormatReporter<F> {
-    /// A reporter that has written nothing yet.
+    /// Creates a reporter that has not written anything.
     pub fn new(format: F, setting: &Setting) -> FormatReporter<F> {
         FormatReporter {
             output_target: OutputTarget::new(format, setting),

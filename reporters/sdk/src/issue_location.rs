@@ -1,41 +1,41 @@
-//! The places of an issue, with those that lie in other files.
+//! Places of an issue, including those in other files.
 
 use qcbus_formats::location::OtherPlace;
 use qcbus_formats::xqar::{Issue, Location, Locations};
 use qcbus_messages::ResultMessage;
 
-/// Where an issue shows, put together from the several ways in which a result says where.
+/// Place of an issue, collected from the different kinds of locations in a result.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct IssueLocation {
-    /// The file; `None` is the checked file itself.
+    /// Path of the file; `None` for the checked file itself.
     pub path: Option<String>,
-    /// Line, from 1. Other tools' 0 for "unknown" has become `None`.
+    /// Line, from 1. A 0 for "unknown" from other tools is `None` here.
     pub row: Option<u64>,
-    /// Column in characters, from 1. Other tools' 0 for "unknown" has become `None`.
+    /// Column in characters, from 1. A 0 for "unknown" from other tools is `None` here.
     pub column: Option<u64>,
     /// Bytes from the start of the file, if known.
     pub offset: Option<u64>,
-    /// The element or attribute.
+    /// XPath of the element or attribute.
     pub xpath: Option<String>,
-    /// The road's id, `s` and `t` in metres.
+    /// Id of the road, and `s` and `t` in metres.
     pub road: Option<(String, f64, f64)>,
     /// `x`, `y` and `z` in metres.
     pub inertial: Option<(f64, f64, f64)>,
-    /// Seconds from the start.
+    /// Time in seconds from the start.
     pub time: Option<f64>,
-    /// Number of a trace's message, and its channel.
+    /// Number of a message in a trace, and its channel.
     pub message: Option<(u64, String)>,
-    /// What is to be seen there.
+    /// Description of the place.
     pub description: String,
-    /// Row and column in the checked file from where another file is referred to.
+    /// Row and column of the reference to another file, in the checked file.
     pub referred_at: Option<(u64, u64)>,
-    /// Further rows and columns under the same description.
+    /// Further rows and columns with the same description.
     pub also: Vec<(u64, u64)>,
 }
 
-/// The places of an issue in their order; the first is the main one.
+/// Returns the places of an issue in their order; the first is the main one.
 pub fn issue_locations(issue: &Issue) -> Vec<IssueLocation> {
-    // Another tool may say the other file and nothing else.
+    // Another tool may give only the place in the other file.
     if let ([], [info]) = (issue.locations.as_slice(), issue.domain_info.as_slice())
         && let Some(place) = OtherPlace::from_info(info)
     {
@@ -48,8 +48,8 @@ pub fn issue_locations(issue: &Issue) -> Vec<IssueLocation> {
     issue.locations.iter().map(place_of).collect()
 }
 
-/// The path of another file as people read it in a report: from the directory that the checked file's path is
-/// relative to, where it lies below.
+/// Returns the display path of another file. It is relative to the base directory of the checked
+/// file's path if the file is below that directory.
 pub fn path_for_people<'p>(result: &ResultMessage, path: &'p str) -> &'p str {
     let base = result.input.strip_suffix(&result.display_path);
     let base = base.filter(|base| base.ends_with('/'));
@@ -57,7 +57,7 @@ pub fn path_for_people<'p>(result: &ResultMessage, path: &'p str) -> &'p str {
     short.unwrap_or(path)
 }
 
-/// Everything that one `Locations` says.
+/// Collects all data of one `Locations`.
 fn gather(locations: &Locations) -> IssueLocation {
     let mut place = IssueLocation {
         description: locations.description.trim().to_owned(),
@@ -106,7 +106,7 @@ fn gather_one(place: &mut IssueLocation, location: &Location) {
     }
 }
 
-/// What was gathered is the reference in the checked file; the place itself is in the other file.
+/// Returns the place in the other file; the gathered place is the reference to it.
 fn moved(other: &OtherPlace, gathered: IssueLocation) -> IssueLocation {
     let referred_at = gathered
         .row

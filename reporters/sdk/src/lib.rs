@@ -1,14 +1,14 @@
-//! How a reporter runs: what it implements, and everything around it.
+//! SDK for reporters: defines the trait to implement and provides the code around it.
 //!
 //! A reporter is a value with one method, [`Reporter::report`], that writes one result. [`run`]
-//! puts it on the bus as a daemon: it joins, acknowledges each result after it was written, lives
-//! through the loss of the broker, and goes when it is drained. [`report_once`] runs the same
-//! reporter on an `.xqar` that exists already, as ASAM's report modules do.
+//! runs it on the bus as a daemon: it joins and acknowledges each result after it was written. It
+//! survives the loss of the broker and stops when it is drained. [`report_once`] runs the same
+//! reporter on an existing `.xqar`, as ASAM's report modules do.
 //!
-//! What reporters have in common lies here too: the lines of the checked files ([`Sources`]), the
-//! places of an issue with those in other files ([`issue_locations`]), and where reports go ([`OutputTarget`],
-//! [`Output`], [`ArtifactStore`]). A reporter that turns results into text implements [`ReportFormat`] and nothing
-//! else; a crate says by a [`Registration`] what it offers.
+//! The crate also has the common parts of reporters: the lines of the checked files ([`Sources`]),
+//! the places of an issue with those in other files ([`issue_locations`]), and the targets of
+//! reports ([`OutputTarget`], [`Output`], [`ArtifactStore`]). A reporter that converts results to
+//! text implements only [`ReportFormat`]. A crate describes its reporter in a [`Registration`].
 
 mod artifacts;
 mod checkers;
@@ -56,26 +56,25 @@ use std::path::PathBuf;
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{ResultMessage, Withdrawn};
 
-/// Something that writes results.
+/// A writer of results.
 ///
-/// Writing is idempotent: the same result may be given again after a crash, and the newer result
-/// of a file takes the place of the older one.
+/// Writing is idempotent: the same result may come again after a crash. A newer result of a file
+/// replaces the older one.
 pub trait Reporter: Send {
-    /// Writes one result. When this returns `Ok`, the report is where it belongs.
+    /// Writes one result. When this returns `Ok`, the report is at its target.
     ///
     /// # Errors
-    /// [`ReportError`] when it could not be written; it is told to the broker, and tried
-    /// again by the next one.
+    /// [`ReportError`] when it could not be written. The broker receives the error, and the next
+    /// broker tries again.
     fn report(&mut self, result: &ResultMessage, sources: &dyn Sources) -> Result<(), ReportError>;
 
-    /// A file has gone: takes back what was reported about it. Nothing may be there to take back.
+    /// Removes the report about a file that no longer exists. The report may be missing.
     ///
     /// # Errors
-    /// [`ReportError`] when it could not be taken back; it is told to the broker and not tried
-    /// again.
+    /// [`ReportError`] when it could not be removed. The broker is informed and does not try again.
     fn withdraw(&mut self, gone: &Withdrawn) -> Result<(), ReportError>;
 
-    /// All results have been given; brings what was collected into its final order.
+    /// Brings the collected data into its final order after all results.
     ///
     /// # Errors
     /// [`ReportError`] when that could not be written.
@@ -84,28 +83,28 @@ pub trait Reporter: Send {
     }
 }
 
-/// Why a report could not be written.
+/// Reasons why a report could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// The file system or the stream refused.
+    /// The file system or the stream returned an error.
     #[error("write {}: {source}", to_text(path))]
     Write {
-        /// The file, or `__stdout__` and `__stderr__`.
+        /// Path of the file, or `__stdout__` and `__stderr__`.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// A parameter of the configuration makes no sense.
+    /// A parameter of the configuration is invalid.
     #[error("use the parameter {name}=\"{value}\": {why}")]
     Param {
-        /// Its name.
+        /// Name of the parameter.
         name: String,
-        /// Its value.
+        /// Value of the parameter.
         value: String,
-        /// What is allowed.
+        /// Allowed values.
         why: String,
     },
-    /// The result cannot be put in the report's form.
+    /// The result cannot be converted to the report's format.
     #[error("put the result in its form: {0}")]
     Form(String),
 }

@@ -1,4 +1,4 @@
-//! A result from an `.xqar` on disk, as if it had come from the broker.
+//! Loads a result from an `.xqar` on disk in the same form as a result from the broker.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,28 +7,28 @@ use qcbus_formats::xqar::{self, Results};
 use qcbus_messages::path_text::{from_text, to_text};
 use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
 
-/// Why an `.xqar` could not be read.
+/// Reasons why an `.xqar` could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
-    /// The file system refused.
+    /// The file system returned an error.
     #[error("read {}: {source}", to_text(path))]
     Read {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// It is no result file.
+    /// The file is not a result file.
     #[error("read {} as a result: {why}", to_text(path))]
     Content {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong with it, and where.
+        /// Description of the fault and its place.
         why: String,
     },
 }
 
-/// Reads an `.xqar`, ours or another tool's. A result file carries no digest of the checked file
+/// Reads an `.xqar` of qcbus or of another tool. A result file has no digest of the checked file
 /// and no texts of rules: `digest` is all zero and `rules` empty.
 ///
 /// # Errors
@@ -59,8 +59,8 @@ pub fn load(path: &Path) -> Result<ResultMessage, LoadError> {
     })
 }
 
-/// The checked file: the first bundle's `InputFile` (or its older names). A relative one is meant
-/// from the directory of the result, unless it is there from the current directory.
+/// Returns the checked file: the first bundle's `InputFile` (or its older names). A relative path
+/// starts at the directory of the result, unless it exists from the current directory.
 fn input_of(results: &Results, xqar: &Path) -> String {
     let params = results.bundles.iter().flat_map(|bundle| &bundle.params);
     let named = params
@@ -81,7 +81,7 @@ fn input_of(results: &Results, xqar: &Path) -> String {
     to_text(&path)
 }
 
-/// The path as a person in the current directory would write it.
+/// Returns the path relative to the current directory if the file is below it.
 fn displayed(input: &str) -> String {
     let current = std::env::current_dir().unwrap_or_default();
     let path = from_text(input);

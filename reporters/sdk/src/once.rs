@@ -1,4 +1,4 @@
-//! A reporter on a result file that exists already, as ASAM's report modules run.
+//! Runs a reporter on an existing result file, as ASAM's report modules do.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,32 +12,32 @@ use crate::loaded::{LoadError, load};
 use crate::output::asked;
 use crate::{FileSources, Registration, ReportError, Reporter, param};
 
-/// The result file that ASAM's runtime writes, meant when a configuration names none.
+/// Name of the result file that ASAM's runtime writes. It is used if a configuration names none.
 const DEFAULT_RESULT: &str = "Result.xqar";
 
-/// What to report on.
+/// Input of a single report.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct OneShot {
-    /// The result files. They win over the configuration's.
+    /// Result files. They take precedence over the configuration.
     pub results: Vec<PathBuf>,
-    /// A configuration (`-c`): the parameters of this reporter's `ReportModule`. Its `InputFile`
+    /// Configuration (`-c`) with the parameters of this reporter's `ReportModule`. Its `InputFile`
     /// names the result file.
     pub config: Option<PathBuf>,
-    /// Parameters that win over the configuration's.
+    /// Parameters that take precedence over those of the configuration.
     pub params: Vec<Param>,
-    /// What rules are about, by UID; a result file does not say it.
+    /// Descriptions of rules by UID; a result file does not contain them.
     pub rules: BTreeMap<String, String>,
 }
 
-/// Why there is no report.
+/// Reasons why a report is missing.
 #[derive(Debug, thiserror::Error)]
 pub enum OnceError {
     /// The configuration cannot be used.
     #[error("read the configuration {}: {why}", to_text(path))]
     Config {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong with it, and where.
+        /// Description of the fault and its place.
         why: String,
     },
     /// The result file cannot be used.
@@ -48,8 +48,8 @@ pub enum OnceError {
     Report(#[from] ReportError),
 }
 
-/// Reports on result files: a report of its own to the stream unless somebody wants it elsewhere, for
-/// who asks wants to see it; pages of HTML go beside the results.
+/// Reports on result files. Without another output parameter, each report goes to stdout, because
+/// the caller wants to see it. HTML pages are written beside the results.
 ///
 /// # Errors
 /// [`OnceError`]
@@ -74,7 +74,7 @@ pub fn report_once(
             value: "__stdout__".into(),
         });
     }
-    // All are looked at before anything is said of one.
+    // All results are loaded before the first one is reported.
     let loaded: Result<Vec<_>, LoadError> = results.iter().map(|path| load(path)).collect();
     for mut result in loaded? {
         result.params.clone_from(&params);
@@ -88,7 +88,7 @@ pub fn report_once(
     Ok(())
 }
 
-/// Why places in a report may not be those of today's file.
+/// Returns the reason why places in a report may differ from the current file.
 fn outdated(result: &ResultMessage) -> Option<&'static str> {
     let modified = |path: &str| std::fs::metadata(from_text(path)).and_then(|it| it.modified());
     if result.input.is_empty() {
@@ -106,8 +106,8 @@ fn outdated(result: &ResultMessage) -> Option<&'static str> {
     }
 }
 
-/// The global parameters, then those of this reporter's module. The global `InputFile` is the
-/// checked file and means nothing to a report.
+/// Returns the global parameters, then those of this reporter's module. The global `InputFile` is
+/// the checked file and is ignored in a report.
 fn configured(path: &Path, name: &str) -> Result<Vec<Param>, OnceError> {
     let wrong = |why: String| OnceError::Config {
         path: path.to_owned(),

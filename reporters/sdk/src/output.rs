@@ -1,4 +1,4 @@
-//! Where reports go, and how a file is replaced so that nobody sees half of it.
+//! Targets of reports, and replacement of files without visible partial content.
 
 use std::path::{Path, PathBuf};
 
@@ -7,24 +7,24 @@ use qcbus_messages::path_text::from_text;
 
 use crate::{ReportError, Subject};
 
-/// Where reports go: the parameter `OutputFile`, or what ASAM's C++ reports call `strReportFile`.
+/// Target of reports: the parameter `OutputFile`, or `strReportFile` of ASAM's C++ reports.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Output {
     /// No parameter: one report per result, beside it. `a.xodr.xqar` gets `a.xodr.txt`.
     BesideResult,
-    /// The name of a directory that exists, or any name that ends in `/`: one report per result,
-    /// under its path for people.
+    /// The name of an existing directory, or any name that ends in `/`: one report per result,
+    /// under its display path.
     Directory(PathBuf),
-    /// Any other name: one file that holds the newest report of every checked file.
+    /// Any other name: one file with the newest report of every checked file.
     File(PathBuf),
-    /// `__stdout__`, ASAM's name for it.
+    /// `__stdout__`, the name that ASAM uses for it.
     Stdout,
-    /// `__stderr__`, likewise.
+    /// `__stderr__`, the name that ASAM uses for it.
     Stderr,
 }
 
 impl Output {
-    /// What `OutputFile` asks for. Relative names are meant from the current directory.
+    /// Returns the output of `OutputFile`. Relative names start at the current directory.
     pub fn of(params: &[Param]) -> Output {
         match asked(params) {
             None | Some("") => Output::BesideResult,
@@ -37,8 +37,8 @@ impl Output {
         }
     }
 
-    /// The file that a report of its own goes to; `None` for streams and the one file for all.
-    /// `suffix` is without a dot.
+    /// Returns the path of a separate report; `None` for streams and for the shared file. `suffix`
+    /// has no dot.
     pub fn own_file(&self, subject: Subject<'_>, suffix: &str) -> Option<PathBuf> {
         match self {
             Output::BesideResult => {
@@ -54,18 +54,18 @@ impl Output {
     }
 }
 
-/// What the parameters say about where reports go; `None` when they say nothing.
+/// Returns the output given by the parameters, or `None` if they give none.
 pub(crate) fn asked(params: &[Param]) -> Option<&str> {
     param(params, "OutputFile").or_else(|| param(params, "strReportFile"))
 }
 
-/// The value of a parameter; the last one wins, as the more specific are written later.
+/// Returns the value of a parameter. The last one applies: more specific ones come later.
 pub fn param<'p>(params: &'p [Param], name: &str) -> Option<&'p str> {
     let mut named = params.iter().rev().filter(|param| param.name == name);
     named.next().map(|param| param.value.as_str())
 }
 
-/// Replaces a file in one step, and makes missing directories.
+/// Replaces a file atomically and creates missing directories.
 ///
 /// # Errors
 /// [`ReportError::Write`] with the name of the file.
@@ -76,8 +76,8 @@ pub fn replace_file(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
     })
 }
 
-/// Writes a report where a person has named a place for it: a link is followed, and a device is written
-/// to, not replaced.
+/// Writes a report to a place that a user named. It follows links, and it writes to a device
+/// instead of replacing it.
 ///
 /// # Errors
 /// [`ReportError::Write`] with the name of the file.
@@ -88,8 +88,8 @@ pub fn write_named(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
     })
 }
 
-/// Finds out whether a report can be written at a place, and takes away one of an earlier run: no report
-/// is better than one that says nothing, which whoever finds it after a kill would take for the result.
+/// Checks whether a report can be written at a place, and removes the report of an earlier run. A
+/// missing report is better than an outdated one, which could be taken for the result after a kill.
 ///
 /// # Errors
 /// [`ReportError::Write`] with the name of the file.
@@ -101,12 +101,12 @@ pub fn clear_place(path: &Path) -> Result<(), ReportError> {
     remove_file(&path.canonicalize().unwrap_or_else(|_| path.to_owned()))
 }
 
-/// What a report that was written earlier holds; `None` where there is no file.
+/// Returns the content of an earlier report, or `None` if the file does not exist.
 ///
 /// # Errors
 /// [`ReportError::Write`] with the name of the file.
 pub fn earlier(path: &Path) -> Result<Option<String>, ReportError> {
-    // Devices and pipes have no earlier content, and may never end.
+    // Devices and pipes have no earlier content, and reading them may never end.
     if !std::fs::metadata(path).is_ok_and(|data| data.is_file()) {
         return Ok(None);
     }
@@ -117,7 +117,7 @@ pub fn earlier(path: &Path) -> Result<Option<String>, ReportError> {
     })
 }
 
-/// Removes a file that need not be there.
+/// Removes a file if it exists.
 ///
 /// # Errors
 /// [`ReportError::Write`].
@@ -131,7 +131,7 @@ pub fn remove_file(path: &Path) -> Result<(), ReportError> {
     }
 }
 
-/// The path without what would lead out of the directory that it is joined to.
+/// Removes the parts of a path that would lead out of its base directory.
 pub fn inside(path: &Path) -> PathBuf {
     use std::path::Component;
     path.components()

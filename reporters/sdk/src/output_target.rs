@@ -1,4 +1,4 @@
-//! Everything between a rendered report and the place where it belongs.
+//! Writes a rendered report to its target.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,12 +11,12 @@ use crate::{
     ArtifactStore, Destination, Output, ReportError, ReportFormat, Setting, Sources, replace_file,
 };
 
-/// The file that a report is about, and what its reporter was told.
+/// The file of a report, with the parameters of the reporter.
 #[derive(Debug, Clone, Copy)]
 pub struct Subject<'m> {
     /// Absolute path of the file.
     pub input: &'m str,
-    /// Path for people.
+    /// Display path of the file.
     pub display_path: &'m str,
     /// Absolute path of its `.xqar`.
     pub xqar: &'m str,
@@ -46,18 +46,18 @@ impl<'m> From<&'m Withdrawn> for Subject<'m> {
     }
 }
 
-/// Puts reports where the parameter `OutputFile` wants them, and takes them back.
+/// Writer of reports to the target given by the parameter `OutputFile`; it also removes them.
 pub struct OutputTarget<F: ReportFormat> {
     format: F,
     keep: bool,
     is_run: bool,
     artifact_stores: BTreeMap<PathBuf, ArtifactStore<F>>,
-    /// What is printed when the run is over, by stream.
+    /// Sections to print at the end of the run, by stream.
     waiting: BTreeMap<Output, BTreeMap<String, F::Section>>,
 }
 
 impl<F: ReportFormat> OutputTarget<F> {
-    /// An outlet for reports of one form.
+    /// Creates an output target for reports of one format.
     pub fn new(format: F, setting: &Setting) -> OutputTarget<F> {
         OutputTarget {
             format,
@@ -68,8 +68,8 @@ impl<F: ReportFormat> OutputTarget<F> {
         }
     }
 
-    /// Writes the report of a result. When this returns `Ok`, it is where it belongs; in a run,
-    /// what holds the reports of all files gets there with [`OutputTarget::finish`].
+    /// Writes the report of a result. When this returns `Ok`, the report is at its target. In a
+    /// run, shared reports of all files are written by [`OutputTarget::finish`].
     ///
     /// # Errors
     /// [`ReportError`].
@@ -106,7 +106,7 @@ impl<F: ReportFormat> OutputTarget<F> {
         }
     }
 
-    /// Takes back what was written about a file that has gone. What went to a stream stays there.
+    /// Removes the report of a file that no longer exists. Output on a stream stays there.
     ///
     /// # Errors
     /// [`ReportError::Write`].
@@ -129,8 +129,8 @@ impl<F: ReportFormat> OutputTarget<F> {
         }
     }
 
-    /// Brings the sections of files for all in the order of their paths, and writes what waited for
-    /// the end of the run.
+    /// Sorts the sections of shared files by path, and writes everything that was delayed until the
+    /// end of the run.
     ///
     /// # Errors
     /// [`ReportError::Write`].
@@ -143,7 +143,7 @@ impl<F: ReportFormat> OutputTarget<F> {
         Ok(())
     }
 
-    /// A form of sections is streamed as they come; of one that is a document there is one in a run.
+    /// Writes a section to a stream, or keeps it for the one document of a run.
     fn stream(
         &mut self,
         output: Output,
@@ -167,7 +167,7 @@ impl<F: ReportFormat> OutputTarget<F> {
     }
 }
 
-/// Writes to the stream that an output is; to stdout for one that is none.
+/// Writes to the stream of an output, or to stdout if the output is not a stream.
 ///
 /// # Errors
 /// [`ReportError::Write`].
@@ -183,7 +183,7 @@ pub fn write_stream(output: &Output, text: &str) -> Result<(), ReportError> {
             out.write_all(text.as_bytes()).and_then(|()| out.flush())
         }
     };
-    // A reader that has left wants no more; that is no error of ours.
+    // A closed pipe means that the reader needs no more output, which is not an error.
     if let Err(error) = &written
         && error.kind() == std::io::ErrorKind::BrokenPipe
     {

@@ -1,41 +1,41 @@
-//! What a reporter crate offers to the program that runs it.
+//! Registration of a reporter crate in the program that runs it.
 
 use crate::Reporter;
 
-/// One reporter: a crate has a static of it, and the program's table names that static. This is all
-/// that it takes: the command line, configurations and the broker know reporters by the table.
+/// One reporter: a crate has a static of this type, and the program's table names it. The command
+/// line, configurations and the broker need only the table.
 #[derive(Debug, Clone, Copy)]
 pub struct Registration {
-    /// What it is called on the command line: `sarif`.
+    /// Name on the command line: `sarif`.
     pub alias: &'static str,
-    /// What it is called on the bus and in configurations: `qc-report-sarif`. A configuration may
-    /// also say `sarif` and `SarifReport`.
+    /// Name on the bus and in configurations: `qc-report-sarif`. A configuration may also use
+    /// `sarif` and `SarifReport`.
     pub name: &'static str,
-    /// What it writes, for the help: `NAME.sarif beside every result`.
+    /// Description of the output for the help: `NAME.sarif beside every result`.
     pub about: &'static str,
-    /// Whether it is a page to look at, which nobody wants on a stream.
+    /// Whether the output is a page for a browser, which is not suitable for a stream.
     pub is_page: bool,
-    /// Makes one that has written nothing yet.
+    /// Creates a reporter that has not written anything.
     pub make: fn(&Setting) -> Box<dyn Reporter>,
 }
 
-/// In what a reporter runs.
+/// Environment in which a reporter runs.
 #[derive(Debug, Clone, Copy)]
 pub struct Setting {
-    /// Whether to colour what goes to `__stdout__` and `__stderr__`. Files are never coloured.
+    /// Whether to colour the output on `__stdout__` and `__stderr__`. Files are never coloured.
     pub color: bool,
-    /// Whether what the one file for all already holds stays in it: for a daemon that is started
-    /// again beside the same broker.
+    /// Whether the shared file keeps its earlier content. A daemon needs this when it is restarted
+    /// beside the same broker.
     pub keep: bool,
-    /// Whether all results are known when [`Reporter::finish`] is called, and nobody looks before:
-    /// files for all are then written once, and streams get one report.
+    /// Whether all results are known at [`Reporter::finish`] and no reader needs the files before.
+    /// Then shared files are written once, and streams get one report.
     pub is_run: bool,
-    /// What there is to read about rules.
+    /// Source of the rule pages.
     pub pages: Pages,
 }
 
 impl Setting {
-    /// For a run of its own, without colours and pages.
+    /// Returns the setting of a separate run, without colours and pages.
     pub fn plain_run() -> Setting {
         Setting {
             color: false,
@@ -46,18 +46,18 @@ impl Setting {
     }
 }
 
-/// The page of a rule, by its UID and the id of its checker; either may be empty.
+/// Function that returns a rule's page by UID and checker id; either may be empty.
 pub type Pages = fn(uid: &str, checker: &str) -> Option<RulePage>;
 
-/// What there is to read about a rule.
+/// Page about a rule.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct RulePage {
-    /// The id of its checker.
+    /// Id of the rule's checker.
     pub checker: String,
-    /// What it is about, in a sentence.
+    /// Description of the rule in one sentence.
     pub summary: String,
-    /// All of the page, as Markdown.
+    /// The whole page as Markdown.
     pub text: &'static str,
-    /// Where the standard says it; empty when that is not known.
+    /// Link to the rule in the standard; empty if it is unknown.
     pub link: String,
 }

@@ -1,4 +1,4 @@
-//! What a reporter answers to the broker, without the bus.
+//! Answers of a reporter to the broker, independent of the bus.
 
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -7,10 +7,10 @@ use qcbus_messages::{FromPeer, JobId, PeerReport, ResultMessage, ToPeer, Withdra
 
 use crate::{Reporter, Sources};
 
-/// How many results are remembered as written. More than any broker has under way.
+/// Number of results that are remembered as written. No broker has more of them in progress.
 const REMEMBERED: usize = 4096;
 
-/// One reporter's side of the conversation with a broker: messages in, answers out.
+/// A reporter's side of the protocol with a broker: takes messages and returns answers.
 pub struct Responder<'r> {
     reporter: &'r mut dyn Reporter,
     written: VecDeque<(JobId, String)>,
@@ -18,7 +18,7 @@ pub struct Responder<'r> {
 }
 
 impl<'r> Responder<'r> {
-    /// A conversation that has not begun.
+    /// Creates a responder that has not received any message.
     pub fn new(reporter: &'r mut dyn Reporter) -> Responder<'r> {
         Responder {
             reporter,
@@ -27,8 +27,8 @@ impl<'r> Responder<'r> {
         }
     }
 
-    /// What to say to `message`. `sources` gives the lines of a result's files and is asked only
-    /// when the result is written.
+    /// Returns the answers to `message`. `sources` gives the lines of a result's files and is
+    /// called only when the result is written.
     pub fn handle<'s>(
         &mut self,
         message: ToPeer,
@@ -48,7 +48,7 @@ impl<'r> Responder<'r> {
                 self.finish();
                 vec![FromPeer::Leaving]
             }
-            // The bus answers the first two; jobs are for bundles.
+            // The bus answers the first two messages, and jobs are for bundles.
             ToPeer::Welcome { .. }
             | ToPeer::Refused { .. }
             | ToPeer::Job(_)
@@ -56,17 +56,17 @@ impl<'r> Responder<'r> {
         }
     }
 
-    /// Whether the reporter has said that it leaves.
+    /// Checks whether the reporter has announced that it leaves.
     pub fn has_left(&self) -> bool {
         self.left
     }
 
-    /// A new broker: its job numbers have nothing to do with the old one's.
+    /// Resets the state for a new broker. Its job numbers are unrelated to those of the old one.
     pub fn rejoined(&mut self) {
         self.written.clear();
     }
 
-    /// No more results will come; what the reporter cannot bring to its end is logged.
+    /// Finishes the reporter after the last result, and logs a failure.
     pub fn finish(&mut self) {
         if self.left {
             return;
@@ -88,7 +88,7 @@ impl<'r> Responder<'r> {
         }
         let sources = sources(result);
         let report = AssertUnwindSafe(|| self.reporter.report(result, sources.as_ref()));
-        // A result that makes a reporter panic must not come back after each restart.
+        // A result that makes a reporter panic must not be sent again after each restart.
         match catch_unwind(report) {
             Ok(Ok(())) => {
                 self.remember(key);
@@ -125,7 +125,7 @@ pub(crate) mod samples {
     use qcbus_formats::xqar::Results;
     use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
 
-    /// An accepted result without checkers.
+    /// Returns an accepted result without checkers.
     pub(crate) fn result(job: u64, display_path: &str) -> ResultMessage {
         ResultMessage {
             job: JobId(job),
@@ -236,7 +236,7 @@ mod tests {
             report: PeerReport::Written,
         };
         assert_eq!(answer, [done]);
-        // It is there again, unchanged: the same job counts anew.
+        // The file exists again, unchanged, so the same job is written again.
         tell(&mut responder, 1, "a.xodr");
         assert_eq!(notebook.written, ["b.xodr", "a.xodr"]);
     }

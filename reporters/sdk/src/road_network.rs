@@ -1,4 +1,4 @@
-//! The road network that a result is about.
+//! The road network of a result.
 
 use qcbus_document::{Document, FileKind};
 use qcbus_ingest::modular::SearchPath;
@@ -8,9 +8,9 @@ use qcbus_messages::{DocumentRole, ResultMessage};
 
 use crate::Sources;
 
-/// Gives `look` the path and the image of the road network that a result is about: the checked file
-/// itself, or the map that a scenario lies on. Nothing when there is none, or when the bytes that were
-/// checked are not at hand any more.
+/// Calls `look` with the path and the image of a result's road network: the checked file itself, or
+/// the map of a scenario. It does not call `look` if there is no map or if the checked bytes are no
+/// longer available.
 pub fn road_network(
     result: &ResultMessage,
     sources: &dyn Sources,
@@ -35,12 +35,12 @@ pub fn road_network(
     }
 }
 
-/// Where the map of a scenario may lie, the likeliest first.
+/// Returns the possible paths of a scenario's map, the most likely first.
 fn maps_of(scenario: &[u8]) -> Vec<String> {
     let Ok(document) = Document::open(scenario) else {
         return Vec::new();
     };
-    // Maps are never looked for along the search path of scenarios.
+    // Maps are never searched along the search path of scenarios.
     let found = references(&document, &SearchPath::default());
     let maps = found.into_iter().filter(|it| it.role == DocumentRole::Map);
     let candidates = maps.flat_map(|reference| reference.candidates);

@@ -1,4 +1,4 @@
-//! Results to try reporters on. For tests: there is nothing behind them.
+//! Sample results for tests of reporters, without a real check.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use qcbus_formats::xqar::{
 };
 use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
 
-/// An issue at a row and a column of the checked file; 0 for unknown.
+/// Creates an issue at a row and a column of the checked file; 0 means unknown.
 pub fn issue(level: Level, uid: &str, text: &str, (row, column): (u64, u64)) -> Issue {
     let place = Location::File {
         row,
@@ -28,7 +28,7 @@ pub fn issue(level: Level, uid: &str, text: &str, (row, column): (u64, u64)) -> 
     }
 }
 
-/// A checker that ended so.
+/// Creates a checker with this status.
 pub fn checker(id: &str, status: Option<Status>, summary: &str, issues: Vec<Issue>) -> Checker {
     Checker {
         id: id.into(),
@@ -39,7 +39,7 @@ pub fn checker(id: &str, status: Option<Status>, summary: &str, issues: Vec<Issu
     }
 }
 
-/// A checker that something kept from looking.
+/// Creates a blocked checker.
 pub fn blocked(id: &str) -> Checker {
     let by = Metadata {
         key: BLOCKED.into(),
@@ -53,7 +53,8 @@ pub fn blocked(id: &str) -> Checker {
     }
 }
 
-/// The result of the file `/farm/PATH`, of one bundle with these checkers. The verdict follows from them.
+/// Creates the result of the file `/farm/PATH`, with one bundle of these checkers. The verdict
+/// follows from them.
 pub fn result(path: &str, checkers: Vec<Checker>) -> ResultMessage {
     let results = Results {
         version: "1.0.0".into(),

@@ -1,4 +1,4 @@
-//! Checkers that owe an answer.
+//! Checkers whose answer is missing.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -8,24 +8,24 @@ use qcbus_messages::{ResultMessage, Verdict};
 
 use crate::{checkers, is_blocked, one_line, reason};
 
-/// How many checkers are named; the others are counted.
+/// Maximum number of checkers that are named; the others are counted.
 const MOST_NAMES: usize = 5;
 
-/// Why part of a file was not looked at, and by whom.
+/// Reason why part of a file was not checked, and the affected checkers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Silence {
-    /// Why, on one line.
+    /// Reason on one line.
     pub reason: String,
-    /// `bundle/checker` of each that gave no answer; none where there was nobody to ask.
+    /// `bundle/checker` of each checker without an answer; empty if there was no checker to ask.
     pub names: Vec<String>,
 }
 
-/// What keeps a result from telling everything, one for each reason: when a bundle dies, hundreds of
-/// checkers give no answer at once. None when all is answered.
+/// Returns the missing answers of a result, one entry for each reason, or none if all checkers
+/// answered. A dead bundle can leave hundreds of checkers without an answer.
 ///
-/// Checkers that do not apply have answered, and so have those of results that tell no status, as
-/// ASAM's first form did. One that could not look because of what others found matters only
-/// where that was no error: an error decides the verdict without it.
+/// Checkers that do not apply have answered. So have checkers without a status, as in ASAM's first
+/// result format. A checker blocked by findings of others counts only if these are not errors,
+/// because an error decides the verdict anyway.
 pub fn silences(result: &ResultMessage) -> Vec<Silence> {
     let mut silences = grouped(result, |it| it.status == Some(Status::Error));
     if result.verdict == Verdict::Undetermined {
@@ -53,7 +53,7 @@ fn grouped(result: &ResultMessage, is_meant: impl Fn(&Checker) -> bool) -> Vec<S
 }
 
 impl fmt::Display for Silence {
-    /// `3 checkers gave no answer (a/x, a/y, a/z): it died`.
+    /// Writes for example `3 checkers gave no answer (a/x, a/y, a/z): it died`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let count = self.names.len();
         if count == 0 {

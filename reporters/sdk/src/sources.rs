@@ -1,4 +1,4 @@
-//! The lines of the checked files, for reports that show them.
+//! Lines of the checked files, for reports that show them.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -10,27 +10,27 @@ use qcbus_ingest::{Limits, Prepared};
 use qcbus_messages::path_text::from_text;
 use qcbus_messages::{Digest, ResultMessage};
 
-/// Gives lines of files. A line that may not be the one that was checked is not given.
+/// Access to lines of files. It never returns a line that may differ from the checked one.
 pub trait Sources {
-    /// Line `row` (from 1) of the file at `path`, without its end; of a very long line the part
-    /// around the character at column `near` (from 1).
+    /// Returns line `row` (from 1) of the file at `path`, without its end. For a very long line, it
+    /// returns the part around the character at column `near` (from 1).
     fn line(&self, path: &str, row: u64, near: u64) -> Option<Line>;
 
-    /// Gives `look` the image of the file at `path`, if it is that of the bytes that were checked:
-    /// in place where it is on the bus still.
+    /// Calls `look` with the image of the file at `path` if it matches the checked bytes. The image
+    /// is used in place if it is still on the bus.
     fn image(&self, path: &str, look: &mut dyn FnMut(&[u8])) {
         let _ = (path, look);
     }
 }
 
-/// A line, or a part of a very long one: some maps are one line of many megabytes.
+/// A line or part of a very long one. Some maps have a single line of many megabytes.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Line {
-    /// Its characters.
+    /// Characters of the line or part.
     pub text: String,
-    /// How many characters of the line come before `text`.
+    /// Number of characters of the line before `text`.
     pub skipped: u64,
-    /// Whether the line goes on after `text`.
+    /// Whether the line continues after `text`.
     pub goes_on: bool,
 }
 
@@ -43,10 +43,10 @@ impl From<&str> for Line {
     }
 }
 
-/// Characters that are given of a line on each side of the column asked for.
+/// Number of characters that are returned on each side of the requested column.
 const REACH: usize = 1000;
 
-/// No lines at all.
+/// A source without any lines.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NoSources;
 
@@ -56,27 +56,27 @@ impl Sources for NoSources {
     }
 }
 
-/// Lines out of a document image: those of the root file and of what it includes.
+/// Lines from a document image: lines of the root file and of the files that it includes.
 pub struct ImageSources<B> {
     image: B,
     input: String,
     files: RefCell<BTreeMap<String, Index>>,
 }
 
-/// What a source knows about a line.
+/// Answer of a source about a line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Answer {
-    /// The line.
+    /// The line exists.
     Line(Line),
-    /// The file is known and has no such line.
+    /// The file is known, but the line does not exist.
     NoSuchLine,
     /// The file is not part of this source.
     OtherFile,
 }
 
 impl<B: Deref<Target = [u8]>> ImageSources<B> {
-    /// Lines of `image`, whose root is the file at `input`: files with equal bytes share one
-    /// image, so the image may name its root differently. A damaged image gives no lines.
+    /// Creates a source of the lines of `image` with the file at `input` as root. Files with equal
+    /// bytes share an image, so it may name its root differently. A damaged image gives no lines.
     pub fn new(image: B, input: &str) -> ImageSources<B> {
         ImageSources {
             image,
@@ -85,7 +85,8 @@ impl<B: Deref<Target = [u8]>> ImageSources<B> {
         }
     }
 
-    /// Whether the image names its root so, and not another file of equal bytes.
+    /// Checks whether the image's root has this path, and not that of another file with equal
+    /// bytes.
     fn is_named(&self, path: &str) -> bool {
         let named = |document: Document<'_>| {
             let rest = document.path().strip_prefix(path);
@@ -94,7 +95,7 @@ impl<B: Deref<Target = [u8]>> ImageSources<B> {
         Document::open(&self.image).is_ok_and(named)
     }
 
-    /// Whether the image holds that file, and its line.
+    /// Returns the line if the image contains the file.
     pub fn answer(&self, path: &str, row: u64, near: u64) -> Answer {
         let Ok(document) = Document::open(&self.image) else {
             return Answer::OtherFile;
@@ -135,11 +136,11 @@ impl<B: Deref<Target = [u8]>> Sources for ImageSources<B> {
     }
 }
 
-/// Lines from an image where it has the file, from the disk otherwise.
+/// Lines from an image if it contains the file, otherwise from the disk.
 pub struct BothSources<B> {
-    /// Asked first.
+    /// Image, which is used first.
     pub image: Option<ImageSources<B>>,
-    /// Asked for files that are not part of the image.
+    /// Files on disk, for files outside of the image.
     pub files: FileSources,
 }
 
@@ -158,16 +159,15 @@ impl<B: Deref<Target = [u8]>> Sources for BothSources<B> {
 
     fn image(&self, path: &str, look: &mut dyn FnMut(&[u8])) {
         match &self.image {
-            // What an image refers to is told by where its root lies.
+            // The references of an image depend on the directory of its root.
             Some(image) if image.input == path && image.is_named(path) => image.image(path, look),
             _ => self.files.image(path, look),
         }
     }
 }
 
-/// Lines of files on disk, read as the broker reads them: packed, in any encoding. The checked
-/// file must still have the bytes that were checked; a file of which no digest is known must be
-/// older than the result.
+/// Lines of files on disk, read as the broker reads them: packed, in any encoding. The checked file
+/// must still have the checked bytes. A file without a known digest must be older than the result.
 pub struct FileSources {
     input: String,
     digest: Digest,
@@ -175,7 +175,7 @@ pub struct FileSources {
     files: RefCell<BTreeMap<String, Option<FileSource>>>,
 }
 
-/// A file on disk. Who asks for its lines only needs no image of it.
+/// A file on disk. Its image is built only on request, because lines do not need it.
 struct FileSource {
     prepared: Prepared,
     index: Index,
@@ -183,7 +183,7 @@ struct FileSource {
 }
 
 impl FileSources {
-    /// The files that this result speaks of.
+    /// Creates a source for the files of this result.
     pub fn new(result: &ResultMessage) -> FileSources {
         FileSources {
             input: result.input.clone(),
@@ -193,7 +193,7 @@ impl FileSources {
         }
     }
 
-    /// Gives `look` the file, if it is what it was.
+    /// Calls `look` with the file if it is unchanged.
     fn with<T>(&self, path: &str, look: impl FnOnce(&mut FileSource) -> T) -> Option<T> {
         let mut files = self.files.borrow_mut();
         let file = files
@@ -204,7 +204,7 @@ impl FileSources {
 
     fn open(&self, path: &str) -> Option<FileSource> {
         let file = from_text(path);
-        // A member of an archive is as old as the archive.
+        // A member of an archive has the modification time of the archive.
         let on_disk = if file.is_file() {
             path
         } else {
@@ -252,7 +252,7 @@ fn modified(path: &str) -> Option<SystemTime> {
     std::fs::metadata(from_text(path)).ok()?.modified().ok()
 }
 
-/// Where the lines of a file begin.
+/// Start positions of the lines of a file.
 struct Index {
     starts: Vec<u32>,
     ascii: bool,
@@ -278,7 +278,7 @@ impl Index {
         Some(marked.unwrap_or(line))
     }
 
-    /// The part of the line around a column; characters are bytes where all of them are ASCII.
+    /// Returns the part of the line around a column. In a pure ASCII file, characters are bytes.
     fn part(&self, line: &str, near: u64) -> Line {
         if line.len() <= 2 * REACH {
             return Line::from(line);

@@ -1,10 +1,10 @@
-//! Which characters of a line a finding is about.
+//! Characters of a line to which a finding refers.
 
-/// The longest underline; an element's name or an attribute is shorter.
+/// Maximum length of an underline; the name of an element or an attribute is shorter.
 const MOST: usize = 60;
 
-/// How many characters from `at` on to mark: the start of a tag with its name, an attribute with its
-/// value, one character otherwise.
+/// Returns the number of characters to mark from `at`: the start of a tag with its name, an
+/// attribute with its value, otherwise one character.
 pub fn underlined(line: &[char], at: usize) -> usize {
     let rest = line.get(at..).unwrap_or_default();
     let name_from = |start: usize| {
@@ -22,7 +22,7 @@ pub fn underlined(line: &[char], at: usize) -> usize {
     length.clamp(1, MOST)
 }
 
-/// `name="value"` as a whole when that is what stands there.
+/// Returns the length of `name="value"` if it is present, else that of the name.
 fn attribute(rest: &[char], name: usize) -> usize {
     let quoted = match (rest.get(name), rest.get(name + 1)) {
         (Some('='), Some(quote @ ('"' | '\''))) => rest

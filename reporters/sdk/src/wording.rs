@@ -1,10 +1,10 @@
-//! How rules and numbers are written for people.
+//! Display form of rules and numbers.
 
 use qcbus_messages::Verdict;
 
-/// What people call a rule: the end of its UID (`road.lane.link_order` of
-/// `asam.net:xodr:1.4.0:road.lane.link_order`), which `qcbus rule` and `--select` take; the id of
-/// its checker where there is no UID.
+/// Returns the short name of a rule: the end of its UID (`road.lane.link_order` of
+/// `asam.net:xodr:1.4.0:road.lane.link_order`), which `qcbus rule` and `--select` accept. Without a
+/// UID, it is the id of the checker.
 pub fn rule_name<'r>(uid: &'r str, checker: &'r str) -> &'r str {
     match uid.rsplit(':').next() {
         Some(name) if !name.is_empty() => name,
@@ -12,8 +12,8 @@ pub fn rule_name<'r>(uid: &'r str, checker: &'r str) -> &'r str {
     }
 }
 
-/// A number of metres or seconds as far as it matters: to the thousandth, without zeros at its end.
-/// Very large ones, which no road has, in scientific notation.
+/// Returns a number of metres or seconds, rounded to the thousandth, without zeros at its end. Very
+/// large numbers, which no road has, use scientific notation.
 pub fn rounded(number: f64) -> String {
     if !number.is_finite() || number.abs() >= 1e9 {
         return format!("{number:e}");
@@ -26,7 +26,7 @@ pub fn rounded(number: f64) -> String {
     }
 }
 
-/// What a verdict means, for those who meet it for the first time.
+/// Returns a short explanation of a verdict for new users.
 pub fn meaning(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Accepted => "everything that was asked has looked, and found no error",

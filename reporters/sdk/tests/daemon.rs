@@ -1,4 +1,4 @@
-//! A reporter on a real bus, against a broker's side that is played here.
+//! Tests of a reporter on a real bus, with a simulated broker.
 
 #![expect(
     clippy::unwrap_used,
@@ -21,10 +21,10 @@ use qcbus_messages::{
 };
 use qcbus_reporter_sdk::{Identity, ReportError, Reporter, Sources, run};
 
-/// Longer than anything takes on the slowest machine; only a hang gets here.
+/// Timeout that only a hanging test reaches, even on the slowest machine.
 const WATCHDOG: Duration = Duration::from_secs(60);
 
-/// Line 2 of each result's file, by path for people.
+/// A reporter that records line 2 of each result's file, by display path.
 #[derive(Default)]
 struct SecondLines {
     seen: Vec<(String, Option<String>)>,
@@ -87,7 +87,7 @@ fn block_on(test: impl Future<Output = ()>) {
         .expect("the watchdog: this never happened");
 }
 
-/// The broker's side.
+/// The simulated broker.
 struct Broker {
     host: Host,
     reporter: Option<PeerId>,
@@ -120,7 +120,7 @@ impl Broker {
         self.host.send(self.reporter.unwrap(), message);
     }
 
-    /// The next answer that is not a sign of life.
+    /// Returns the next answer that is not a heartbeat.
     async fn answer(&mut self) -> FromPeer {
         loop {
             match self.host.next().await {
@@ -145,7 +145,7 @@ impl Broker {
         }
     }
 
-    /// Publishes the file as document `doc`; gives the digest of its bytes.
+    /// Publishes the file as document `doc`. Returns the digest of its bytes.
     fn publish(&self, path: &Path, doc: DocId) -> Digest {
         let (image, digest) = image(path);
         let mut loan = self.host.documents().loan(image.len()).unwrap();
@@ -177,11 +177,11 @@ fn results_are_written_acknowledged_and_drained() {
             let hello = broker.welcome().await;
             assert_eq!((hello.role, hello.launch), (Role::Reporter, Some(3)));
             let digest = broker.publish(&file, DocId(5));
-            // Whoever reads the disk from now on does not see what was checked.
+            // From now on, the file on disk differs from the checked document.
             std::fs::write(&file, "<OpenDRIVE>\n  <changed/>\n</OpenDRIVE>\n").unwrap();
             let known = result(1, &file, Some(DocId(5)), digest);
             assert_eq!(broker.report(known.clone()).await, PeerReport::Written);
-            // The same once more is acknowledged and not written twice.
+            // The same result is acknowledged again, but not written twice.
             assert_eq!(broker.report(known).await, PeerReport::Written);
 
             let changed = result(2, &file, None, digest);
@@ -194,7 +194,7 @@ fn results_are_written_acknowledged_and_drained() {
             assert!(why.ends_with("there is no room"), "{why}");
             broker.send(&ToPeer::Drain);
             assert_eq!(broker.answer().await, FromPeer::Leaving);
-            // The last acknowledgement lets the reporter go.
+            // The reporter leaves after the last acknowledgement.
             loop {
                 broker.host.next().await;
             }
@@ -205,7 +205,7 @@ fn results_are_written_acknowledged_and_drained() {
         }
     });
     assert!(reporter.finished);
-    // The document on the bus is what was checked; a file that has changed since is not shown.
+    // The document on the bus is the checked one. A file that has changed since then is not shown.
     let expected = [
         ("a.xodr".to_owned(), Some("  <header/>".to_owned())),
         ("a.xodr".to_owned(), None),
@@ -231,7 +231,7 @@ fn a_new_broker_gets_the_reporter_back() {
             let report = first.report(result(1, &file, None, digest)).await;
             assert_eq!(report, PeerReport::Written);
             drop(first);
-            // Job numbers start again and mean other jobs.
+            // Job numbers start again and refer to other jobs.
             let mut second = Broker::start(&instance);
             second.welcome().await;
             let report = second.report(result(1, &file, None, digest)).await;

@@ -1,4 +1,4 @@
-//! Source lines of files on disk.
+//! Tests of source lines of files on disk.
 
 #![expect(
     clippy::unwrap_used,
@@ -40,7 +40,7 @@ fn digest(path: &Path) -> Digest {
     Digest(prepared.digest())
 }
 
-/// The lines of a farm file as a report shows them.
+/// Returns a line of a farm file as a report shows it.
 fn line(name: &str, row: u64) -> String {
     let file = farm(name);
     let result = result(&file, Path::new("none.xqar"), digest(&file));

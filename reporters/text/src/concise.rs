@@ -10,17 +10,18 @@ use qcbus_reporter_sdk::{one_line, rule_name, silences};
 use crate::paint::Paint;
 use crate::{Entry, sorted};
 
-/// How many findings of one rule are shown of one file.
+/// Maximum number of findings of one rule that are shown for one file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Folding {
-    /// All: for programs.
+    /// All findings, for programs.
     None,
-    /// So many, and a line says how many more there are.
+    /// This number of findings, followed by a line with the number of further ones.
     After(usize),
 }
 
-/// The findings of a result on one line each, in the manner that editors and CI recognise, then, when
-/// the verdict is undetermined, a line that says why. Empty for an accepted file without findings.
+/// Returns the findings of a result, one per line in the form that editors and CI recognise. If the
+/// verdict is undetermined, a line with the reason follows. It is empty for an accepted file
+/// without findings.
 pub fn concise(result: &ResultMessage, color: bool, folding: Folding) -> String {
     let paint = Paint::new(color);
     let mut out = String::new();
@@ -68,7 +69,7 @@ impl Folding {
 
 fn line(out: &mut String, result: &ResultMessage, entry: &Entry<'_>, rule: &str, paint: Paint) {
     let place = entry.places.first();
-    // A line is about the checked file: of what lies in another one, it has where that is referred to.
+    // A line is about the checked file. For another file it uses the place of the reference.
     let at = place.and_then(|place| match &place.path {
         Some(_) => place.referred_at,
         None => place.row.map(|row| (row, place.column.unwrap_or(0))),
@@ -89,7 +90,7 @@ fn line(out: &mut String, result: &ResultMessage, entry: &Entry<'_>, rule: &str,
     let _ = writeln!(out, "{place_name}: {level}: {text} {rule}");
 }
 
-/// Why nobody can say more.
+/// Returns the reasons for an undetermined verdict.
 fn why(result: &ResultMessage) -> String {
     let silences: Vec<String> = silences(result).iter().map(ToString::to_string).collect();
     shown::line(&silences.join("; ")).into_owned()

@@ -1,4 +1,4 @@
-//! One issue.
+//! Rendering of one issue.
 
 use std::fmt::Write as _;
 
@@ -13,18 +13,18 @@ use crate::paint::Paint;
 use crate::snippet::snippet;
 use crate::wrap::wrap;
 
-/// Everything that the rendering of an issue looks at besides the issue.
+/// Context for the rendering of an issue.
 pub(crate) struct View<'v> {
     pub(crate) result: &'v ResultMessage,
     pub(crate) sources: &'v dyn Sources,
     pub(crate) paint: Paint,
     pub(crate) width: usize,
-    /// Whether UID and checker are written in full, besides the rule's name in the headline.
+    /// Whether UID and checker are written in full, in addition to the rule's name in the headline.
     pub(crate) full_names: bool,
 }
 
 impl View<'_> {
-    /// Writes headline, places with source lines, rule and reason.
+    /// Writes the headline, the places with source lines, the rule and the reason.
     pub(crate) fn write(&self, out: &mut String, entry: &Entry<'_>, why: Option<&str>) {
         let gutter = gutter(&entry.places);
         self.headline(out, entry);
@@ -95,7 +95,7 @@ impl View<'_> {
         }
     }
 
-    /// `PATH:ROW:COLUMN`, as far as known.
+    /// Returns `PATH:ROW:COLUMN` without unknown parts.
     fn name(&self, place: &IssueLocation) -> String {
         let mut name = match &place.path {
             Some(path) => shown::line(path_for_people(self.result, path)).into_owned(),
@@ -107,7 +107,7 @@ impl View<'_> {
         name
     }
 
-    /// The source line with marks; says whether there was one.
+    /// Writes the source line with marks. Returns whether the line was available.
     fn snippet(
         &self,
         out: &mut String,
@@ -140,7 +140,7 @@ impl View<'_> {
         true
     }
 
-    /// A line `= name: text`, wrapped below its text.
+    /// Writes a line `= name: text`; continuation lines are indented to the text.
     fn note(&self, out: &mut String, gutter: usize, name: &str, text: &str) {
         let indent = gutter + 3 + name.len() + 2;
         let lines = wrap(&printable(text), self.width.saturating_sub(indent).max(30));
@@ -155,22 +155,22 @@ impl View<'_> {
     }
 }
 
-/// Columns for the largest row number that may be shown. Larger rows than files have are other
-/// tools' nonsense.
+/// Returns the number of columns for the largest row number. Rows larger than any file are invalid
+/// data of other tools, so the width is limited.
 fn gutter(places: &[IssueLocation]) -> usize {
     let rows = places.iter().filter_map(|place| place.row);
     rows.max().map_or(1, |row| row.to_string().len().min(8))
 }
 
-/// The UIDs of further rules that the same fact breaks.
+/// Returns the UIDs of further rules that the same fact violates.
 fn further_rules(info: &DomainInfo) -> String {
     let values = info.content.iter().flat_map(|element| &element.attributes);
     let uids: Vec<String> = values.map(|(_, uid)| one_line(uid)).collect();
     uids.join(", ")
 }
 
-/// The rule's UID and the checker; ASAM's checkers carry the rule's name, so both are needed to
-/// look either up.
+/// Returns the rule's UID and the checker. ASAM's checkers carry the rule's name, so a user needs
+/// both to find either.
 fn rule_of(entry: &Entry<'_>) -> String {
     let checker = format!("{}/{}", entry.bundle.name, entry.checker.id);
     match entry.issue.rule_uid.as_str() {
@@ -201,7 +201,7 @@ fn facts(place: &IssueLocation) -> String {
     facts.join("; ")
 }
 
-/// `:ROW:COLUMN`, or `:ROW` when the column is not known.
+/// Returns `:ROW:COLUMN`, or `:ROW` if the column is unknown.
 fn row_column((row, column): (u64, u64)) -> String {
     match column {
         0 => format!(":{row}"),
@@ -209,7 +209,7 @@ fn row_column((row, column): (u64, u64)) -> String {
     }
 }
 
-/// A `DomainSpecificInfo` in one line: `Element key=value text, …`.
+/// Returns a `DomainSpecificInfo` on one line: `Element key=value text, …`.
 fn flat(info: &DomainInfo) -> String {
     let mut words = Vec::new();
     for element in &info.content {

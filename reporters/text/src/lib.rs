@@ -1,10 +1,9 @@
-//! Results as text, in the manner of a compiler: what was found, where, the line of the file with
-//! a caret, the rule, why it matters, and at the end the verdict with what ran and what did not.
+//! Results as text in the style of a compiler: the finding, its place, the source line with a
+//! caret, the rule and its reason. At the end are the verdict and the state of the checkers.
 //!
-//! [`render`] is a pure function, so that `qcbus check` prints the very text that the report
-//! files hold.
+//! [`render`] is a pure function, so `qcbus check` prints exactly the text of the report files.
 //!
-//! Parameters: `OutputFile` (see [`Output`]; in one file, each report is under a line
+//! Parameters: `OutputFile` (see [`Output`]; in a shared file, each report is under a line
 //! `==== PATH ====`) and `LineWidth` in characters (40 to 1000, default 100).
 
 mod concise;
@@ -29,7 +28,7 @@ use paint::Paint;
 /// The reporter's name on the bus and in configurations.
 pub const NAME: &str = "qc-report-text";
 
-/// What this crate offers.
+/// Registration of this reporter.
 pub static REPORTER: Registration = Registration {
     alias: "text",
     name: NAME,
@@ -38,7 +37,7 @@ pub static REPORTER: Registration = Registration {
     make: |setting| Box::new(FormatReporter::new(report::Full, setting)),
 };
 
-/// The same on one line each, which editors and CI read.
+/// Registration of the concise form with one finding per line, which editors and CI read.
 pub static CONCISE: Registration = Registration {
     alias: "concise",
     name: "qc-report-concise",
@@ -47,20 +46,20 @@ pub static CONCISE: Registration = Registration {
     make: |setting| Box::new(FormatReporter::new(report::Concise, setting)),
 };
 
-/// How to render.
+/// Options for rendering.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
-    /// Columns to stay within where text can be wrapped or cut.
+    /// Maximum number of columns for text that can be wrapped or cut.
     pub width: usize,
-    /// Whether to colour with ANSI escape sequences. The caller knows the terminal and `NO_COLOR`.
+    /// Whether to use ANSI colours. The caller knows the terminal and `NO_COLOR`.
     pub color: bool,
-    /// How many checkers that were skipped for one reason are named; the rest are counted.
+    /// Maximum number of named checkers that were skipped for one reason; the others are counted.
     pub skipped_names: usize,
-    /// How many checkers that failed for one reason are named; the rest are counted.
+    /// Maximum number of named checkers that failed for one reason; the others are counted.
     pub failed_names: usize,
-    /// Whether each issue names its rule's UID and its checker in full.
+    /// Whether each issue gives its rule's UID and its checker in full.
     pub full_names: bool,
-    /// Whether those that do not apply to the file are listed with the reason, and not only counted.
+    /// Whether inapplicable checkers are listed with the reason and not only counted.
     pub inapplicable: bool,
 }
 
@@ -77,7 +76,7 @@ impl Default for Options {
     }
 }
 
-/// An issue with what is around it: one entry of a report.
+/// An entry of a report: an issue with its context.
 pub(crate) struct Entry<'r> {
     pub(crate) bundle: &'r CheckerBundle,
     pub(crate) checker: &'r Checker,
@@ -85,21 +84,21 @@ pub(crate) struct Entry<'r> {
     pub(crate) places: Vec<IssueLocation>,
 }
 
-/// The report of one result: its issues in the order of their places, then the verdict and the
-/// summary. Ends with a line feed; equal input gives equal text.
+/// Returns the report of one result: its issues in the order of their places, then the verdict and
+/// the summary. It ends with a line feed. Equal input gives equal text.
 pub fn render(result: &ResultMessage, options: &Options, sources: &dyn Sources) -> String {
     let mut out = findings(result, options, sources);
     summary::write(&mut out, result, Paint::new(options.color), options);
     out
 }
 
-/// What was found, without the verdict and what it rests on. Empty when nothing was.
+/// Returns the findings without the verdict and its reasons. It is empty if there are no findings.
 pub fn findings(result: &ResultMessage, options: &Options, sources: &dyn Sources) -> String {
     let paint = Paint::new(options.color);
     let mut explained = std::collections::BTreeSet::new();
     let mut out = String::new();
     for entry in &sorted(result) {
-        // Why a rule exists is said once per report, not under each of a hundred issues.
+        // The reason for a rule appears once per report and not under each of a hundred issues.
         let why = result.rules.get(&entry.issue.rule_uid);
         let why = why.filter(|_| explained.insert(entry.issue.rule_uid.as_str()));
         let view = issue::View {
@@ -115,13 +114,13 @@ pub fn findings(result: &ResultMessage, options: &Options, sources: &dyn Sources
     out
 }
 
-/// What kept somebody from looking, in lines for a person: checkers that failed and, with `blocked`,
-/// those that something else kept from looking. Empty when nothing did.
+/// Returns lines for people about the checkers that failed and, with `blocked`, the blocked
+/// checkers. It is empty if there are none.
 pub fn not_looked(result: &ResultMessage, options: &Options, blocked: bool) -> String {
     summary::not_looked(result, options, blocked)
 }
 
-/// All issues, as they are read.
+/// Returns all issues in reading order.
 fn sorted(result: &ResultMessage) -> Vec<Entry<'_>> {
     let mut entries = entries(result);
     entries.sort_by_key(order);
@@ -143,9 +142,9 @@ fn entries(result: &ResultMessage) -> Vec<Entry<'_>> {
     issues.collect()
 }
 
-/// What rejects comes first. Issues of one level are read along the file; what is in other files goes
-/// by where it is referred to, what qcbus says about the check itself comes last. The sort is stable:
-/// ties stay in result order.
+/// Returns the sort key of an entry. Levels that cause a rejection come first; within a level,
+/// issues are in file order. An issue in another file uses the place of the reference. Issues from
+/// qcbus about the check itself come last. The sort is stable: ties stay in result order.
 fn order(entry: &Entry<'_>) -> (Level, bool, u64, u64) {
     let own = entry.bundle.name == qcbus_formats::pool::OWN_BUNDLE;
     let place = entry.places.first();

@@ -1,10 +1,10 @@
-//! Colours, or none.
+//! Optional colours.
 
 use anstyle::{AnsiColor, Style};
 use qcbus_formats::xqar::Level;
 use qcbus_messages::Verdict;
 
-/// Puts text in a style when colours are wanted.
+/// Styling of text, if colours are enabled.
 #[derive(Clone, Copy)]
 pub(crate) struct Paint {
     color: bool,
@@ -19,7 +19,7 @@ impl Paint {
         self.with(Style::new().bold(), text)
     }
 
-    /// Lines, arrows and row numbers.
+    /// Styles lines, arrows and row numbers.
     pub(crate) fn frame(self, text: &str) -> String {
         self.with(AnsiColor::BrightBlue.on_default().bold(), text)
     }

@@ -1,4 +1,4 @@
-//! The daemon: where the text goes.
+//! The text reporter: builds and splits text reports.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use qcbus_reporter_sdk::{
 
 use crate::{Folding, Options, concise, render};
 
-/// Columns unless `LineWidth` says otherwise; ASAM's report has the same.
+/// Number of columns without `LineWidth`, the same as in ASAM's report.
 pub const DEFAULT_WIDTH: usize = 100;
 
 fn line_width(params: &[Param]) -> Result<usize, ReportError> {
@@ -27,10 +27,10 @@ fn line_width(params: &[Param]) -> Result<usize, ReportError> {
     }
 }
 
-/// Both ends of the line that begins a section of the one file.
+/// Start and end of the line before a section in a shared file.
 const RULER: &str = "====";
 
-/// A line for each finding.
+/// Format with a line for each finding.
 pub(crate) struct Concise;
 
 impl ReportFormat for Concise {
@@ -69,7 +69,7 @@ impl ReportFormat for Concise {
     }
 }
 
-/// The path that a line of [`concise`] begins with.
+/// Returns the path at the start of a line of [`concise`].
 fn path_of(line: &str) -> Option<&str> {
     let levels = [Level::Error, Level::Warning, Level::Information];
     let levels = levels.map(|level| format!(": {}: ", level.as_str()));
@@ -84,8 +84,8 @@ fn path_of(line: &str) -> Option<&str> {
     Some(without(without(place)))
 }
 
-/// Reports in full. In a file for all each stands under `==== PATH ====`; no other line of a
-/// report begins with a ruler.
+/// Format of full reports. In a shared file each report is under `==== PATH ====`. No other line of
+/// a report begins with a ruler.
 pub(crate) struct Full;
 
 impl ReportFormat for Full {
@@ -135,7 +135,7 @@ impl ReportFormat for Full {
                 sections.entry(key.clone()).or_default().push_str(line);
             }
         }
-        // What was torn does not end in an empty line.
+        // A truncated section does not end in an empty line.
         sections.retain(|_, section| section.ends_with("\n\n") && section.pop().is_some());
         sections
     }

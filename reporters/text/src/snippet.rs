@@ -1,27 +1,27 @@
-//! A source line with a caret under the place.
+//! Source line with a caret under the place.
 
 use qcbus_reporter_sdk::{Line, printable, underlined};
 use unicode_width::UnicodeWidthChar as _;
 
-/// Columns that a tab is shown as.
+/// Number of columns of a tab.
 const TAB: usize = 4;
 
-/// Where a line was cut.
+/// Sign for the cut part of a line.
 const CUT: char = '…';
 
-/// A line as shown, and where the marks go below it.
+/// A displayed line and the position of the marks below it.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Snippet {
-    /// The line, or the part of it around the place; no wider than asked for.
+    /// The line or the part around the place, limited to the requested width.
     pub(crate) text: String,
-    /// Columns before the first mark and number of marks; `None` when no column is known.
+    /// Columns before the first mark and number of marks; `None` if the column is unknown.
     pub(crate) marks: Option<(usize, usize)>,
 }
 
-/// One character and the columns that it takes.
+/// A character and its width in columns.
 type Cell = (char, usize);
 
-/// Shows `line` within `width` columns so that character `column` (from 1) can be seen.
+/// Returns `line` within `width` columns, so that character `column` (from 1) is visible.
 pub(crate) fn snippet(line: &Line, column: Option<u64>, width: usize) -> Snippet {
     let cells: Vec<Cell> = printable(&line.text).chars().map(cell).collect();
     let at = column.map(|column| {
@@ -88,8 +88,8 @@ fn columns(cells: &[Cell]) -> usize {
     cells.iter().map(|&(_, columns)| columns).sum()
 }
 
-/// The first character to show: the line's, unless the place would be cut off at the right; then
-/// a third of the width is kept before it.
+/// Returns the first character to show. It is the first one of the line, unless the place would be
+/// cut off at the right. In that case a third of the width is kept before the place.
 fn first_shown(cells: &[Cell], at: usize, marked: usize, width: usize) -> usize {
     let end = (at + marked).min(cells.len());
     if columns(cells) <= width || columns(&cells[..end]) + 1 < width {
@@ -110,7 +110,7 @@ mod tests {
 
     use super::*;
 
-    /// The line and its marks as they appear below each other.
+    /// Returns the line with its marks below it.
     fn show(line: &str, column: u64, width: usize) -> String {
         let snippet = snippet(&Line::from(line), Some(column), width);
         let (before, count) = snippet.marks.unwrap();

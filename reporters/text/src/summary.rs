@@ -1,4 +1,4 @@
-//! The verdict, and what ran, what did not and why.
+//! Summary: the verdict, and the checkers by status with the reasons.
 
 use std::fmt::Write as _;
 
@@ -31,7 +31,7 @@ pub(crate) fn write(out: &mut String, result: &ResultMessage, paint: Paint, opti
     }
 }
 
-/// `2 errors, 1 warning`, or `no issues`.
+/// Returns for example `2 errors, 1 warning`, or `no issues`.
 fn issues(result: &ResultMessage) -> String {
     let of = |level: Level| {
         let bundles = result.results.bundles.iter();
@@ -58,7 +58,7 @@ fn counted(count: usize, one: &str, many: &str) -> Option<String> {
     (count > 0).then(|| format!("{count} {}", if count == 1 { one } else { many }))
 }
 
-/// Counts by status; `completed` is said even when it is none.
+/// Returns the number of checkers by status; `completed` is always included.
 fn checkers(result: &ResultMessage, options: &Options) -> String {
     let all = || {
         let bundles = result.results.bundles.iter();
@@ -84,7 +84,7 @@ fn checkers(result: &ResultMessage, options: &Options) -> String {
     text
 }
 
-/// What kept somebody from looking, in lines.
+/// Returns lines about checkers that failed or were blocked.
 pub(crate) fn not_looked(result: &ResultMessage, options: &Options, blocked: bool) -> String {
     let options = Options {
         inapplicable: false,
@@ -99,8 +99,8 @@ pub(crate) fn not_looked(result: &ResultMessage, options: &Options, blocked: boo
     out
 }
 
-/// Checkers that ended alike for the same reason: when a file is not well-formed, all of the
-/// semantic ones are skipped, and one line says so.
+/// Checkers with the same status for the same reason. For example, all semantic checkers are
+/// skipped if a file is not well-formed, and one line reports them.
 struct Group {
     status: Status,
     reason: String,
@@ -118,7 +118,7 @@ impl Group {
         for (number, line) in wrap(&head, width.saturating_sub(6)).iter().enumerate() {
             let _ = writeln!(out, "  {}{line}", if number == 0 { "" } else { "    " });
         }
-        // On a terminal a few names do.
+        // On a terminal, a few names are enough.
         let most = match self.status {
             Status::Skipped => options.skipped_names,
             Status::Completed | Status::Error => options.failed_names,
@@ -140,7 +140,7 @@ impl Group {
     }
 }
 
-/// The groups that did not complete, what failed before what was skipped.
+/// Returns the groups that did not complete; failed groups come before skipped ones.
 fn groups(result: &ResultMessage, options: &Options) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for bundle in &result.results.bundles {
@@ -173,7 +173,7 @@ fn groups(result: &ResultMessage, options: &Options) -> Vec<Group> {
     groups
 }
 
-/// Checkers that wait for one that was skipped, with those that were skipped for what stopped that one.
+/// Merges checkers that wait for a skipped checker into the group of that skipped checker.
 fn by_cause(groups: Vec<Group>) -> Vec<Group> {
     let mut merged: Vec<Group> = Vec::new();
     for group in groups {

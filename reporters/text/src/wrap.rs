@@ -2,8 +2,8 @@
 
 use unicode_width::UnicodeWidthStr as _;
 
-/// The words of `text` on lines of at most `width` columns; a longer word gets a line of its own.
-/// Never empty.
+/// Wraps the words of `text` into lines of at most `width` columns. A longer word gets its own
+/// line. The result is never empty.
 pub(crate) fn wrap(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     let mut used = 0;

@@ -1,4 +1,4 @@
-//! A line for each finding.
+//! Tests of the format with one line for each finding.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 

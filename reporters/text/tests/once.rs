@@ -1,4 +1,4 @@
-//! A report on a result file that exists already.
+//! Tests of a report on an existing result file.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
 
@@ -31,7 +31,7 @@ fn params(output: &Path) -> Vec<Param> {
     }]
 }
 
-/// The file first, then the result: a newer file would not be shown.
+/// Writes the file first, then the result, because a newer file would not be shown.
 fn scene(dir: &Path) {
     std::fs::write(dir.join("quay.xodr"), "<OpenDRIVE>\n  <road id='5'/>\n").unwrap();
     std::fs::write(dir.join("Result.xqar"), RESULT).unwrap();

@@ -1,4 +1,4 @@
-//! The text of whole reports, as people see it.
+//! Tests of the text of whole reports, as users see it.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use qcbus_reporter_sdk::{Line, NoSources, Reporter, Setting, Sources};
 
 const UNIQUE: &str = "asam.net:xodr:1.4.0:ids.id_unique_in_class";
 
-/// Files made of a few lines.
+/// Files with a few lines.
 struct Pages(BTreeMap<&'static str, Vec<&'static str>>);
 
 impl Sources for Pages {

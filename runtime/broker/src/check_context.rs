@@ -1,5 +1,5 @@
-//! Under what a broker checks files, so that a run of `check` knows whether one that is there would find what it would
-//! find itself.
+//! Conditions under which a broker checks files. A run of `check` uses them to decide whether a
+//! running broker would find the same as itself.
 
 use qcbus_messages::Digest;
 use qcbus_messages::control::CheckContext;
@@ -8,11 +8,13 @@ use sha2::{Digest as _, Sha256};
 use crate::core::{ChildSpec, Settings};
 use crate::options::Options;
 
-/// Takes from the command of a bundle what changes nothing that it finds.
+/// Option that is removed from a bundle's command with its value, because it does not change the
+/// findings.
 const WITHOUT: &str = "--threads";
 
-/// The terms of a broker that was told `options` and has a configuration of this digest in force. `children` are those
-/// that it starts. Only brokers of the same program can be compared: the digests are over what its types look like.
+/// Returns the check context of a broker with these `options` and a configuration of this digest.
+/// `children` are those that it starts. Only brokers of the same program are comparable, because
+/// the digests cover the debug format of its types.
 pub fn check_context(options: &Options, config: Digest, children: &[ChildSpec]) -> CheckContext {
     let general = format!(
         "{config}{:?}{:?}{:?}{:?}{}",
@@ -31,7 +33,7 @@ pub fn check_context(options: &Options, config: Digest, children: &[ChildSpec]) 
     }
 }
 
-/// Whether who offers `ours` finds what somebody asks for under `asked`; if not, why not, for a person.
+/// Returns why a broker with context `ours` may find other results than `asked`, for the user.
 pub fn differs(ours: &CheckContext, asked: &CheckContext) -> Option<&'static str> {
     if ours.general != asked.general {
         return Some(

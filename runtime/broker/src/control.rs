@@ -1,4 +1,5 @@
-//! The control socket: short-lived commands ask, the broker answers, one JSON object per line.
+//! Control socket: short-lived commands send requests, and the broker answers with one JSON object
+//! per line.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,19 +21,19 @@ use self::clients::{Bounds, Clients};
 /// File name of the socket in the instance's directory.
 pub const SOCKET: &str = "control.sock";
 
-/// How long the end waits for answers to be written.
+/// Maximum time that the shutdown waits for answers to be written.
 const FLUSH_LIMIT: Duration = Duration::from_millis(500);
 
-/// A request with the place for its answer.
+/// A request with the channel for its answer.
 #[derive(Debug)]
 pub struct Asked {
-    /// What is asked.
+    /// The request of the client.
     pub request: Request,
-    /// Where the answer goes; the client may have left meanwhile.
+    /// Channel for the answer. The client may have disconnected meanwhile.
     pub answer: oneshot::Sender<Response>,
 }
 
-/// The listening socket; its file is removed when this is dropped.
+/// The listening socket. Its file is removed when this value is dropped.
 #[derive(Debug)]
 pub struct ControlSocket {
     path: PathBuf,
@@ -41,11 +42,11 @@ pub struct ControlSocket {
 }
 
 impl ControlSocket {
-    /// Listens in the instance's directory, readable and writable by the owner only. The caller
-    /// holds the instance's lock, so a socket file that is there is a leftover.
+    /// Listens in the instance's directory. Only the owner can read and write the socket. The
+    /// caller holds the instance's lock, so an existing socket file is a leftover.
     ///
     /// # Errors
-    /// When the socket cannot be made.
+    /// Returns an error if the socket cannot be created.
     pub fn listen(
         directory: &Path,
         inbox: mpsc::UnboundedSender<Asked>,
@@ -64,7 +65,7 @@ impl ControlSocket {
         })
     }
 
-    /// Waits until answers that have been given are written, but not for clients that do not read.
+    /// Waits until the given answers are written. It does not wait for clients that do not read.
     pub async fn flush(&self) {
         let deadline = tokio::time::Instant::now() + FLUSH_LIMIT;
         while self.clients.is_busy() && tokio::time::Instant::now() < deadline {
@@ -75,9 +76,9 @@ impl ControlSocket {
 
 impl Drop for ControlSocket {
     fn drop(&mut self) {
-        // First, or it would be made again.
+        // The task stops first, because it would create the socket again.
         self.kept.abort();
-        // The directory may have been removed already.
+        // The error is ignored because the directory may have been removed already.
         let _ = qcbus_disk::remove(&self.path);
     }
 }

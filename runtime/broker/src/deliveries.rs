@@ -1,5 +1,5 @@
-//! What a reporter is told: read back from the stored result, so that a slow reporter costs disk
-//! space and no memory.
+//! Messages for reporters. They are read back from the stored result, so a slow reporter uses disk
+//! space but no memory.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,7 +18,7 @@ use crate::result_paths::ResultPaths;
 /// Builds the message for one reporter.
 ///
 /// # Errors
-/// When the stored result cannot be read back; for a person.
+/// Returns a text for the user if the stored result cannot be read back.
 pub fn message(
     reporter: &str,
     delivery: &Delivery,
@@ -54,8 +54,8 @@ pub fn message(
     })
 }
 
-/// What one reporter is told when a file has gone. `left` says where its result lay, if that is
-/// not where it would lie today.
+/// Returns the message for one reporter about a removed file. `left` is the path of its result, if
+/// that differs from the present result path.
 pub fn withdrawn(
     reporter: &str,
     path: &Path,
@@ -74,15 +74,16 @@ pub fn withdrawn(
     }
 }
 
-/// A result that holds what the broker keeps of every bundle is far smaller.
+/// Maximum size of a result. A result with all the data that the broker keeps of every bundle is
+/// far smaller.
 const MOST_OF_A_RESULT: u64 = 4 << 30;
 
-/// Findings in one message, in bytes of memory. Half of what the bus carries in one: the encoded
-/// form is smaller, and the rest of the message has room, too.
+/// Maximum bytes of memory for the findings in one message. It is half of the message limit of the
+/// bus. The encoded form is smaller, and the rest of the message also needs room.
 const MOST_BYTES: usize = MAX_MESSAGE / 2;
 
-/// Cuts a result that is too large for one message where most is said, and says so there. The
-/// stored result holds everything.
+/// Shortens a result that is too large for one message at the checkers with most findings, and
+/// states this there. The stored result remains complete.
 fn cut_to(results: &mut Results, most: usize) {
     let mut checkers: Vec<&mut Checker> = results
         .bundles
@@ -121,7 +122,7 @@ fn cut_to(results: &mut Results, most: usize) {
     }
 }
 
-/// What the rules that were broken are about.
+/// Returns the descriptions of the violated rules.
 pub fn broken_rules(results: &Results) -> BTreeMap<String, String> {
     let checkers = results.bundles.iter().flat_map(|bundle| &bundle.checkers);
     let broken = checkers.flat_map(|checker| {

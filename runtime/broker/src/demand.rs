@@ -1,4 +1,4 @@
-//! What a configuration demands, in the state machine's words.
+//! Demand of a configuration in the form for the state machine.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -14,20 +14,22 @@ use sha2::{Digest as _, Sha256};
 use crate::core::{ChildSpec, Demand};
 use crate::reload::{LoadError, Loaded, Sources};
 
-/// A configuration in force: parsed, encoded for the bus, and with its digest.
+/// The configuration in force: parsed, encoded for the bus and with its digest.
 #[derive(Debug, Clone)]
 pub struct InForce {
-    /// The configuration; `None` when there is none and everything runs that is on by default.
+    /// The configuration. `None` if there is none, so that every checker that is on by default
+    /// runs.
     pub config: Option<Arc<Config>>,
-    /// The same without the shadows that it names: what results are pooled by, for nobody misses those.
+    /// The configuration without the named shadows. Results are pooled with it, because shadows are
+    /// not required.
     pub judging: Option<Arc<Config>>,
-    /// As it travels on the bus.
+    /// Encoded form for the bus.
     pub encoded: Vec<u8>,
     /// SHA-256 of the encoded form and of the search path.
     pub digest: Digest,
-    /// Where the scenarios are looked for that modular scenarios refer to.
+    /// Search path for the files that modular scenarios refer to.
     pub search: Arc<SearchPath>,
-    /// What of all that was asked for, or left out, for this run.
+    /// Selection of checkers for this run.
     pub choice: Choice,
 }
 
@@ -35,12 +37,12 @@ impl InForce {
     /// Puts a configuration into force.
     ///
     /// # Errors
-    /// When it is too large for the bus.
+    /// Returns an error if it is too large for the bus.
     pub fn new(config: Option<Config>, search: SearchPath) -> Result<InForce, codec::CodecError> {
         let encoded = codec::encode(&config)?;
         let mut hash = Sha256::new_with_prefix(&encoded);
         for directory in search.directories() {
-            // With another search path a verdict may be another, too.
+            // Another search path may also lead to another verdict.
             hash.update([0]);
             hash.update(directory.as_os_str().as_encoded_bytes());
         }
@@ -56,11 +58,11 @@ impl InForce {
         })
     }
 
-    /// What was loaded, with the search path of the configuration before that of the environment.
-    /// Relative directories of the former start where the configuration lies.
+    /// Returns the loaded configuration in force. Its own search path precedes that of the
+    /// environment. Relative directories in it start at the directory of the configuration.
     ///
     /// # Errors
-    /// [`LoadError::Config`] when it is too large for the bus.
+    /// [`LoadError::Config`] if it is too large for the bus.
     pub fn of(sources: &Sources, loaded: &Loaded) -> Result<InForce, LoadError> {
         let of_environment = SearchPath::of_environment();
         let written = loaded.config.as_ref().and_then(Config::scenario_path);
@@ -79,7 +81,7 @@ impl InForce {
             .map_err(|error| LoadError::Config(error.to_string()))
     }
 
-    /// The same beside these children, some of which may be shadows.
+    /// Returns the configuration in force for these children, which may contain shadows.
     fn beside(mut self, children: &[ChildSpec]) -> InForce {
         let names_shadow = |it: &BundleConfig| {
             let mut shadows = children.iter().filter(|child| child.shadow);
@@ -95,7 +97,7 @@ impl InForce {
         self
     }
 
-    /// The same, but only what `choice` asks for.
+    /// Returns the configuration in force, limited to the checkers in `choice`.
     #[must_use]
     pub fn narrowed(mut self, choice: Choice) -> InForce {
         if !choice.is_everything() {
@@ -107,8 +109,8 @@ impl InForce {
         self
     }
 
-    /// The same, with or without verdicts that count in those on the files that a file rests on. Verdicts of the
-    /// other kind do not stand.
+    /// Returns the configuration in force with or without own verdicts. Own verdicts ignore the
+    /// verdicts on the files that a file rests on. Verdicts of the other kind become invalid.
     #[must_use]
     fn with_own_verdicts(mut self, own_verdicts: bool) -> InForce {
         if own_verdicts {
@@ -119,7 +121,7 @@ impl InForce {
         self
     }
 
-    /// What it demands.
+    /// Returns its demand.
     pub fn demand(&self) -> Arc<dyn Demand> {
         let all: Arc<dyn Demand> = match &self.config {
             Some(config) => Arc::new(Configured(config.clone())),
@@ -138,7 +140,7 @@ impl InForce {
     }
 }
 
-/// Without a configuration: every checker that is on by default.
+/// Demand without a configuration: every checker that is on by default.
 #[derive(Debug)]
 pub struct Everything;
 
@@ -171,7 +173,7 @@ impl Demand for Configured {
     }
 
     fn checkers(&self, name: &str, catalogue: &Catalogue, _: FileKind) -> Vec<u32> {
-        // What is named and does not apply to this kind is listed as skipped, by the bundle.
+        // A named checker that does not apply to this kind is reported as skipped by the bundle.
         select(catalogue, |checker| {
             self.0
                 .selects(name, &catalogue.alias, &checker.id)
@@ -192,12 +194,12 @@ impl Demand for Configured {
     }
 }
 
-/// What is chosen of what would be demanded.
+/// Demand that is limited to a choice.
 #[derive(Debug)]
 struct Chosen {
     all: Arc<dyn Demand>,
     choice: Choice,
-    /// Whether a configuration says what would be demanded.
+    /// Whether a configuration determines the demand.
     configured: bool,
 }
 
@@ -216,7 +218,7 @@ impl Demand for Chosen {
                 uids: &checker.rule_uids,
             };
             let is_demanded = demanded.contains(&index);
-            // One that is off by default may be asked for by its name, where no configuration speaks.
+            // Without a configuration, a checker that is off by default can be requested by name.
             let may_ask = is_demanded || (!self.configured && checker.kinds.contains(&kind));
             may_ask && self.choice.asks(names, is_demanded)
         };

@@ -1,7 +1,7 @@
-//! Processes that bundles have started and left behind.
+//! Descendants: processes that bundles have started and left behind.
 //!
-//! The broker is their next of kin: whatever a child has started, in whatever session or group it has placed itself,
-//! becomes a child of the broker when its parent ends.
+//! The broker is their subreaper: a process below a child becomes a child of the broker when its
+//! parent ends. This is independent of its session and process group.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -12,16 +12,17 @@ use rustix::process::{Pid, Signal, WaitOptions, kill_process, waitpid};
 use crate::core::Launch;
 use crate::launches::Launches;
 
-/// Children of this process that no bundle has left: it may have had some before it became a broker, as when a script
-/// starts something and then becomes it.
+/// Children of this process that no bundle left behind. A script may start a process and then
+/// execute the broker, for example.
 #[derive(Debug)]
 pub struct Strangers {
     before: BTreeSet<i32>,
-    /// The first process of a container is given everybody's orphans.
+    /// Whether this is the first process of a container, which inherits all orphaned processes.
     is_first: bool,
 }
 
-/// Makes this process the one that orphans are given to. Returns whom to leave alone.
+/// Makes this process the subreaper of its descendants. Returns the processes that must be left
+/// alone.
 pub fn adopt() -> Strangers {
     let strangers = Strangers {
         before: children(),
@@ -33,14 +34,14 @@ pub fn adopt() -> Strangers {
     strangers
 }
 
-/// A process as the kernel lists it.
+/// A process as listed by the kernel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Listed {
     parent: i32,
     is_dead: bool,
 }
 
-/// All processes.
+/// Returns all processes.
 fn processes() -> BTreeMap<i32, Listed> {
     let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
     let numbers = entries.filter_map(|entry| entry.file_name().to_str()?.parse::<i32>().ok());
@@ -52,7 +53,7 @@ fn processes() -> BTreeMap<i32, Listed> {
 fn listed(pid: i32) -> Option<Listed> {
     let stat =
         std::fs::read_to_string(Path::new("/proc").join(pid.to_string()).join("stat")).ok()?;
-    // The command stands in parentheses and may contain anything; behind it come state and parent.
+    // The command is in parentheses and may contain any character. State and parent follow it.
     let (_, rest) = stat.rsplit_once(')')?;
     let mut fields = rest.split_whitespace();
     let state = fields.next()?;
@@ -63,14 +64,15 @@ fn listed(pid: i32) -> Option<Listed> {
     })
 }
 
-/// Kills what a process has started, and what that has started. It is to be stopped or killed itself at once after.
+/// Kills all descendants of a process. The caller must stop or kill the process itself immediately
+/// afterwards.
 pub fn kill_below(process: &Process) {
-    // It must not come to an end of its own, with a code that says something else, when it misses its children.
+    // The process must not notice the loss of its children and exit with a misleading code.
     if let Some(pid) = Pid::from_raw(process.id().cast_signed()) {
         let _ = kill_process(pid, Signal::STOP);
     }
-    // What is started while we look is found by looking again; a hostile one may go on for as long as it likes,
-    // so not for ever.
+    // A repeated search finds processes that are started meanwhile. The number of attempts is
+    // limited, because a hostile process may start new ones for ever.
     for _ in 0..8 {
         let living = living_below(process.id().cast_signed());
         if living.is_empty() {
@@ -80,9 +82,10 @@ pub fn kill_below(process: &Process) {
     }
 }
 
-/// Those who live of what a process has started, and of what that has started. By the kernel's lists of children
-/// where it keeps some: to look through all processes of a machine takes milliseconds. A list may lack one while
-/// others of it end; whoever is missed so comes to us when its parent ends, and is found then.
+/// Returns the living descendants of a process. Uses the kernel's lists of children if they exist,
+/// because a search through all processes takes milliseconds. A list may miss an entry while other
+/// entries end. Such a process becomes a child of the broker when its parent ends, and is found
+/// then.
 fn living_below(root: i32) -> Vec<i32> {
     let is_alive = |pid: &i32| listed(*pid).is_some_and(|it| !it.is_dead);
     let mut found = BTreeSet::from([root]);
@@ -99,10 +102,11 @@ fn living_below(root: i32) -> Vec<i32> {
     found.into_iter().filter(is_alive).collect()
 }
 
-/// Whether a process was started by another one, or by what that has started.
+/// Checks whether a process is a descendant of another one.
 pub fn is_below(pid: u32, root: u32) -> bool {
     let mut pid = pid.cast_signed();
-    // No family is that old; should the kernel's lists change while we look, this ends all the same.
+    // No ancestry is that deep. The limit also ends the loop if the kernel's lists change
+    // meanwhile.
     for _ in 0..64 {
         match listed(pid) {
             Some(found) if found.parent == root.cast_signed() => return true,
@@ -128,9 +132,10 @@ fn below(all: &BTreeMap<i32, Listed>, root: i32) -> BTreeSet<i32> {
     }
 }
 
-/// Kills and buries orphans: children of this process that are none of `ours`. Those that a start among `ours` has left
-/// on purpose stay as long as it does. Whose it is, its environment tells; one that has none of that is nobody's, unless
-/// it may be a stranger. Returns how many are still there.
+/// Kills and reaps descendants: children of this process that are not in `ours`. Processes left on
+/// purpose by a launch in `ours` stay as long as it does. The environment identifies the launch. A
+/// process without a proof is killed unless it may be a stranger. Returns the number of processes
+/// that were still alive.
 pub fn sweep(
     ours: &BTreeMap<Launch, Option<u32>>,
     strangers: &Strangers,
@@ -154,7 +159,8 @@ pub fn sweep(
         };
         if is_left {
             left += 1;
-            // With what it has started in turn, or that would only be an orphan at the next look.
+            // Its descendants are killed too, otherwise the next sweep would find them as orphaned
+            // processes.
             living_below(pid).into_iter().for_each(kill);
             kill(pid);
         }
@@ -162,7 +168,7 @@ pub fn sweep(
     left
 }
 
-/// Whether the kernel lists the children of a process.
+/// Checks whether the kernel lists the children of a process.
 pub fn are_listed() -> bool {
     let own = std::process::id().to_string();
     Path::new("/proc/self/task")
@@ -171,7 +177,7 @@ pub fn are_listed() -> bool {
         .exists()
 }
 
-/// All children of this process.
+/// Returns all children of this process.
 fn children() -> BTreeSet<i32> {
     children_of("self").unwrap_or_else(|| {
         let own = std::process::id().cast_signed();
@@ -182,8 +188,8 @@ fn children() -> BTreeSet<i32> {
     })
 }
 
-/// All children of a process, whichever of its threads they are listed with. `None`: kernels are built without these
-/// lists, too.
+/// Returns all children of a process, from the lists of all its threads. Returns `None` if the
+/// kernel was built without these lists.
 fn children_of(process: &str) -> Option<BTreeSet<i32>> {
     let threads = Path::new("/proc").join(process).join("task");
     let threads = std::fs::read_dir(threads).into_iter().flatten().flatten();
@@ -208,12 +214,13 @@ const ESRCH: i32 = rustix::io::Errno::SRCH.raw_os_error();
 
 fn kill(pid: i32) {
     if let Some(pid) = Pid::from_raw(pid) {
-        // It may have ended by itself.
+        // The process may have ended already.
         let _ = kill_process(pid, Signal::KILL);
     }
 }
 
-/// Waits for one that has ended. Only for orphans: others are waited for by whoever has started them.
+/// Reaps an ended process. Only for descendants: other processes are reaped by the code that
+/// started them.
 fn bury(pid: i32) {
     if let Some(pid) = Pid::from_raw(pid) {
         let _ = waitpid(Some(pid), WaitOptions::NOHANG);

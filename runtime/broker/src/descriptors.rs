@@ -1,31 +1,33 @@
-//! How many files, sockets and mappings the broker may have open at once, and for how many peers that is
-//! enough: it is bounded here, so that nobody who comes late takes what is needed to go on.
+//! File descriptors: limits the open files, sockets and mappings of the broker and derives the
+//! maximum number of peers. Thus late peers cannot use up the descriptors that the broker needs.
 
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 use crate::environment::is_simulated;
 
-/// What one peer takes: its services, ports and connections on the bus (22 were counted), and a few more
-/// while it comes and goes.
+/// Descriptors of one peer: its services, ports and connections on the bus (22 were counted). A few
+/// more are needed while it joins and leaves.
 const PER_PEER: u64 = 26;
-/// What everything else takes: the bus, the journal, threads that read and write, commands that ask.
+/// Descriptors for all other purposes: the bus, the journal, I/O threads and commands.
 const FOR_THE_REST: u64 = 448;
-/// With fewer the bus does not start.
+/// Minimum number of descriptors for the start of the bus.
 const FOR_THE_BUS: u64 = 64;
-/// More is of no use, and some programs walk through all that they may have.
+/// Maximum number of descriptors. More are useless, and some programs iterate over all permitted
+/// descriptors.
 const ENOUGH: u64 = 1 << 16;
 
-/// What the system allows.
+/// Limits of the system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Descriptors {
-    /// Open at once.
+    /// Maximum number of open descriptors.
     pub allowed: u64,
-    /// What was allowed before, for the programs that the broker starts: some cannot do with more.
+    /// Former limit for the programs that the broker starts, because some cannot handle a higher
+    /// one.
     pub before: Option<Rlimit>,
 }
 
 impl Descriptors {
-    /// Takes as many as this process may give itself.
+    /// Raises the limit as far as this process is allowed to.
     pub fn take() -> Descriptors {
         let before = getrlimit(Resource::Nofile);
         if is_simulated() {
@@ -34,7 +36,7 @@ impl Descriptors {
                 before: None,
             };
         }
-        // No limit at all is none that matters here.
+        // An unlimited number is treated as the maximum.
         let now = before.current.unwrap_or(ENOUGH);
         let wanted = before.maximum.map_or(ENOUGH, |most| most.min(ENOUGH));
         if wanted <= now {
@@ -59,12 +61,14 @@ impl Descriptors {
         }
     }
 
-    /// As many as may be had; peers that there are none for are not let in, and what is to be said then.
+    /// Raises the limit and reduces the maximum number of peers to it. Returns the notice for a
+    /// reduced number.
     pub fn for_peers(most: &mut usize) -> (Descriptors, Option<String>) {
         let descriptors = Descriptors::take();
         let (peers, limited) = descriptors.peers(*most);
         *most = peers;
-        // The bus may not even start with so few, and its error would not say why.
+        // The bus may fail to start with so few descriptors, and its error would not state the
+        // reason.
         if let Some(said) = limited
             .as_ref()
             .filter(|_| descriptors.allowed < FOR_THE_BUS)
@@ -74,11 +78,11 @@ impl Descriptors {
         (descriptors, limited)
     }
 
-    /// For how many peers they are enough, of so many that are wanted, and what is to be said when these
-    /// are fewer.
+    /// Returns the number of peers that the descriptors are sufficient for, up to the wanted
+    /// number. Also returns the notice for a reduced number.
     pub fn peers(&self, wanted: usize) -> (usize, Option<String>) {
         let fit = self.allowed.saturating_sub(FOR_THE_REST) / PER_PEER;
-        // Without its standard bundles and a reporter a broker is of no use.
+        // A broker is useless without its standard bundles and a reporter.
         let fit = usize::try_from(fit).unwrap_or(usize::MAX);
         if fit >= wanted {
             return (wanted, None);

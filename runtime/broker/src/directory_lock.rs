@@ -1,5 +1,5 @@
-//! Who has a directory: the state, the results and the gate of a broker are each nobody else's
-//! while it runs.
+//! Directory locks: while a broker runs, its state, results and gate directories belong to it
+//! alone.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
@@ -10,14 +10,14 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use qcbus_disk::trust::{self, TrustError};
 use qcbus_messages::path_text::to_text;
 
-/// What a directory is to the one who has it.
+/// Purpose of a directory for its owner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
-    /// A broker's journal lies there.
+    /// It contains the journal of a broker.
     State,
-    /// Results are written there.
+    /// It contains results.
     Results,
-    /// Accepted files are published there.
+    /// It contains published accepted files.
     Gate,
 }
 
@@ -38,7 +38,8 @@ impl Purpose {
         }
     }
 
-    /// Name of the file in which the holder says who it is. It stays when nobody holds anything.
+    /// Returns the name of the file that identifies the owner. The file remains when the directory
+    /// is released.
     fn file(self) -> &'static str {
         match self {
             Purpose::State => "lock",
@@ -48,13 +49,13 @@ impl Purpose {
     }
 }
 
-/// Name of the file that tells a gate from any other directory.
+/// Name of the file that distinguishes a gate from other directories.
 pub const GATE_FILE: &str = ".qcbus-gate";
 
-/// Why a directory cannot be had, with the way out.
+/// Reason why a directory cannot be locked, with a remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
-    /// A broker has it.
+    /// Another broker has locked it.
     #[error(
         "{} is {} of another broker that runs ({holder}); stop that one with `qcbus down`, or give this one {}",
         to_text(directory), purpose.as_str(), purpose.way_out()
@@ -62,9 +63,9 @@ pub enum LockError {
     Taken {
         /// The directory.
         directory: PathBuf,
-        /// What it is to that broker.
+        /// Its purpose for that broker.
         purpose: Purpose,
-        /// Who.
+        /// The owner.
         holder: String,
     },
     /// Runs of `qcbus check` write into it.
@@ -76,35 +77,36 @@ pub enum LockError {
         /// The directory.
         directory: PathBuf,
     },
-    /// It cannot be taken.
+    /// The directory cannot be used.
     #[error("cannot write {}: {source}; choose {}", to_text(path), purpose.way_out())]
     Unusable {
         /// The directory, or the file in it.
         path: PathBuf,
-        /// What it was to be.
+        /// Its intended purpose.
         purpose: Purpose,
-        /// What the system says.
+        /// Error of the system.
         source: io::Error,
     },
 }
 
-/// A directory that is ours until this is dropped, or the process ends in whatever way.
+/// Lock of a directory. It lasts until this value is dropped or the process ends.
 #[derive(Debug)]
 pub struct DirectoryLock {
     locked: Mutex<Locked>,
     directory: PathBuf,
     purpose: Purpose,
-    /// The instance that has the directory alone; `None` when runs of `check` share it.
+    /// The instance that owns the directory alone. `None` if runs of `check` share it.
     instance: Option<String>,
-    /// The directory, if it was made for this and is to go with it as long as it is empty.
+    /// The directory if it was created for this lock. It is removed with the lock if it is empty.
     made: Option<PathBuf>,
 }
 
-/// What is open as long as a directory is ours.
+/// Files that are open as long as the directory is locked.
 #[derive(Debug)]
 struct Locked {
     file: File,
-    /// The directory itself, open so that none that is made later gets its inode. `None` where it cannot be opened.
+    /// The directory itself. It stays open so that no later directory gets its inode. `None` if it
+    /// cannot be opened.
     directory: Option<File>,
 }
 
@@ -118,10 +120,10 @@ impl Locked {
 }
 
 impl DirectoryLock {
-    /// Takes a directory for the broker of an instance alone.
+    /// Locks a directory for the broker of one instance.
     ///
     /// # Errors
-    /// [`LockError`]; each says what to do.
+    /// [`LockError`], each with a remedy.
     pub fn take(
         directory: &Path,
         purpose: Purpose,
@@ -139,10 +141,10 @@ impl DirectoryLock {
         })
     }
 
-    /// Takes a directory of results together with others that do the same: runs of `check`.
+    /// Locks a results directory together with other runs of `check`.
     ///
     /// # Errors
-    /// [`LockError`]; each says what to do.
+    /// [`LockError`], each with a remedy.
     pub fn share(directory: &Path) -> Result<DirectoryLock, LockError> {
         let made = (!directory.exists()).then(|| directory.to_path_buf());
         Ok(DirectoryLock {
@@ -154,11 +156,13 @@ impl DirectoryLock {
         })
     }
 
-    /// Makes sure that this is the lock of the directory that lies there now. Somebody may have removed the directory,
-    /// or put another one in its place: that one is taken then, and made if there is none.
+    /// Makes sure that this lock belongs to the directory that exists now. Another process may have
+    /// removed or replaced the directory. Then the new directory is locked, and created if
+    /// necessary.
     ///
     /// # Errors
-    /// When it cannot be taken, because another broker has it. Nothing may be written to it or removed from it then.
+    /// Returns an error if another broker has locked it. In this case no file in it may be written
+    /// or removed.
     pub fn hold(&self) -> Result<(), LockError> {
         let mut locked = self.locked();
         if is_in_place(&locked.file, &locked_at(&self.directory, self.purpose)) {
@@ -172,7 +176,7 @@ impl DirectoryLock {
         Ok(())
     }
 
-    /// Whether the directory that was taken lies there still.
+    /// Checks whether the locked directory still exists at its path.
     pub fn is_in_place(&self) -> bool {
         is_in_place(
             &self.locked().file,
@@ -180,7 +184,7 @@ impl DirectoryLock {
         )
     }
 
-    /// Whether the very directory that was taken lies there still, and its lock file was removed from it.
+    /// Checks whether the locked directory still exists at its path but its lock file was removed.
     pub fn has_lost_its_file(&self) -> bool {
         let locked = self.locked();
         let directory = locked.directory.as_ref();
@@ -188,7 +192,7 @@ impl DirectoryLock {
             && !is_in_place(&locked.file, &locked_at(&self.directory, self.purpose))
     }
 
-    /// The directory.
+    /// Returns the directory.
     pub fn directory(&self) -> &Path {
         &self.directory
     }
@@ -205,12 +209,14 @@ fn lock_alone(directory: &Path, purpose: Purpose, instance: &str) -> Result<File
         Err(TryLockError::WouldBlock) => return Err(refusal(&mut file, directory, purpose)),
         Err(TryLockError::Error(error)) => without_locks(directory, &error),
     }
-    // Only with the lock in hand: of two brokers that start at the same time, one at least sees the other.
+    // The check needs the lock: of two brokers that start at the same time, at least one sees the
+    // other.
     if purpose != Purpose::State {
         is_free_above(directory, purpose)?;
         is_free_below(directory)?;
     }
-    // Only for whoever is refused: on a full disk the lock holds without it.
+    // The error is ignored, because the text is only for rejected brokers. On a full disk the lock
+    // is valid without it.
     let _ = introduce(&mut file, directory, purpose, instance);
     Ok(file)
 }
@@ -228,7 +234,8 @@ fn lock_shared(directory: &Path) -> Result<File, LockError> {
     Ok(file)
 }
 
-/// Whether the file that is locked lies at a path. Where nothing can be told, it does: a write there fails by itself.
+/// Checks whether the locked file exists at a path. If this cannot be determined, the answer is
+/// yes, because a write there fails by itself.
 fn is_in_place(file: &File, path: &Path) -> bool {
     let identity = |data: std::fs::Metadata| (data.dev(), data.ino());
     match (
@@ -243,19 +250,20 @@ fn is_in_place(file: &File, path: &Path) -> bool {
 
 impl Drop for DirectoryLock {
     fn drop(&mut self) {
-        // It stays when there is anything in it, or somebody else uses it.
+        // The directory stays if it is not empty or if another process uses it.
         if let Some(made) = &self.made
             && self.locked().file.try_lock().is_ok()
         {
             let _ = std::fs::remove_dir(made);
         }
-        // A process that is being started at this moment has the descriptor, too, until it runs its program.
+        // The unlock is explicit, because a starting process also has the descriptor until it
+        // executes its program.
         let _ = self.locked().file.unlock();
     }
 }
 
-/// What is locked. Of results that is the directory itself: locking must not need any room, and
-/// must leave nothing behind.
+/// Returns the path that is locked. For results it is the directory itself, because locking must
+/// not need disk space or leave a file.
 fn locked_at(directory: &Path, purpose: Purpose) -> PathBuf {
     match purpose {
         Purpose::Results => directory.to_path_buf(),
@@ -283,8 +291,8 @@ fn open(directory: &Path, purpose: Purpose) -> Result<File, LockError> {
         .map_err(|source| fail(&path, source))
 }
 
-/// No broker may have a directory above, or this one as something else: what lies below is its
-/// results, too, or what it has not published and removes.
+/// Checks that no broker owns a parent directory, or this directory for another purpose. Otherwise
+/// its files would be results of that broker, or the gate would remove them as unpublished.
 fn is_free_above(directory: &Path, wanted: Purpose) -> Result<(), LockError> {
     for above in directory.ancestors() {
         for purpose in [Purpose::Results, Purpose::Gate] {
@@ -296,8 +304,8 @@ fn is_free_above(directory: &Path, wanted: Purpose) -> Result<(), LockError> {
     Ok(())
 }
 
-/// No broker may have a directory below: it would be one of two that write its results, or would be cleared as a
-/// part of the gate.
+/// Checks that no broker owns a subdirectory. Otherwise two brokers would write its results, or it
+/// would be cleared as a part of the gate.
 fn is_free_below(directory: &Path) -> Result<(), LockError> {
     let mut open = vec![directory.to_path_buf()];
     while let Some(next) = open.pop() {
@@ -305,7 +313,7 @@ fn is_free_below(directory: &Path) -> Result<(), LockError> {
             is_free(&next, Purpose::Results)?;
             is_free(&next, Purpose::Gate)?;
         }
-        // A directory that cannot be looked into holds nothing of ours either.
+        // A directory that cannot be read contains no locked directory either.
         let entries = std::fs::read_dir(&next).into_iter().flatten().flatten();
         let below = entries.filter(|it| it.file_type().is_ok_and(|it| it.is_dir()));
         open.extend(below.map(|it| it.path()));
@@ -324,7 +332,7 @@ fn is_free(directory: &Path, purpose: Purpose) -> Result<(), LockError> {
     }
 }
 
-/// A file system without locks is no reason to refuse the work.
+/// Warns that a file system has no locks. This is no reason to refuse the work.
 fn without_locks(directory: &Path, error: &io::Error) {
     let directory = to_text(directory);
     tracing::warn!("cannot lock {directory}, see to it that nobody else uses it: {error}");
@@ -355,7 +363,7 @@ fn refusal(file: &mut File, directory: &Path, purpose: Purpose) -> LockError {
     if purpose == Purpose::Results {
         text = std::fs::read_to_string(directory.join(purpose.file())).unwrap_or_default();
     } else {
-        // Whoever cannot be asked has not said.
+        // If the file cannot be read, the owner stays unknown.
         let _ = file.read_to_string(&mut text);
     }
     let holder = match text.trim().split_once(' ') {
@@ -369,7 +377,8 @@ fn refusal(file: &mut File, directory: &Path, purpose: Purpose) -> LockError {
     }
 }
 
-/// What is to be said of those directories into which others may write. Many want it so, and it has a price.
+/// Returns warnings about directories that other users may write to. This is often intended, but it
+/// has risks.
 pub fn open_to_others<'p>(
     directories: impl Iterator<Item = &'p Path>,
 ) -> impl Iterator<Item = String> {

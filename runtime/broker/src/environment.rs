@@ -1,7 +1,6 @@
-//! Where time, threads, the kernel's tellings and the processes around the broker come from: the
-//! system. Built for its unit tests, the broker takes them from a simulation where one runs (see
-//! `simulation`), so that one thread can play all that happens at once, in an order that a seed
-//! gives.
+//! Environment of the broker: the sources of time, threads, kernel events and surrounding
+//! processes. By default this is the system. In unit tests a running simulation can replace it (see
+//! `simulation`). Then one thread plays all concurrent events in an order that a seed determines.
 
 #[cfg(not(test))]
 mod system {
@@ -20,35 +19,35 @@ mod system {
     pub use qcbus_bus::Host;
     pub use tokio::task::spawn_blocking;
 
-    /// Whether all this is simulated.
+    /// Checks whether the environment is simulated.
     pub fn is_simulated() -> bool {
         false
     }
 
-    /// The time that passes.
+    /// Returns the monotonic time.
     pub fn now() -> Instant {
         Instant::now()
     }
 
-    /// The time of the day, which may be set.
+    /// Returns the time of day, which may be adjusted.
     pub fn wall_time() -> SystemTime {
         SystemTime::now()
     }
 
-    /// What `stat` says of the times of a file.
+    /// Returns the times of a file as reported by `stat`.
     pub fn stat(told: Stat) -> Stat {
         told
     }
 
-    /// What tells files apart when they are shared out: the path.
+    /// Returns the key that distinguishes files when they are distributed: the path.
     pub fn place(path: &Path) -> &Path {
         path
     }
 
-    /// Here others may come in between. No lock is held by who calls it.
+    /// Marks a point at which the simulation may run other threads. The caller must hold no lock.
     pub fn step(_what: &'static str, _path: &Path) {}
 
-    /// What the disk answers before it is asked: nothing.
+    /// Returns a simulated disk error. The system never has one.
     pub fn disk() -> io::Result<()> {
         Ok(())
     }

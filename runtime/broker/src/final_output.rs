@@ -1,5 +1,5 @@
-//! What children say before they have joined: it goes to the broker's log as it comes, and the end of it is kept for
-//! whoever wants to know why a bundle is not ready.
+//! Output of children before they join. It goes to the broker's log immediately. The last lines are
+//! kept to explain why a bundle is not ready.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::io::{Read as _, Write as _};
@@ -15,49 +15,50 @@ use tokio::sync::oneshot;
 
 use crate::core::Launch;
 
-/// The last lines that are kept of a child, and the bytes of each.
+/// Maximum number of lines that are kept of a child, and maximum bytes of each line.
 const LINES: usize = 8;
 const LINE: usize = 300;
-/// Children of which something is kept.
+/// Maximum number of children with kept output.
 const CHILDREN: usize = 64;
-/// After the end of a child its words have been read within this time, unless a process that it has left holds the
-/// other end.
+/// Maximum time for reading the remaining output after the end of a child. It is exceeded only if a
+/// left-over process holds the other end of the pipe.
 const READ_WITHIN: Duration = Duration::from_millis(500);
 
-/// The last words of children that have ended, by name.
+/// Final output of ended children, by name.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct FinalOutput(Arc<Mutex<Kept>>);
 
 #[derive(Debug, Default)]
 struct Kept {
     words: BTreeMap<String, Vec<String>>,
-    /// Those that have joined and have not ended: they said more since than was heard.
+    /// Running children that have joined. Their later output was not read here.
     joined: BTreeSet<Launch>,
 }
 
 impl FinalOutput {
-    /// The last lines that a child of this name has said, when it has ended.
+    /// Returns the last lines of an ended child of this name.
     pub fn of(&self, name: &str) -> Vec<String> {
         self.kept().words.get(name).cloned().unwrap_or_default()
     }
 
-    /// A process has joined: nobody asks what it said before.
+    /// Records that a process has joined. Its earlier output is no longer of interest.
     pub fn joined(&self, launch: Launch) {
         self.kept().joined.insert(launch);
     }
 
-    /// A process has not even begun: what the one before it said is not about this one.
+    /// Deletes the output of the previous process of this name, because the next process did not
+    /// even start.
     pub fn forget(&self, name: &str) {
         self.kept().words.remove(name);
     }
 
-    /// Takes down what a child has said that has just ended.
+    /// Stores the output of a child that has just ended.
     pub async fn take_down(&self, launch: Launch, name: String, heard: Option<Heard>) {
         let Some(heard) = heard else {
             self.kept().joined.remove(&launch);
             return;
         };
-        // The sender is dropped when everything was read.
+        // The sender is dropped when all output was read.
         let _ = tokio::time::timeout(READ_WITHIN, heard.read).await;
         let lines = heard
             .tail
@@ -78,16 +79,16 @@ impl FinalOutput {
     }
 }
 
-/// What is being heard of a child.
+/// Output that is being read from a child.
 #[derive(Debug)]
 pub(crate) struct Heard {
     tail: Arc<Mutex<Tail>>,
     read: oneshot::Receiver<()>,
 }
 
-/// Has what a child says on its stderr read by a thread, which hands it on to the broker's. The child is told the
-/// broker's stderr as well: a bundle goes over to it when it has joined, for it may outlive this broker. `None`: nothing
-/// is heard, and the child has the broker's stderr.
+/// Starts a thread that reads the child's stderr and forwards it to the broker's stderr. The child
+/// also receives the broker's stderr. A bundle switches to it after joining, because it may outlive
+/// this broker. Returns `None` if no output is read. The child then has the broker's stderr.
 #[expect(
     unsafe_code,
     reason = "only the new process itself can keep a descriptor open, between fork and exec"
@@ -100,8 +101,8 @@ pub(crate) fn listen_to(command: &mut Command) -> Option<Heard> {
     let stat = rustix::fs::fstat(&lasting).ok()?;
     let number = lasting.as_raw_fd();
     command.env(STDERR, format!("{number}:{}:{}", stat.st_dev, stat.st_ino));
-    // SAFETY: between fork and exec only fcntl is called. The descriptor belongs to the closure, which lives as long
-    // as the command.
+    // SAFETY: between fork and exec only fcntl is called. The descriptor belongs to the closure,
+    // which lives as long as the command.
     unsafe {
         command.pre_exec(
             move || match libc::fcntl(lasting.as_raw_fd(), libc::F_SETFD, 0) {
@@ -127,7 +128,7 @@ fn hear(reader: OwnedFd) -> Option<Heard> {
             kept.lock()
                 .unwrap_or_else(PoisonError::into_inner)
                 .add(said);
-            // Where nobody reads the log any more, there is nobody to tell.
+            // If the log has no reader, the error cannot be reported.
             let _ = std::io::stderr().write_all(said);
         }
     };
@@ -135,11 +136,11 @@ fn hear(reader: OwnedFd) -> Option<Heard> {
     Some(Heard { tail, read })
 }
 
-/// The end of a text that may be without end.
+/// Last lines of a text of unlimited length.
 #[derive(Debug, Default)]
 struct Tail {
     lines: VecDeque<Vec<u8>>,
-    /// The last line goes on.
+    /// Whether the last line is still incomplete.
     is_open: bool,
 }
 

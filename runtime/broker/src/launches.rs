@@ -1,8 +1,8 @@
-//! How a process proves that a broker of this instance started it, and as what.
+//! Proof that a broker of this instance started a process, and under which name.
 //!
-//! Every start gets a proof in its environment, which other users cannot read: launch, a digest with the
-//! instance's secret, name. The secret lies in the instance's directory as long as a broker may come that
-//! has to know the children of the one before.
+//! Every start gets a proof in its environment, which other users cannot read. The proof contains
+//! the launch, a digest with the instance's secret, and the name. The secret stays in the
+//! instance's directory while a later broker may need to recognise the children of its predecessor.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -15,10 +15,10 @@ use crate::core::Launch;
 
 /// Name of the file with the secret.
 const FILE: &str = "launches";
-/// Bytes of the secret.
+/// Size of the secret in bytes.
 const SECRET: usize = 32;
 
-/// What makes and knows the proofs of an instance.
+/// Creates and verifies the proofs of an instance.
 #[derive(Clone)]
 pub struct Launches {
     secret: [u8; SECRET],
@@ -32,10 +32,10 @@ impl std::fmt::Debug for Launches {
 }
 
 impl Launches {
-    /// Those of the instance with this directory. The secret is made when there is none.
+    /// Returns the proofs of the instance with this directory. Creates the secret if it is missing.
     ///
     /// # Errors
-    /// When it cannot be made.
+    /// When the secret cannot be created.
     pub fn of(instance_dir: &Path) -> std::io::Result<Launches> {
         let path = instance_dir.join(FILE);
         let kept = trust::read(&path, SECRET as u64);
@@ -49,14 +49,14 @@ impl Launches {
             let filled = rustix::rand::getrandom(&mut *empty, flags)?;
             empty = &mut empty[filled..];
         }
-        // Temporary files are their owner's alone.
+        // Only the owner can read temporary files.
         let mut file = tempfile::NamedTempFile::new_in(instance_dir)?;
         file.write_all(&secret)?;
         file.persist(&path)?;
         Ok(Launches { secret, path })
     }
 
-    /// What a process of this name is given in its environment.
+    /// Returns the proof for the environment of a process with this name.
     pub fn proof(&self, launch: Launch, name: &str) -> String {
         let mut hash = Sha256::new();
         hash.update(self.secret);
@@ -70,20 +70,20 @@ impl Launches {
         format!("{}:{digest}:{name}", launch.0)
     }
 
-    /// The launch and the name that a proof proves. `None`: it was not made here.
+    /// Returns the launch and the name of a valid proof, or `None` if it was not created here.
     pub fn proven<'p>(&self, proof: &'p str) -> Option<(Launch, &'p str)> {
         let (launch, rest) = proof.split_once(':')?;
         let (_, name) = rest.split_once(':')?;
         let launch = Launch(launch.parse().ok()?);
         let expected = self.proof(launch, name);
-        // In the same time wherever they differ.
+        // The comparison takes constant time, wherever the proofs differ.
         let differing = |(a, b): (u8, u8)| a ^ b;
         let differs = expected.bytes().zip(proof.bytes()).map(differing);
         let differs = differs.fold(0, |all, it| all | it);
         (expected.len() == proof.len() && differs == 0).then_some((launch, name))
     }
 
-    /// The start that a process of this machine belongs to, by its environment; `None` where that proves none.
+    /// Returns the launch of a local process by its environment, or `None` without a valid proof.
     pub fn of_process(&self, id: u32) -> Option<Launch> {
         let environment = Path::new("/proc").join(id.to_string()).join("environ");
         let environment = std::fs::read(environment).ok()?;
@@ -94,7 +94,7 @@ impl Launches {
         Some(launch)
     }
 
-    /// Removes the secret: nothing that could prove anything with it is left.
+    /// Removes the secret, so existing proofs become invalid.
     pub fn forget(&self) {
         // The directory may have been removed already.
         let _ = qcbus_disk::remove(&self.path);

@@ -1,10 +1,11 @@
-//! The broker: watches, reads, publishes, collects, judges, and keeps its word when anything dies.
+//! The broker: watches and reads files, publishes them, collects findings and decides verdicts,
+//! even when processes fail.
 //!
-//! `core` decides and does nothing; `engine` does and decides nothing. Everything else is a pair
-//! of hands: `watch` sees files, `intake` reads and publishes them, `store` and `writers` put
-//! results on the disk, `journal` remembers, `directory_lock` keeps others out, `supervise` starts
-//! and kills, `control` answers commands, `reload` reads configuration and manifests, `memory`
-//! gives back what was taken, `probes` look at files that may never answer.
+//! `core` decides and performs no action. `engine` performs actions and decides nothing. `watch`
+//! detects changes. `intake` reads and publishes files. `store` and `writers` put results on the
+//! disk. `journal` stores the state. `directory_lock` excludes other brokers. `supervise` starts
+//! and kills children. `control` answers commands. `reload` reads configuration and manifests.
+//! `memory` returns free memory. `probes` access files that may never answer.
 
 mod check_context;
 pub mod control;

@@ -1,4 +1,4 @@
-//! What a broker is told at its start.
+//! Options of a broker at its start.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -12,44 +12,44 @@ use crate::core::{ChildSpec, Settings};
 use crate::gate::Outside;
 use crate::reload::Adapter;
 
-/// Everything that a broker is told at its start.
+/// Options of a broker at its start.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// The instance that it is.
+    /// Instance of this broker.
     pub instance: Instance,
-    /// Directories to look through, absolute and without symbolic links.
+    /// Directories to search, absolute and without symbolic links.
     pub roots: Vec<PathBuf>,
     /// Single files to check, absolute.
     pub files: Vec<PathBuf>,
-    /// Whether to go on watching after the first look.
+    /// Whether to continue watching after the first scan.
     pub watch: bool,
-    /// Look around this often instead of relying on events.
+    /// Interval of scans that replace events.
     pub poll: Option<Duration>,
-    /// Look around this often even when events arrive.
+    /// Interval of scans in addition to events.
     pub rescan: Duration,
-    /// How long files must be quiet that are written in place, also once they are closed.
+    /// Time without changes that a file written in place must have, even after it is closed.
     pub settle: Option<Duration>,
     /// Directory of the results.
     pub out: PathBuf,
-    /// The directory of a single run, see [`crate::ResultPaths`].
+    /// Directory of a single run, see [`crate::ResultPaths`].
     pub here: Option<PathBuf>,
-    /// One file for the one result, instead of a directory of results.
+    /// Single file for the only result, in place of a directory of results.
     pub single_result: Option<PathBuf>,
-    /// Directory of the journal; none: nothing is remembered.
+    /// Directory of the journal. `None`: no state is stored.
     pub state: Option<PathBuf>,
-    /// How long the history of jobs is kept.
+    /// Retention time of the job history.
     pub retention: Duration,
-    /// What of all that would be demanded is asked for.
+    /// Selection among the required checkers.
     pub choice: Choice,
-    /// The form of the results.
+    /// Dialect of the results.
     pub dialect: Dialect,
-    /// Whether results are safe on the disk before they are announced.
+    /// Whether results are flushed to the disk before they are announced.
     pub durable: bool,
-    /// Whether a verdict file is written beside every result.
+    /// Whether a verdict file is written next to every result.
     pub verdict_files: bool,
     /// Directory in which accepted files are published.
     pub gate: Option<PathBuf>,
-    /// What becomes there of files that depend on others outside of the watched directories.
+    /// Treatment of accepted files that depend on files outside of the watched directories.
     pub gate_outside: Outside,
     /// The configuration file.
     pub config: Option<PathBuf>,
@@ -57,23 +57,23 @@ pub struct Options {
     pub bundles_d: Option<PathBuf>,
     /// The bundles and reporters that come with the program.
     pub standard: Vec<ChildSpec>,
-    /// How to start a reporter that the configuration names, by our name for it.
+    /// Start commands of reporters that the configuration may name, by their qcbus names.
     pub reporters: Vec<ChildSpec>,
-    /// What can be said beforehand of the bundles that come with the program, for looking at the
+    /// Known facts about the bundles that come with the program, used to validate the
     /// configuration.
     pub known: Known,
-    /// Who has one-shot modules of ASAM's framework take part as bundles.
+    /// Adapter that runs ASAM modules as bundles.
     pub adapter: Adapter,
-    /// Whether children die with the broker at once.
+    /// Whether children end immediately when the broker ends.
     pub die_with_broker: bool,
-    /// Whether bundles are confined.
+    /// Whether bundles run in the sandbox.
     pub sandbox: bool,
-    /// Most private memory of a child, in bytes.
+    /// Maximum private memory of a child, in bytes.
     pub memory_limit: Option<u64>,
-    /// Caps on what is read.
+    /// Limits for reading files.
     pub limits: Limits,
-    /// Shape of the bus.
+    /// Options of the bus.
     pub host: HostOptions,
-    /// Shape of the state machine.
+    /// Settings of the state machine.
     pub settings: Settings,
 }

@@ -1,4 +1,5 @@
-//! The program that runs here: where it lies, what else lies there by now, and the environment that it is part of.
+//! The running program: its path, a replacement at this path, and the environment that it belongs
+//! to.
 
 use std::ffi::OsString;
 use std::fs::Metadata;
@@ -11,33 +12,34 @@ use qcbus_disk::foreign;
 use qcbus_messages::path_text::to_text;
 use rustix::fs::{Access, access};
 
-/// What runs, whatever lies at its path by now. A child is it as well between fork and exec.
+/// Path of the running program, even if the file was replaced. Also valid between fork and exec.
 pub(crate) const RUNNING: &str = "/proc/self/exe";
 
-/// Most links that are followed from the path by which the program was called, as many as the kernel follows.
+/// Maximum number of links followed from the path by which the program was called. The kernel
+/// follows as many.
 const LINKS: usize = 40;
 
-/// Where this program lies.
+/// Location of this program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OwnProgram {
-    /// Without links, by which commands of its own children name it.
+    /// Path without links. Commands of the program's own children use it.
     path: PathBuf,
-    /// As it was called, which may be a link.
+    /// Path by which the program was called. It may be a link.
     called: PathBuf,
     environment: Option<Environment>,
 }
 
-/// Programs that lie beside this one, a Python interpreter among them.
+/// Directory of programs next to this one, including a Python interpreter.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Environment {
-    /// The directory of the programs.
+    /// Directory of the programs.
     programs: PathBuf,
-    /// It is a virtual environment of Python, so that all its programs belong together.
+    /// Whether it is a virtual environment of Python, so that all its programs belong together.
     is_virtual: bool,
 }
 
 impl OwnProgram {
-    /// This program, as it was when it was first asked for, which is at its start.
+    /// Returns the location of this program at the first call, which happens at its start.
     pub fn this() -> &'static OwnProgram {
         static THIS: LazyLock<OwnProgram> = LazyLock::new(OwnProgram::look);
         &THIS
@@ -54,26 +56,26 @@ impl OwnProgram {
         }
     }
 
-    /// Its path without links.
+    /// Returns the path without links.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Whether a command's first word is this program.
+    /// Checks whether the first word of a command is this program.
     pub(crate) fn is(&self, word: &str) -> bool {
-        // Commands are text.
+        // Commands are text, so the path is compared as text.
         self.path.to_string_lossy() == word
     }
 
-    /// The Python interpreter that lies beside it.
+    /// Returns the Python interpreter next to the program.
     pub fn python(&self) -> Option<PathBuf> {
         let environment = self.environment.as_ref()?;
         Some(environment.programs.join(PYTHON))
     }
 
-    /// Where programs are looked for by their names: `PATH`, behind the environment that this program is part of.
-    /// That need not have been activated, as in services. A directory with an interpreter that is no virtual
-    /// environment keeps its place in `PATH` if it has one: it may be the system's.
+    /// Returns the search path for programs: the environment of this program, followed by `PATH`.
+    /// The environment may be inactive, as in services. A directory with an interpreter that is no
+    /// virtual environment keeps its position in `PATH` if it has one. It may belong to the system.
     pub fn search_path(&self) -> OsString {
         let path =
             std::env::var_os("PATH").unwrap_or_else(|| "/usr/local/bin:/usr/bin:/bin".into());
@@ -83,7 +85,8 @@ impl OwnProgram {
         behind(environment, path)
     }
 
-    /// What lies at the program's path now when that is not what runs, for a person. Waits for the disk.
+    /// Returns a message for the user if another file, or none, is at the program's path. Waits for
+    /// the disk.
     pub(crate) fn replaced(&self) -> Option<String> {
         let shown = to_text(&self.called);
         let what = match foreign::metadata(&self.called) {
@@ -116,11 +119,11 @@ fn behind(environment: &Environment, path: OsString) -> OsString {
         return path;
     }
     let others = others.into_iter().filter(|it| it != own);
-    // A directory with a colon in its name cannot stand there.
+    // A directory with a colon in its name cannot be part of `PATH`.
     std::env::join_paths(std::iter::once(own.clone()).chain(others)).unwrap_or(path)
 }
 
-/// The path by which this program was called, looked up as a shell does.
+/// Returns the path by which this program was called, found as a shell does.
 fn called() -> Option<PathBuf> {
     let word = PathBuf::from(std::env::args_os().next()?);
     if word.components().count() > 1 {
@@ -141,12 +144,13 @@ fn is_same(a: &Metadata, b: &Metadata) -> bool {
     (a.dev(), a.ino()) == (b.dev(), b.ino())
 }
 
-/// The environment of a program that was called by this path: a link may lie in one as well as what it leads to. A
-/// virtual one counts before a mere directory with an interpreter.
+/// Returns the environment of a program that was called by this path. Both a link and its target
+/// may lie in one. A virtual environment has priority over a directory that only contains an
+/// interpreter.
 fn environment_of(called: &Path) -> Option<Environment> {
     let next = |path: &PathBuf| {
         let target = path.parent()?.join(std::fs::read_link(path).ok()?);
-        // Of the way only: the last name may be a link that lies in an environment.
+        // Only the parent is resolved: the last name may be a link inside an environment.
         Some(
             std::fs::canonicalize(target.parent()?)
                 .ok()?
@@ -176,7 +180,8 @@ mod tests {
 
     use super::*;
 
-    /// A directory with programs, and one with `pyvenv.cfg` above them.
+    /// Creates a directory with programs, optionally with `pyvenv.cfg` above it and an interpreter
+    /// in it.
     fn place(dir: &Path, name: &str, is_virtual: bool, has_python: bool) -> PathBuf {
         let programs = dir.join(name).join("bin");
         std::fs::create_dir_all(&programs).unwrap();
@@ -203,7 +208,7 @@ mod tests {
         assert_eq!(found(bare.join("qcbus")), None);
         assert_eq!(found(system.join("qcbus")), Some((system.clone(), false)));
         assert_eq!(found(venv.join("qcbus")), Some((venv.clone(), true)));
-        // A link that lies among other programs, and one in the environment that leads out of it.
+        // Two links outside lead into the environment. One link inside leads out of it.
         symlink("../../venv/bin/qcbus", bare.join("link")).unwrap();
         symlink(venv.join("qcbus"), system.join("link")).unwrap();
         symlink(bare.join("qcbus"), venv.join("link")).unwrap();

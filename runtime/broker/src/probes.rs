@@ -1,4 +1,4 @@
-//! Threads that look at files of others for those who must not wait for ever.
+//! Probe threads that access files of others, for callers that must not wait for ever.
 
 use std::collections::VecDeque;
 use std::io;
@@ -11,14 +11,14 @@ use qcbus_disk::foreign::IoWatchdog;
 
 use crate::environment::{is_simulated, spawn_blocking};
 
-/// How long the system may take to answer about a file. A disk that spins up takes less, one that is
-/// gone answers never.
+/// Maximum time for an answer of the system about a file. A disk that spins up needs less. A
+/// missing disk never answers.
 pub const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Threads that stay when there is nothing to look at.
+/// Number of idle threads that are kept.
 const RESERVE: usize = 4;
 
-/// Sends threads to look at files. Those that do not come back in time are given up.
+/// Runs file accesses on probe threads. Threads that do not return in time are abandoned.
 #[derive(Debug, Clone)]
 pub struct Probes {
     io_watchdog: Arc<IoWatchdog>,
@@ -54,18 +54,20 @@ struct Waiting {
 }
 
 impl Probes {
-    /// None yet; they are seen by `io_watchdog`, and given up after `patience`.
+    /// Creates an empty set of threads. `io_watchdog` monitors them and abandons them after
+    /// `patience`.
     pub fn new(io_watchdog: Arc<IoWatchdog>, patience: Duration) -> Probes {
         Probes {
             io_watchdog,
             orders: Arc::default(),
-            // Jobs are owners, too; their numbers never come here.
+            // Jobs are owners, too. Their numbers never reach this range.
             next: Arc::new(AtomicU64::new(1 << 63)),
             patience,
         }
     }
 
-    /// Has something looked at; the number tells whose visit it is to the lookout.
+    /// Runs a file access on a thread. The returned number identifies its owner for the I/O
+    /// watchdog.
     ///
     /// # Errors
     /// When no thread can be started.
@@ -88,10 +90,10 @@ impl Probes {
         Ok(owner)
     }
 
-    /// Has something looked at, and waits for what comes of it as long as the system answers.
+    /// Runs a file access on a thread and waits for its result as long as the system answers.
     ///
     /// # Errors
-    /// [`io::ErrorKind::TimedOut`] when it does not answer; what comes of it later is dropped.
+    /// [`io::ErrorKind::TimedOut`] when the system does not answer. A later result is dropped.
     pub fn within<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
@@ -101,7 +103,7 @@ impl Probes {
         }
         let (tell, told) = channel();
         let owner = self.send(move || {
-            // Whoever has given it up listens no more.
+            // If the caller has given up, the receiver is gone.
             let _ = tell.send(work());
         })?;
         loop {
@@ -134,7 +136,7 @@ impl Orders {
         }
     }
 
-    /// Waits for something to do; `None` when there are enough who wait.
+    /// Waits for the next work item. Returns `None` if enough threads are idle.
     fn next(&self) -> Option<(u64, Work)> {
         let mut waiting = self.lock();
         loop {
@@ -197,7 +199,7 @@ mod tests {
         let io_watchdog = Arc::new(IoWatchdog::default());
         let probes = Probes::new(io_watchdog.clone(), Duration::from_millis(50));
         let at = pipe.clone();
-        // Nothing of ours waits for a pipe; this does what a disk does that is gone.
+        // A visit opens no pipe, so this reads one directly to block like a missing disk.
         let lost = probes.within(move || foreign::access(&at, || std::fs::read(&at)));
         assert_eq!(lost.unwrap_err().kind(), io::ErrorKind::TimedOut);
         assert_eq!(io_watchdog.hanging(), std::slice::from_ref(&pipe));

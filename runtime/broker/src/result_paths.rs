@@ -1,4 +1,4 @@
-//! Where the result of a file goes.
+//! Mapping from files to the paths of their results.
 
 use std::collections::HashSet;
 use std::ffi::OsStr;
@@ -14,15 +14,15 @@ pub struct ResultPaths {
     pub roots: Vec<PathBuf>,
     /// Files given by name, absolute.
     pub files: HashSet<PathBuf>,
-    /// In a single run, the directory that it is run in: files have there the places that their
-    /// paths from here say, whatever else is given. A broker has none.
+    /// Working directory of a single run. The place of each file is its path relative to this
+    /// directory, whatever else is given. A broker has none.
     pub here: Option<PathBuf>,
-    /// All results go into one file of this name instead (`check -c`).
+    /// Single file for all results (`check -c`).
     pub single: Option<PathBuf>,
 }
 
 impl ResultPaths {
-    /// For a broker: results mirror the watched directories.
+    /// Creates the mapping for a broker: results mirror the watched directories.
     pub fn of_watched(out: PathBuf, roots: Vec<PathBuf>) -> ResultPaths {
         ResultPaths {
             out,
@@ -33,8 +33,8 @@ impl ResultPaths {
         }
     }
 
-    /// For a single run in the directory `here`: results mirror the paths from there, and those of
-    /// files elsewhere their paths from the root, so that equal names never share a result.
+    /// Creates the mapping for a single run in the directory `here`. Results mirror the paths from
+    /// there. Files elsewhere keep their paths from the root, so equal names never share a result.
     pub fn of_run(
         out: PathBuf,
         here: PathBuf,
@@ -48,7 +48,7 @@ impl ResultPaths {
         }
     }
 
-    /// The path for people: relative to the directory that is watched or in which they are.
+    /// Returns the path for display, relative to the watched directory or the working directory.
     pub fn display(&self, path: &Path) -> PathBuf {
         match &self.here {
             Some(here) => path.strip_prefix(here).unwrap_or(path).to_path_buf(),
@@ -56,7 +56,7 @@ impl ResultPaths {
         }
     }
 
-    /// Where a file lies among its like: below the results, or behind the gate.
+    /// Returns the relative place of a file, both below the results and behind the gate.
     pub fn relative(&self, path: &Path) -> PathBuf {
         if let Some(here) = &self.here {
             return below(path, here);
@@ -64,22 +64,22 @@ impl ResultPaths {
         match self.roots.as_slice() {
             [root] if path.starts_with(root) => below(path, root),
             roots if roots.iter().any(|root| path.starts_with(root)) => {
-                // Several directories: their own names keep their files apart.
+                // With several directories, their own names keep their files apart.
                 below(path, &common_ancestor(&roots.iter().collect::<Vec<_>>()))
             }
-            // Nobody's place: a bare name might be that of another file.
+            // The file belongs to no root, and a bare name might collide with another file.
             _ => below(path, Path::new("/")),
         }
     }
 
-    /// Whether the file is among those given or watched.
+    /// Checks whether the file is among the given or watched ones.
     pub fn contains(&self, path: &Path) -> bool {
         let is_below = |root: &PathBuf| path.starts_with(root) && !leads_upwards(path);
         self.files.contains(path) || self.roots.iter().any(is_below)
     }
 
-    /// Whether a result lies where this broker writes, so that it may remove it. No part of the path leads
-    /// upwards: results are named by what is below the directory.
+    /// Checks whether a result lies in this broker's directory, so that it may be removed. The path
+    /// must contain no `..`, because results are named by the path below the directory.
     pub fn owns(&self, xqar: &Path) -> bool {
         let below = xqar.strip_prefix(&self.out).ok();
         below.is_some_and(|it| {
@@ -88,42 +88,43 @@ impl ResultPaths {
         })
     }
 
-    /// The path for people of the file whose result lies there; `None` when it lies elsewhere.
+    /// Returns the path for display of the file with this result, or `None` if the result lies
+    /// elsewhere.
     pub fn shown_at(&self, xqar: &Path) -> Option<PathBuf> {
         let shown = xqar.strip_prefix(&self.out).ok()?;
         let name = shown.file_name()?.as_bytes().strip_suffix(b".xqar")?;
         Some(shown.with_file_name(OsStr::from_bytes(name)))
     }
 
-    /// Where the result of this file goes.
+    /// Returns the path of the result of this file.
     pub fn xqar(&self, path: &Path) -> PathBuf {
         self.single
             .clone()
             .unwrap_or_else(|| with_suffix(&self.out.join(self.relative(path)), ".xqar"))
     }
 
-    /// Where the verdict file of this file goes.
+    /// Returns the path of the verdict file of this file.
     pub fn verdict(&self, path: &Path) -> PathBuf {
         with_suffix(&self.out.join(self.relative(path)), ".verdict.json")
     }
 }
 
-/// Where the verdict file lies that belongs to a result.
+/// Returns the path of the verdict file that belongs to a result.
 pub fn verdict_beside(xqar: &Path) -> Option<PathBuf> {
     let stem = xqar.as_os_str().as_bytes().strip_suffix(b".xqar")?;
     let stem = Path::new(OsStr::from_bytes(stem));
     Some(with_suffix(stem, ".verdict.json"))
 }
 
-/// `path` with something put behind its name.
+/// Returns `path` with a suffix appended to its name.
 pub fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(suffix);
     PathBuf::from(name)
 }
 
-/// Whether a path has a `..`. References keep it only behind a symbolic link, or where there is nothing, so
-/// its words do not tell where it leads.
+/// Checks whether a path contains `..`. References keep it only after a symbolic link or a missing
+/// directory. The text of such a path does not show its target.
 pub fn leads_upwards(path: &Path) -> bool {
     path.components().any(|part| part == Component::ParentDir)
 }

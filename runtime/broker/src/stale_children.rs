@@ -1,4 +1,4 @@
-//! What former brokers of an instance have left running.
+//! Stale children: processes that former brokers of an instance have left running.
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -10,8 +10,9 @@ use qcbus_bus::Process;
 use crate::core::Launch;
 use crate::launches::Launches;
 
-/// Processes that former brokers of an instance have started, and what those have started. Their
-/// environments prove it: no list can miss one of a broker that was killed before it wrote the list.
+/// Processes that former brokers of an instance have started, and their descendants. They are
+/// identified by their environment. Unlike a list, this also covers a broker that was killed before
+/// it wrote the list.
 #[derive(Debug)]
 pub struct StaleChildren {
     launches: Launches,
@@ -19,18 +20,18 @@ pub struct StaleChildren {
 }
 
 impl StaleChildren {
-    /// Those started before this launch.
+    /// Returns the processes that were started before this launch.
     pub fn of(launches: &Launches, before: Launch) -> StaleChildren {
         let launches = launches.clone();
         StaleChildren { launches, before }
     }
 
-    /// Kills those of this start.
+    /// Kills the processes of this launch.
     pub fn kill_those_of(&self, launch: Launch) {
         self.kill(|it| it == launch);
     }
 
-    /// Kills those that are of none of these starts. Returns their process ids and programs.
+    /// Kills all processes except those of these launches. Returns their process ids and programs.
     pub fn kill_but(&self, joined: &BTreeSet<Launch>) -> Vec<(u32, String)> {
         self.kill(|launch| launch < self.before && !joined.contains(&launch))
     }
@@ -38,7 +39,8 @@ impl StaleChildren {
     fn kill(&self, is_meant: impl Fn(Launch) -> bool) -> Vec<(u32, String)> {
         let mut killed = Vec::new();
         for id in processes() {
-            // The handle first: what is read afterwards is of this process or of none.
+            // The handle comes first, so that all data read later belongs to this process or to
+            // none.
             let Some(process) = Process::open(id, None) else {
                 continue;
             };
@@ -64,7 +66,7 @@ fn of_process(id: u32) -> PathBuf {
     Path::new("/proc").join(id.to_string())
 }
 
-/// The first word of its command line.
+/// Returns the first word of its command line.
 fn program(id: u32) -> String {
     let line = std::fs::read(of_process(id).join("cmdline")).unwrap_or_default();
     let first = line.split(|byte| *byte == 0).next().unwrap_or_default();
@@ -81,10 +83,10 @@ mod tests {
 
     use super::*;
 
-    /// Starts a process with this proof, or without one.
+    /// Starts a process with or without this proof.
     fn start(proof: Option<&str>) -> Child {
         let mut command = Command::new("sh");
-        // Its command line says whatever it likes.
+        // The command line of a process proves nothing.
         command.args(["-c", "sleep 1000; true", "sh", "--launch", "1099511627776"]);
         command.process_group(0);
         command
@@ -95,7 +97,7 @@ mod tests {
 
     fn ends(mut child: Child) -> bool {
         let runs = child.try_wait().unwrap().is_none();
-        // With what it has started.
+        // This also kills the processes that it has started.
         let group = Pid::from_child(&child);
         kill_process_group(group, Signal::KILL).unwrap();
         child.wait().unwrap();
@@ -112,7 +114,7 @@ mod tests {
         });
         let [first, joined, now] = [1, 2, 3].map(Launch::first_of);
         let proof = here.proof(first, "a");
-        // Whatever it starts, in whatever session, is of the same start.
+        // All descendants belong to the same launch, in any session.
         let mut grandchild = Command::new("sh");
         grandchild.args(["-c", "setsid sleep 1000 & wait"]);
         let grandchild = grandchild
@@ -136,7 +138,7 @@ mod tests {
         assert!(!others.iter().any(|it| told(it.id())), "{killed:?}");
         let spared = others.map(ends);
         assert_eq!((last, spared), ([false; 2], [true; 5]));
-        // What was just being started is found by the next look.
+        // The next iteration finds processes that were just being started.
         while !stale_children
             .kill_but(&BTreeSet::from([joined]))
             .is_empty()

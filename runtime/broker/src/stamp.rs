@@ -1,4 +1,4 @@
-//! What `stat` says of a file.
+//! Stamps of files, taken from `stat`.
 
 use std::ffi::OsString;
 use std::fs::Metadata;
@@ -14,18 +14,18 @@ use qcbus_ingest::{Content, Stat};
 use crate::core::Stamp;
 use crate::environment::{stat, wall_time};
 
-/// The stamp of a regular file, which may lie behind a symbolic link; `None` for anything else, a
-/// link that leads nowhere or back to itself for instance.
+/// Returns the stamp of a regular file, which may be behind a symbolic link. Returns `None` for
+/// anything else, for example a dangling link or a link loop.
 ///
 /// # Errors
-/// Whatever `stat` says, other than that there is no such file: there may be one.
+/// Any error of `stat` other than a missing file, because the file may exist.
 pub fn stamp_of(path: &Path) -> io::Result<Option<Stamp>> {
     match foreign::metadata(path) {
         Ok(data) if data.is_file() => Ok(Some(from_metadata(&data))),
         Ok(_) => Ok(None),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) if error.raw_os_error() == Some(libc::ENOTDIR) => Ok(None),
-        // The path itself is that link, not a directory on the way to a file that may be there.
+        // The path itself is the looping link, not a directory above a file that may exist.
         Err(error)
             if error.raw_os_error() == Some(libc::ELOOP)
                 && foreign::is_symlink(path).unwrap_or(false) =>
@@ -36,9 +36,10 @@ pub fn stamp_of(path: &Path) -> io::Result<Option<Stamp>> {
     }
 }
 
-/// The stamp of a file that may be reached through symbolic links, as dependencies may. A
-/// directory's stamp tells its scenarios: it changes when one comes or goes, not when something
-/// else, such as a result, is written there. A pipe or a device has one, too: it is not the same as nothing.
+/// Returns the stamp of a file that may be reached through symbolic links, as dependencies may. The
+/// stamp of a directory describes its scenarios: it changes when one appears or disappears, not
+/// when another file, such as a result, is written there. A pipe or a device has a stamp, too,
+/// because it differs from a missing file.
 pub fn stamp_through_links(path: &Path) -> Option<Stamp> {
     let data = foreign::metadata(path).ok()?;
     if data.is_file() {
@@ -54,10 +55,11 @@ pub fn stamp_through_links(path: &Path) -> Option<Stamp> {
     }
 }
 
-/// The time of change of a directory's stamp: one that no file can have, centuries ago.
+/// Time of change in a directory's stamp. No file can have it, because it is centuries ago.
 const LISTED: i128 = i64::MIN as i128;
 
-/// The same of what is neither file nor directory, whose own times tell who used it.
+/// Time of change for entries that are neither file nor directory. Their own times only show their
+/// use.
 const NO_FILE: i128 = LISTED + 1;
 
 fn listing(directory: &Path, inode: u64) -> Option<Stamp> {
@@ -68,7 +70,7 @@ fn listing(directory: &Path, inode: u64) -> Option<Stamp> {
         .map(|entry| entry.file_name())
         .collect();
     names.sort();
-    // FNV-1a, because equal names must give equal stamps in every process.
+    // FNV-1a is used because equal names must give equal stamps in every process.
     let bytes = names
         .iter()
         .flat_map(|name| name.as_encoded_bytes().iter().copied().chain([0]));
@@ -77,24 +79,24 @@ fn listing(directory: &Path, inode: u64) -> Option<Stamp> {
     });
     Some(Stamp {
         size: names.len() as u64,
-        // Not after 1970, so that nobody takes it for a time that is still young.
+        // The value is not after 1970, so it never counts as a recent time.
         mtime_ns: -i128::from(hash),
         ctime_ns: LISTED,
         inode,
     })
 }
 
-/// Whether this is the stamp of a directory, as [`stamp_through_links`] gives it.
+/// Checks whether this is the stamp of a directory, as [`stamp_through_links`] returns it.
 pub fn is_listing(stamp: &Stamp) -> bool {
     stamp.ctime_ns == LISTED
 }
 
-/// The stamp in what `stat` returned.
+/// Returns the stamp from the result of `stat`.
 pub fn from_metadata(data: &Metadata) -> Stamp {
     from_stat(data.len(), Stat::of(data))
 }
 
-/// The stamp in what `fstatat` returned.
+/// Returns the stamp from the result of `fstatat`.
 pub fn from_statat(data: &rustix::fs::Stat) -> Stamp {
     let time = |seconds, rest| i128::from(seconds) * 1_000_000_000 + rest;
     let told = Stat {
@@ -105,9 +107,9 @@ pub fn from_statat(data: &rustix::fs::Stat) -> Stamp {
     from_stat(u64::try_from(data.st_size).unwrap_or_default(), told)
 }
 
-/// The stamp of a file as it was read.
+/// Returns the stamp of a file as it was read.
 pub fn from_content(content: &Content) -> Stamp {
-    // Bytes that are of no file have the stamp of none.
+    // Bytes that do not come from a file have the default stamp.
     content
         .stat
         .map_or_else(Stamp::default, |stat| from_stat(content.size, stat))
@@ -123,23 +125,24 @@ fn from_stat(size: u64, told: Stat) -> Stamp {
     }
 }
 
-/// A file that was changed this recently may change again without its stamp telling.
+/// Time after a change in which a file may change again with the same stamp.
 const RACY: Duration = Duration::from_secs(2);
 
-/// How far the clock of a file server may be ahead of ours.
+/// Maximum time by which the clock of a file server may be ahead of the local one.
 const AHEAD: Duration = Duration::from_secs(3600);
 
-/// Whether a file has changed so recently that its stamp proves nothing.
+/// Checks whether a file changed so recently that its stamp proves nothing.
 pub fn is_racy(stamp: Stamp) -> bool {
     is_younger(stamp, RACY)
 }
 
-/// Whether a file was changed within that time. Both its times count: a copy may carry an old time
-/// of modification, and some file systems have no true time of change.
+/// Checks whether a file was changed within that time. Both of its times count: a copy may have an
+/// old time of modification, and some file systems have no true time of change.
 ///
-/// A time of modification that is still to come was set at will and says nothing. A time of change
-/// that is still to come is another machine's, whose clock is ahead, or ours was set back; beyond
-/// an hour it can only be the latter, and then another change would bear another time.
+/// A modification time in the future was set explicitly and proves nothing. A time of change in the
+/// future has two possible causes: another machine's clock is ahead, or the local clock was set
+/// back. More than an hour ahead only the latter is possible, and then another change would have a
+/// different time.
 pub fn is_younger(stamp: Stamp, limit: Duration) -> bool {
     let now = wall_time().duration_since(UNIX_EPOCH);
     was_younger(stamp, limit, nanoseconds(now.unwrap_or_default()))
@@ -165,7 +168,7 @@ pub(crate) mod tests {
 
     const HOUR: Duration = Duration::from_secs(3600);
 
-    /// Writes a file in place, so that it stays the same one, and sets its time.
+    /// Writes a file in place, so that it keeps its inode, and sets its time.
     pub(crate) fn put(path: &Path, bytes: &[u8], modified: SystemTime) -> Stamp {
         let mut file = File::options()
             .create(true)
@@ -208,7 +211,8 @@ pub(crate) mod tests {
         let path = dir.path().join("a.xodr");
         let time = SystemTime::now() - HOUR;
         let before = put(&path, b"one", time);
-        // The clock of the file system moves in steps: only a later change is told apart.
+        // The clock of the file system advances in steps, so only a later change is
+        // distinguishable.
         let after = std::iter::repeat_with(|| put(&path, b"two", time))
             .find(|after| *after != before)
             .unwrap();

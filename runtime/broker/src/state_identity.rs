@@ -1,7 +1,8 @@
-//! Which directory a state belongs to, so that a copied or moved one says so.
+//! Identity of a state directory, to detect that it was copied or moved.
 //!
-//! A state directory is copied for a backup or a staging farm. What its journal names are the results of the
-//! farm it was copied from; this broker leaves them alone, and tells the operator why it judges everything anew.
+//! A state directory may be copied for a backup or a staging farm. Its journal then names the
+//! results of the original farm. This broker leaves them alone and tells the user why it judges
+//! everything again.
 
 use std::io;
 use std::os::unix::fs::MetadataExt;
@@ -13,27 +14,27 @@ use serde::{Deserialize, Serialize};
 
 use crate::options::Options;
 
-/// Name of the file in the state directory. It has no suffix: whoever looks for reports below the directory of
-/// results must not take it for one.
+/// Name of the file in the state directory. It has no suffix, so that a search for reports below
+/// the directory of results does not find it.
 const FILE: &str = "belongs-to";
 
-/// Most bytes of that file: two paths and a number.
+/// Maximum size of that file in bytes: two paths and a number.
 const MOST: u64 = 64 << 10;
 
-/// What a state directory belongs to.
+/// Identity of a state directory.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Identity {
     /// Absolute path of the state directory.
     state: String,
-    /// Inode number of the state directory. Its device number is no help: overlay, NFS and btrfs get another one
-    /// with every mount.
+    /// Inode number of the state directory. The device number is not used, because it changes with
+    /// every mount of overlay, NFS and btrfs.
     inode: u64,
     /// Absolute path of the directory of results.
     out: String,
 }
 
-/// Returns what a person should know of the state directory: that it was copied or moved, or that results go
-/// elsewhere than before. `None` where there is no state, or nothing has changed.
+/// Returns a message for the user if the state directory was copied or moved, or if results now go
+/// elsewhere. Returns `None` without a state directory or without a change.
 pub fn difference_of(options: &Options) -> Option<String> {
     let state = options.state.as_deref()?;
     identify(state, &options.out, options.durable).unwrap_or_else(|error| {
@@ -42,10 +43,11 @@ pub fn difference_of(options: &Options) -> Option<String> {
     })
 }
 
-/// Compares a state directory with what it was when a broker last used it, and writes what it is now.
+/// Compares a state directory with its identity at the last use by a broker, and writes the current
+/// identity.
 ///
 /// # Errors
-/// When the directory cannot be looked at or written to.
+/// When the directory cannot be accessed or written to.
 fn identify(state: &Path, out: &Path, durable: bool) -> io::Result<Option<String>> {
     let data = std::fs::metadata(state)?;
     let now = Identity {
@@ -136,7 +138,7 @@ mod tests {
         let file = dir.path().join(FILE);
         let mut written: serde_json::Value =
             serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
-        written["device"] = 1_u64.into(); // as the version before wrote it, under another mount
+        written["device"] = 1_u64.into(); // The previous version wrote it like this, under another mount.
         std::fs::write(&file, written.to_string()).unwrap();
         assert_eq!(said(dir.path(), "/out"), None);
     }

@@ -1,4 +1,4 @@
-//! Starting and killing child processes. When to do so is the state machine's business.
+//! Starts and kills child processes. The state machine decides when.
 
 mod ends;
 mod limits;
@@ -27,52 +27,52 @@ use crate::stale_children::StaleChildren;
 use ends::{kill_early, watch};
 use limits::restrict;
 
-/// Looks for orphans at the end, two milliseconds apart.
+/// Maximum number of searches for descendants at the end, two milliseconds apart.
 const DESCENDANTS_AT_MOST: u32 = 500;
-/// How long one that is killed is waited for before orphans are looked for.
+/// Maximum time to wait for the end of killed children before the search for descendants.
 const DIES_WITHIN: Duration = Duration::from_millis(20);
 
-/// What every child is given.
+/// Options that apply to every child.
 #[derive(Debug, Clone)]
 pub struct Surroundings {
     /// Runtime directory of the instance, for `--instance-dir`.
     pub instance_dir: PathBuf,
-    /// Whether children die with the broker at once (a private instance), or may outlive it and
+    /// Whether children end immediately with the broker (a private instance), or may outlive it and
     /// join the next one.
     pub die_with_broker: bool,
-    /// Whether bundles are confined.
+    /// Whether bundles run in the sandbox.
     pub sandbox: bool,
-    /// Most private memory (data segment and anonymous mappings) of a child, in bytes. The shared
-    /// segment does not count: it is mapped from a file.
+    /// Maximum private memory (data segment and anonymous mappings) of a child, in bytes. The
+    /// shared segment does not count, because it is mapped from a file.
     pub memory_limit: Option<u64>,
-    /// How many files a child may have open, where that is not what the broker has.
+    /// Limit of open files of a child, if it differs from the broker's limit.
     pub descriptors: Option<Rlimit>,
 }
 
-/// The children of this broker.
+/// Child processes of this broker.
 #[derive(Debug)]
 pub struct Children {
     surroundings: Surroundings,
     launches: Launches,
     first: Launch,
-    /// What was started before the state machine has asked for it, see [`Children::start_early`].
+    /// Children started before the state machine requests them, see [`Children::start_early`].
     early: BTreeMap<Launch, (ChildSpec, Started)>,
-    /// What this broker has started.
+    /// Children that this broker has started.
     own: BTreeMap<Launch, Own>,
-    /// What former brokers have started and has joined this one.
+    /// Stale children of earlier brokers that have joined this one.
     adopted: BTreeMap<Launch, Process>,
     strangers: Strangers,
     final_output: FinalOutput,
     events: UnboundedSender<Event>,
 }
 
-/// What this broker has started, until its end was told.
+/// A child that this broker has started. It is kept until its end is reported.
 #[derive(Debug)]
 struct Own {
     name: String,
-    /// Its id, also when it has ended and nobody has waited for it yet.
+    /// Process id. It is also set for an ended child that is not reaped yet.
     pid: Option<u32>,
-    /// `None` when it had ended before it was asked for.
+    /// Handle of the process, or `None` if the child ended before the handle was opened.
     process: Option<Process>,
 }
 
@@ -84,7 +84,8 @@ struct Started {
 }
 
 impl Children {
-    /// No children yet of the broker of this generation. Their ends are told to `events`.
+    /// Creates an empty set of children for the broker of this generation. Their ends are sent to
+    /// `events`.
     pub fn new(
         surroundings: Surroundings,
         launches: Launches,
@@ -104,9 +105,10 @@ impl Children {
         }
     }
 
-    /// Starts what the state machine is going to ask for first, as it will number it: processes get ready while the
-    /// bus is set up, and wait for it. What it does not ask for ends with this; what cannot be started now is tried
-    /// when it does.
+    /// Starts the children that the state machine will request first, with the same numbers. They
+    /// prepare while the bus is set up, and wait for it. Children that are not requested are killed
+    /// when this value is dropped. A child that cannot be started now is tried again at the
+    /// request.
     pub fn start_early(&mut self, specs: &[ChildSpec]) {
         let specs: BTreeMap<&str, &ChildSpec> =
             specs.iter().map(|it| (it.name.as_str(), it)).collect();
@@ -119,7 +121,7 @@ impl Children {
         }
     }
 
-    /// Whether these are the children of the broker of this generation.
+    /// Checks whether these are the children of the broker of this generation.
     pub fn are_of(&self, generation: u64) -> bool {
         self.first == Launch::first_of(generation)
     }
@@ -136,7 +138,7 @@ impl Children {
         };
         match started {
             Ok(started) => {
-                // Nobody has waited for it yet, so the id is its own.
+                // The child is not reaped yet, so the id certainly belongs to it.
                 let pid = started.child.id();
                 let own = Own {
                     name: spec.name.clone(),
@@ -150,7 +152,7 @@ impl Children {
             Err(why) => {
                 self.final_output.forget(&spec.name);
                 let end = ChildEnd::NotStarted(why);
-                // The loop that receives this is the one that called; it is there.
+                // The receiving loop is the caller, so the receiver exists.
                 let _ = self.events.send(Event::Exited { launch, end });
             }
         }
@@ -181,7 +183,7 @@ impl Children {
         if spec.role == Role::Bundle {
             self.confine(&mut command, spec)
                 .map_err(|error| format!("cannot confine it: {error}"))?;
-            // What this program prints are verdicts; no bundle prints any.
+            // The stdout of this program contains verdicts only, so bundles must not write to it.
             let said = std::io::stderr().as_fd().try_clone_to_owned();
             command.stdout(said.map_or_else(|_| Stdio::null(), Stdio::from));
         }
@@ -193,17 +195,19 @@ impl Children {
         })
     }
 
-    /// Whoever adds a bundle to a broker that stays wants to know what it says when it does not get ready.
+    /// Checks whether the output of a child is read. The user needs it if an added bundle does not
+    /// become ready.
     fn listens_to(&self, spec: &ChildSpec) -> bool {
         !self.surroundings.die_with_broker && reload::command_of(&spec.command).is_some()
     }
 
-    /// The last lines that a child has said that has ended.
+    /// Returns the last lines of output of an ended child.
     pub fn final_output(&self, name: &str) -> Vec<String> {
         self.final_output.of(name)
     }
 
-    /// Reporters write files where they are told to, and are ours; bundles are not.
+    /// Puts a bundle into the sandbox. Reporters are trusted and write files anywhere, so they run
+    /// outside.
     fn confine(&self, command: &mut Command, spec: &ChildSpec) -> Result<(), SandboxError> {
         let command = command.as_std_mut();
         if !self.surroundings.sandbox {
@@ -214,7 +218,8 @@ impl Children {
         Ok(())
     }
 
-    /// How far a bundle is confined, by what the kernel says of its process: it is not asked itself.
+    /// Returns the sandbox state of a bundle as the kernel reports it. The bundle itself is not
+    /// asked.
     pub fn sandbox_of(&self, peer: &PeerStatus) -> Option<SandboxStatus> {
         let there = peer.role == "bundle" && peer.pid != 0 && peer.state != "down";
         if !there || peer.state == "starting" {
@@ -223,7 +228,7 @@ impl Children {
         let mut own = self.own.values().filter_map(|it| it.process.as_ref());
         let is_ours = own.any(|it| it.id() == peer.pid || descendants::is_below(peer.pid, it.id()));
         let surrounded = self.surroundings.sandbox && is_ours;
-        // One that a former broker has started has them, too; one that was started by hand confines itself to nothing.
+        // A stale child has these filters, too. A bundle that was started manually has no sandbox.
         let sandbox = if self.surroundings.sandbox {
             Outer::FILTERS
         } else {
@@ -247,15 +252,15 @@ impl Children {
         })
     }
 
-    /// Forgets a child that has ended.
+    /// Removes a child that has ended.
     pub fn ended(&mut self, launch: Launch) {
         self.own.remove(&launch);
         self.sweep();
     }
 
-    /// Kills and buries what children that have ended, or hidden it, have left. Meant to be called now and then:
-    /// where the kernel keeps no list of children it is left to the next end of a child, for looking through all
-    /// processes takes too long.
+    /// Kills and reaps descendants left behind by children that have ended or that hide it. Must be
+    /// called periodically. Without the kernel's lists of children this happens only at the end of
+    /// a child. A search through all processes takes too long.
     pub fn look_for_descendants(&self) {
         if descendants::are_listed() {
             self.sweep();
@@ -266,8 +271,8 @@ impl Children {
         descendants::sweep(&self.ours(), &self.strangers, &self.launches);
     }
 
-    /// The processes that somebody watches, by their ids: one that ends at once is waited for by its watcher, and would
-    /// have no exit code if it was buried as an orphan.
+    /// Returns the ids of the watched processes. Their watchers must reap them. If such a process
+    /// were reaped as a descendant, its exit code would be lost.
     fn ours(&self) -> BTreeMap<Launch, Option<u32>> {
         let own = self.own.iter().map(|(launch, it)| (*launch, it.pid));
         let early = self.early.iter();
@@ -275,11 +280,11 @@ impl Children {
         own.chain(early).collect()
     }
 
-    /// A process has joined as a child: is it the one that a broker of this instance has started, under
-    /// this very name? `proof` is what its environment says. From now on it can be killed.
+    /// Checks whether a joined process is the one that a broker of this instance has started under
+    /// this name. `proof` is the value in its environment. From now on the process can be killed.
     ///
     /// # Errors
-    /// Why it is not believed, for a person.
+    /// A reason for the user why the process is not accepted.
     pub fn joined(
         &mut self,
         launch: Launch,
@@ -312,7 +317,8 @@ impl Children {
         Ok(())
     }
 
-    /// Kills a child with its process group: one of this broker, or one of a former that has joined.
+    /// Kills a child with its process group. It may be a child of this broker, or a stale child
+    /// that has joined.
     pub fn kill(&self, launch: Launch) {
         let own = self.own.get(&launch).and_then(|it| it.process.as_ref());
         if let Some(process) = own.or(self.adopted.get(&launch)) {
@@ -322,35 +328,37 @@ impl Children {
             process.kill();
         }
         if self.adopted.contains_key(&launch) {
-            // The process that has joined need not be the first of those that were started.
+            // The process that has joined may be a descendant of the started one.
             StaleChildren::of(&self.launches, Launch(u64::MAX)).kill_those_of(launch);
         }
     }
 
-    /// What former brokers of this instance have started; `None` where children die with their broker.
+    /// Returns the stale children of this instance, or `None` if children end with their broker.
     pub fn stale_children(&self) -> Option<StaleChildren> {
         let may_be = !self.surroundings.die_with_broker;
         may_be.then(|| StaleChildren::of(&self.launches, self.first))
     }
 
-    /// Kills whatever is left, also what it has started. [`Children::bury_all`] sees to it that nothing has escaped.
+    /// Kills all remaining children and their descendants. [`Children::bury_all`] finds escaped
+    /// processes.
     pub fn kill_all(&self) {
         for launch in self.own.keys() {
             self.kill(*launch);
         }
     }
 
-    /// Waits until nobody is left of those who were killed, and of those who have come to us by that.
+    /// Waits until all killed children have ended, and kills and reaps their remaining descendants.
     pub fn bury_all(&self) {
         let until = Instant::now() + DIES_WITHIN;
         for own in self.own.values() {
             let left = until.saturating_duration_since(Instant::now());
             if let Some(process) = &own.process {
-                // One that does not is looked at below.
+                // The loop below handles a process that does not end in time.
                 let _ = process.ends_within(left);
             }
         }
-        // One that ends hands over what it has started; hence more than one look, but not for ever.
+        // An ended process passes on its children, so several searches are needed. Their number is
+        // limited.
         let nobody = BTreeMap::new();
         for _ in 0..DESCENDANTS_AT_MOST {
             if descendants::sweep(&nobody, &self.strangers, &self.launches) == 0 {
@@ -360,15 +368,15 @@ impl Children {
         }
     }
 
-    /// Kills whatever brokers of this instance have ever started, and what that has started, also where it
-    /// has left its group or its session.
+    /// Kills all processes that brokers of this instance have ever started, and their descendants.
+    /// Processes that have left their group or session are included.
     pub fn kill_what_they_started(&self) {
         if !self.surroundings.die_with_broker {
             StaleChildren::of(&self.launches, Launch(u64::MAX)).kill_but(&BTreeSet::new());
         }
     }
 
-    /// The end: nobody can prove any more that this broker has started it.
+    /// Invalidates all proofs of launches when the broker ends.
     pub fn forget_launches(&self) {
         self.launches.forget();
     }
@@ -381,8 +389,9 @@ impl Drop for Children {
     }
 }
 
-/// What runs as this broker is started again as it is: another version may lie at its path by now, or nothing. The
-/// programs of others are started from where they lie.
+/// Returns the command for a program. The broker's own program is started from the running image,
+/// because another version may be at its path, or none. Other programs are started from their
+/// paths.
 fn command_of(program: &str) -> Command {
     if !OwnProgram::this().is(program) {
         return Command::new(program);

@@ -1,5 +1,5 @@
-//! The verdict file `NAME.verdict.json` beside a result: everything that a farm needs to decide,
-//! without reading the result itself.
+//! The verdict file `NAME.verdict.json` next to a result. It contains all information that a farm
+//! needs to decide without reading the result itself.
 
 use std::path::Path;
 
@@ -11,28 +11,28 @@ use serde::Serialize;
 
 use crate::core::{FinishedJob, Input, Judged, RequiredBundle, RequiredSet, RestsOn};
 
-/// Version of the form.
+/// Version of the format.
 pub const FORMAT: u32 = 1;
 
-/// The content of a verdict file. Fields are only ever added.
+/// Content of a verdict file. Existing fields never change; new fields may be added.
 #[derive(Debug, Serialize)]
 pub struct VerdictFile<'a> {
     format: u32,
     verdict: Verdict,
-    /// The verdict without the files that it rests on.
+    /// Verdict without the files that it depends on.
     own: Verdict,
     input_file: String,
     sha256: String,
-    /// The files with verdicts of their own that it rests on.
+    /// Dependencies with verdicts of their own.
     rests_on: Vec<RestsOnLine>,
     depends_on: Vec<Dependency>,
     configuration_sha256: String,
     qcbus_version: &'a str,
-    /// Of who must judge: counts up with every change of that.
+    /// Epoch of the required set. It increases with every change of the set.
     epoch: u64,
-    /// The bundles that had to judge in this epoch.
+    /// Bundles that were required in this epoch.
     demanded: Vec<&'a str>,
-    /// Those of them that were not there.
+    /// Required bundles that were missing.
     absent: Vec<&'a str>,
     bundles: Vec<BundleLine<'a>>,
     errors: u64,
@@ -41,13 +41,13 @@ pub struct VerdictFile<'a> {
     filtered: u64,
     skipped: Vec<CheckerLine<'a>>,
     failed: Vec<CheckerLine<'a>>,
-    /// What keeps the verdict undetermined.
+    /// Open points that keep the verdict undetermined.
     open: Vec<CheckerLine<'a>>,
-    /// Bundles of which a configuration left checkers out.
+    /// Bundles with checkers that the configuration excludes.
     not_asked: Vec<NotAskedLine>,
     result: String,
-    /// Files that the verdict depends on and that do not lie behind the gate with it, because they
-    /// lie outside of the watched directories; absent when there is no gate.
+    /// Dependencies that are not published behind the gate with the file, because they lie outside
+    /// of the watched directories. Missing if there is no gate.
     #[serde(skip_serializing_if = "Option::is_none")]
     outside_gate: Option<Vec<String>>,
 }
@@ -56,9 +56,9 @@ pub struct VerdictFile<'a> {
 struct RestsOnLine {
     path: String,
     sha256: String,
-    /// `null` while there was none on these bytes.
+    /// `null` if there was no verdict on these bytes yet.
     verdict: Option<Verdict>,
-    /// Errors of its own.
+    /// Number of errors of its own.
     errors: u64,
 }
 
@@ -89,7 +89,7 @@ struct NotAskedLine {
     of: usize,
 }
 
-/// The text of a verdict file.
+/// Returns the text of a verdict file.
 pub fn render(
     job: &FinishedJob,
     pooled: &Pooled,
@@ -142,9 +142,9 @@ pub fn render(
         result: judged.xqar.as_deref().map(to_text).unwrap_or_default(),
         outside_gate: outside_gate.map(|paths| paths.into_iter().map(to_text).collect()),
     };
-    // A line for each of a few hundred checkers.
+    // There may be one line for each of a few hundred checkers.
     let mut text = Vec::with_capacity(32 << 10);
-    // Into memory, and of text and numbers alone: it cannot fail.
+    // The target is memory and the data are only text and numbers, so this cannot fail.
     let _ = serde_json::to_writer_pretty(&mut text, &file);
     text.push(b'\n');
     text
@@ -169,7 +169,7 @@ fn names(required_set: &RequiredSet, wanted: impl Fn(&RequiredBundle) -> bool) -
         .collect()
 }
 
-/// The bundles that took part; not those that are only demanded.
+/// Returns the bundles that took part, without those that are only required.
 fn bundles(pooled: &Pooled) -> Vec<BundleLine<'_>> {
     let bundles = pooled.results.bundles.iter();
     let there = bundles.filter(|it| it.name != OWN_BUNDLE && !it.version.is_empty());

@@ -1,4 +1,4 @@
-//! What is written when, and what is not.
+//! Conditions under which results are written or not written.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -44,7 +44,7 @@ fn store_in(dir: &Path) -> Store {
     }
 }
 
-/// A file that has been checked by a jury of this epoch.
+/// Creates a file that was checked by the required set of this epoch.
 fn finished(dir: &Path, epoch: u64) -> FinishedJob {
     let path: Arc<Path> = dir.join("farm/a.xodr").into();
     let bytes = b"<OpenDRIVE/>";
@@ -107,7 +107,7 @@ fn what_has_changed_since_it_was_read_is_not_written() {
     assert!(walk(&dir.path().join("out")).is_empty());
 }
 
-/// Somebody else has the journal, so that nothing can be recorded.
+/// Another connection locks the journal, so that no entry can be recorded.
 #[test]
 fn what_must_not_lie_behind_the_gate_waits_for_no_journal() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! The threads that write. What concerns one path is done by one thread, in order, so that a
-//! result can never be withdrawn by an order that is older than the result.
+//! The writer threads. One thread handles all orders for a path, in sequence. An order can never
+//! withdraw a result that is newer than the order.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
@@ -21,51 +21,51 @@ use crate::store::{Store, StoreFailure};
 /// An order for a writer.
 #[derive(Debug)]
 pub enum Order {
-    /// Pool and write a result.
+    /// Pools and writes a result.
     Store {
         /// The job.
         job: Box<FinishedJob>,
-        /// The configuration that it was checked under.
+        /// Configuration of the check.
         config: Option<Arc<Config>>,
-        /// The root's image.
+        /// Image of the root.
         root: Option<MappedImage>,
     },
-    /// Remove the result of a file that has gone.
+    /// Removes the result of a removed file.
     Withdraw {
         /// The file.
         path: Arc<Path>,
-        /// Who is to take back a report about it.
+        /// Reporters that must withdraw a report about it.
         reporters: Vec<String>,
     },
-    /// Remember a verdict with fresh stamps.
+    /// Records a verdict with new stamps.
     Restamp {
         /// The file.
         path: Arc<Path>,
         /// Its verdict.
         judged: Arc<Judged>,
     },
-    /// Take a file from behind the gate, with everything that rests on it.
+    /// Removes a file from behind the gate, with everything that depends on it.
     CloseGate {
         /// The file.
         path: Arc<Path>,
     },
-    /// Publish a file whose acceptance stands.
+    /// Publishes a file with an acceptance that still holds.
     OpenGate {
         /// The file.
         path: Arc<Path>,
         /// Its verdict.
         judged: Arc<Judged>,
     },
-    /// Publish an accepted file, if that has not been done, and what waited for it.
+    /// Publishes an accepted file if it is not published yet, and the files that waited for it.
     Follow {
         /// The file.
         path: Arc<Path>,
     },
-    /// Remember something.
+    /// Records an entry in the journal.
     Record(Entry),
 }
 
-/// The writers. They end when this is dropped and everything ordered is done.
+/// The writer threads. They end when this value is dropped and all orders are done.
 #[derive(Debug)]
 pub struct Writers {
     writers: Vec<Sender<Order>>,
@@ -74,8 +74,8 @@ pub struct Writers {
 }
 
 impl Writers {
-    /// Starts `count` writers. What storing gives is told to `events`, what a person should know
-    /// to `notices`.
+    /// Starts `count` writers. Results of storing are sent to `events`, messages for the user to
+    /// `notices`.
     ///
     /// # Errors
     /// When no thread can be started.
@@ -113,30 +113,30 @@ impl Writers {
         Ok(writers)
     }
 
-    /// What cannot be written at this moment, each thing once.
+    /// Returns the current failures to write, each once.
     pub fn troubles(&self) -> BTreeSet<String> {
         let troubles = self.troubles.lock().unwrap_or_else(PoisonError::into_inner);
         troubles.values().cloned().collect()
     }
 
-    /// Gives an order that concerns `path`.
+    /// Sends an order that concerns `path`.
     pub fn order(&self, path: &Path, order: Order) {
         let hash = BuildHasherDefault::<DefaultHasher>::new().hash_one(place(path));
         let writer = usize::try_from(hash % self.writers.len() as u64).unwrap_or(0);
         if let Some(writer) = self.writers.get(writer) {
-            // A writer only ends after its sender, so somebody is there.
+            // A writer ends only after its sender is dropped, so the receiver exists.
             let _ = writer.send(order);
         }
     }
 
-    /// Waits until everything ordered is done, or cannot be, but not longer than `limit`: says then which
-    /// writers hang. They end with the process.
+    /// Waits until all orders are done or have failed, but not longer than `limit`. Returns the
+    /// writers that still hang. They end with the process.
     pub fn finish(mut self, limit: Duration) -> Vec<String> {
         self.writers.clear();
         let end = Instant::now() + limit;
         let mut hung = Vec::new();
         for (number, thread) in self.threads.drain(..).enumerate() {
-            // Most have nothing left to do and end at once.
+            // Most threads have no orders left and end immediately.
             let mut pause = Duration::from_micros(50);
             while !thread.is_finished() && Instant::now() < end {
                 thread::sleep(pause);
@@ -153,7 +153,7 @@ impl Writers {
 }
 
 impl Order {
-    /// The file that it is about; `None` when it is about a bundle.
+    /// Returns the file of the order, or `None` if it is about a bundle.
     fn path(&self) -> Option<&Arc<Path>> {
         match self {
             Order::Store { job, .. } => Some(&job.path),
@@ -167,7 +167,7 @@ impl Order {
     }
 }
 
-/// What each writer cannot write, by its number.
+/// Current failure of each writer, by its number.
 type Troubles = Arc<Mutex<BTreeMap<usize, String>>>;
 
 struct Writer {
@@ -176,16 +176,15 @@ struct Writer {
     store: Arc<Store>,
     events: UnboundedSender<Event>,
     notices: UnboundedSender<Notice>,
-    /// Orders that failed and are tried again, with everything that came after them for the same
-    /// files, in order.
+    /// Failed orders that are tried again, and all later orders for the same files, in sequence.
     waiting: VecDeque<Order>,
-    /// The files that those are about.
+    /// Files of the waiting orders.
     held_up: HashSet<Arc<Path>>,
-    /// The journal cannot be written, which concerns every file.
+    /// Whether the journal cannot be written, which concerns every file.
     stopped: bool,
-    /// Since the last try a failure was told; there may be thousands of the kind.
+    /// Whether a failure was reported since the last try. There may be thousands of them.
     told: bool,
-    /// What it cannot write is in `troubles`.
+    /// Whether `troubles` contains a failure of this writer.
     troubled: bool,
 }
 
@@ -226,7 +225,7 @@ impl Writer {
         self.retry();
     }
 
-    /// Does an order now, or puts it behind those that must be done before it.
+    /// Executes an order now, or queues it behind those that must be done first.
     fn take(&mut self, mut order: Order) {
         let held_up = order.path().is_some_and(|path| self.held_up.contains(path));
         if !self.stopped && !held_up {
@@ -241,8 +240,9 @@ impl Writer {
         self.waiting.push_back(order);
     }
 
-    /// What must not lie behind the gate goes at once, whatever has to wait for a disk or the journal. When its turn
-    /// comes it goes again: an order before it may have brought it back.
+    /// Removes a file from the gate immediately, even if the order must wait for a disk or the
+    /// journal. The order removes the file again later, because an earlier order may have published
+    /// it again.
     fn withdraw_early(&mut self, order: &Order) {
         if let Order::CloseGate { path } | Order::Withdraw { path, .. } = order
             && let Err(failure) = self.store.close_gate(path)
@@ -281,7 +281,7 @@ impl Writer {
         }
     }
 
-    /// Does an order, and says what is to be done next.
+    /// Executes an order. Returns the next order, if there is one.
     fn carry_out(&self, order: &mut Order) -> Result<Option<Order>, StoreFailure> {
         match order {
             Order::Store { job, config, root } => {
@@ -295,7 +295,8 @@ impl Writer {
             Order::Withdraw { path, reporters } => {
                 self.store.withdraw(path, reporters)?;
                 let path = path.clone();
-                // After the end of the loop nobody tells reporters of it; the journal knows whom to.
+                // After the end of the loop the reporters are not informed. The journal contains
+                // them.
                 let _ = self.events.send(Event::Withdrawn { path });
             }
             Order::Restamp { path, judged } => {
@@ -315,7 +316,7 @@ impl Writer {
                 let recorded = self.store.record(std::slice::from_ref(entry));
                 recorded.map_err(StoreFailure::of_all)?;
                 if let Entry::Voided { path, .. } = entry {
-                    // The report was the last that lay there.
+                    // The report may have been the last file in its directory.
                     self.store.tidy_above(path);
                 }
             }
@@ -340,7 +341,7 @@ impl Writer {
                 "{path} stays undetermined until it changes or qcbus is started anew: {why}"
             )));
         }
-        // After the end of the loop nobody waits for this.
+        // After the end of the loop there is no receiver.
         let _ = self.events.send(Event::Stored {
             job: job.job,
             outcome,

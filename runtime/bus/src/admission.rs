@@ -1,8 +1,8 @@
-//! Who is at the other end: what the kernel says of a peer's process, not what the peer says of itself.
+//! Admission socket: identifies the process of a peer by the kernel's data, not by the peer's own.
 //!
-//! Before it introduces itself on the bus, a peer connects to a socket in the instance's directory and says
-//! which session it is going to ask for. From the kernel the broker learns which process that was, and gets
-//! a handle on it that no other process ever inherits.
+//! Before a peer introduces itself on the bus, it connects to a socket in the instance's directory.
+//! There it states which session it will request. The kernel tells the broker which process that
+//! is. The broker gets a handle on it that no other process ever inherits.
 
 use std::collections::VecDeque;
 use std::fs::File;
@@ -22,41 +22,41 @@ use crate::process::Process;
 
 /// Name of the socket in the instance's directory.
 const SOCKET: &str = "peers.sock";
-/// The environment variable in which whoever starts a peer says so: with what is in it the peer proves that
-/// it was started by that one.
+/// Environment variable that the process starting a peer sets. Its value proves that the peer was
+/// started by that process.
 pub const LAUNCH: &str = "QCBUS_LAUNCH";
 
-/// What a statement begins with.
+/// First bytes of a statement.
 const MAGIC: &[u8; 8] = b"qcpeer1\n";
-/// Bytes of a statement: the magic, three numbers, the length of the proof, room for it.
+/// Bytes of a statement: the magic, three numbers, the length of the proof and room for it.
 const STATEMENT: usize = MAGIC.len() + 3 * 8 + 1 + MAX_LAUNCH;
-/// Longest value of [`LAUNCH`], in bytes.
+/// Maximum length of the value of [`LAUNCH`] in bytes.
 const MAX_LAUNCH: usize = 215;
-/// Statements that wait for their introduction.
+/// Maximum number of statements that wait for their introduction.
 const MAX_KNOWN: usize = 128;
-/// Connections on which nothing has been said.
+/// Maximum number of connections that have not sent a statement.
 const MAX_SILENT: usize = 32;
-/// Connections taken in one turn.
+/// Connections accepted per call.
 const TAKEN: usize = 64;
-/// How long a statement waits for its introduction, and a connection for its statement.
+/// Maximum wait of a statement for its introduction, and of a connection for its statement.
 const FRESH: Duration = Duration::from_secs(10);
-/// How often it is looked whether the socket still is where peers look for it.
+/// Interval of the check that the socket still exists at its path.
 const LOOK: Duration = Duration::from_secs(1);
 
-/// What is certain of a peer, whatever it says of itself.
+/// Verified facts about a peer, independent of its own statements.
 #[derive(Debug)]
 pub struct Known {
-    /// Its process; `None` where that cannot be seen from here, as in another container.
+    /// Its process, or `None` if it is not visible from here, for example in another container.
     pub process: Option<Process>,
-    /// The value of [`LAUNCH`] in its environment, empty where there is none. It proves nothing to whoever
-    /// does not know what the starter has put there.
+    /// The value of [`LAUNCH`] in its environment, empty if unset. Only the process that knows the
+    /// value set by the starter can use it as a proof.
     pub launch: String,
-    /// Ends with the peer's process, wherever that runs.
+    /// Connection that closes with the peer's process, wherever that runs.
     stream: UnixStream,
 }
 
 impl Known {
-    /// Whether the process is there that has connected.
+    /// Checks whether the connected process still exists.
     pub(crate) fn is_there(&self) -> bool {
         match &self.process {
             Some(process) => process.is_alive(),
@@ -64,17 +64,18 @@ impl Known {
         }
     }
 
-    /// Tells the peer, which may be waiting for it, that its session is there. One that does not listen
-    /// looks for it now and then, so this need not arrive.
+    /// Tells the peer that its session exists. A peer that does not listen checks this
+    /// periodically, so the message may be lost.
     pub(crate) fn tell(&self) {
-        // Never waits: the stream does not block, and one byte finds room.
+        // This never blocks: the stream is non-blocking, and one byte fits.
         let _ = (&self.stream).write(&[0]);
     }
 
-    /// Whether two were told of by the same process. Where processes cannot be seen, nobody knows.
+    /// Checks whether two statements come from the same process. This is unknown if processes are
+    /// not visible.
     pub(crate) fn is_same(&self, other: &Known) -> bool {
         let id = |it: &Known| it.process.as_ref().map(Process::id);
-        // Both live, so the ids are theirs.
+        // Both processes are alive, so their ids are valid.
         id(self) == id(other)
     }
 }
@@ -87,13 +88,13 @@ fn is_closed(mut stream: &UnixStream) -> bool {
     }
 }
 
-/// Where peers say who they are. The broker's end.
+/// The broker's end of the admission socket.
 #[derive(Debug)]
 pub(crate) struct Admission {
     directory: PathBuf,
     generation: u64,
     listener: UnixListener,
-    /// Device and inode of the socket's file.
+    /// Device and inode of the socket file.
     file: Option<(u64, u64)>,
     silent: VecDeque<(UnixStream, Instant)>,
     known: VecDeque<(SessionKey, Known, Instant)>,
@@ -101,7 +102,7 @@ pub(crate) struct Admission {
 }
 
 impl Admission {
-    /// Opens the socket. The caller holds the instance's lock, so a file that is there is a leftover.
+    /// Opens the socket. The caller holds the instance's lock, so an existing socket file is stale.
     pub(crate) fn open(instance: &Instance, generation: u64) -> io::Result<Admission> {
         let directory = instance.dir().to_path_buf();
         let (listener, file) = listen(&directory)?;
@@ -116,10 +117,10 @@ impl Admission {
         })
     }
 
-    /// Takes what has been said since.
+    /// Accepts new connections and reads new statements.
     pub(crate) fn receive_budget(&mut self, now: Instant) {
         for _ in 0..TAKEN {
-            // Also where there are no descriptors left: peers come again.
+            // This also covers a lack of file descriptors, because peers connect again.
             let Ok((stream, _)) = self.listener.accept() else {
                 break;
             };
@@ -154,7 +155,7 @@ impl Admission {
                 }
                 return;
             }
-            // A statement is written at once; whoever says anything else is nobody's peer.
+            // A statement is written at once. Anything else does not come from a peer.
             _ => return,
         }
         let Some((key, launch)) = parse(&said) else {
@@ -168,7 +169,8 @@ impl Admission {
         }
     }
 
-    /// What is certain of the peer that asks for this session; the latest, if it has said so again.
+    /// Removes and returns the verified facts about the peer that requests this session. The latest
+    /// statement counts.
     pub(crate) fn take(&mut self, key: &SessionKey) -> Option<Known> {
         let mut latest = None;
         for (of, known, since) in std::mem::take(&mut self.known) {
@@ -181,18 +183,18 @@ impl Admission {
         latest
     }
 
-    /// Takes back what was taken: there was no room for the peer yet.
+    /// Puts a taken statement back because the peer cannot be admitted yet.
     pub(crate) fn keep(&mut self, key: SessionKey, known: Known, now: Instant) {
         self.known.push_back((key, known, now));
     }
 
-    /// Nobody finds it any more.
+    /// Removes the socket file, so that peers no longer find it.
     pub(crate) fn close(&self) {
-        // The directory may have been removed already.
+        // The directory may already be removed.
         let _ = std::fs::remove_file(self.directory.join(SOCKET));
     }
 
-    /// Opens the socket again when its file was removed: by a cleaner of temporary files, say.
+    /// Opens the socket again if its file was removed, for example by a cleaner of temporary files.
     fn stay_open(&mut self) {
         if file_of(&self.directory).is_some_and(|file| Some(file) == self.file) {
             return;
@@ -200,7 +202,7 @@ impl Admission {
         match listen(&self.directory) {
             Ok((listener, file)) => (self.listener, self.file) = (listener, file),
             Err(error) => {
-                // Once is enough, it is tried again every second.
+                // One warning is enough, because opening is retried every second.
                 if self.file.take().is_some() {
                     let directory = to_text(&self.directory);
                     tracing::warn!(%error, directory, "the socket for peers is gone, nobody can join");
@@ -230,9 +232,10 @@ fn file_of(directory: &Path) -> Option<(u64, u64)> {
     Some((data.dev(), data.ino()))
 }
 
-/// A way to the socket that is short enough for the kernel, and what must be kept open meanwhile.
+/// Returns a path to the socket that is short enough for the kernel. The returned file must stay
+/// open meanwhile.
 fn short(directory: &Path) -> io::Result<(File, PathBuf)> {
-    // Only the way to it is wanted: who is confined may not be allowed to look into it.
+    // Only the path is needed: a confined process may not be allowed to read the directory.
     let directory = File::options()
         .read(true)
         .custom_flags(libc::O_PATH | libc::O_DIRECTORY)
@@ -241,8 +244,8 @@ fn short(directory: &Path) -> io::Result<(File, PathBuf)> {
     Ok((directory, path.join(SOCKET)))
 }
 
-/// Says to the broker of an instance which session this process is going to ask for. The connection is to
-/// be kept as long as that lasts. Never waits for the broker.
+/// Tells the broker of an instance which session this process will request. The caller must keep
+/// the connection for the lifetime of the session. This never waits for the broker.
 pub(crate) fn introduce(instance: &Instance, key: SessionKey) -> io::Result<UnixStream> {
     use rustix::net::{
         AddressFamily, SocketAddrUnix, SocketFlags, SocketType, connect, socket_with,
@@ -256,12 +259,12 @@ pub(crate) fn introduce(instance: &Instance, key: SessionKey) -> io::Result<Unix
     Ok(stream)
 }
 
-/// What was said to the broker, on the connection on which it answers that the session is there. To be kept as
-/// long as the session lasts.
+/// A statement sent to the broker, on the connection where the broker answers that the session
+/// exists. It must be kept for the lifetime of the session.
 pub(crate) struct Statement(tokio::net::UnixStream);
 
 impl Statement {
-    /// Must be called within a tokio runtime.
+    /// Creates a statement. Must be called within a tokio runtime.
     pub(crate) fn new(stream: UnixStream) -> io::Result<Statement> {
         tokio::net::UnixStream::from_std(stream).map(Statement)
     }
@@ -270,7 +273,7 @@ impl Statement {
     pub(crate) async fn answered(&self, limit: Duration) {
         let readable = tokio::time::timeout(limit, self.0.readable()).await;
         let answered = matches!(readable, Ok(Ok(()))).then(|| self.0.try_read(&mut [0; 16]));
-        // A broker that has gone has nothing to say at once, again and again.
+        // The connection to a dead broker is always readable, so this waits to avoid a busy loop.
         if matches!(answered, Some(Ok(0) | Err(_))) {
             tokio::time::sleep(limit).await;
         }
@@ -313,15 +316,16 @@ fn parse(said: &[u8; STATEMENT]) -> Option<(SessionKey, String)> {
     Some((key, String::from_utf8(launch.to_vec()).ok()?))
 }
 
-/// What the kernel says of whoever has connected. `None`: another user, or somebody who has gone.
+/// Returns the kernel's data about the connected process. Returns `None` for another user or a
+/// process that has ended.
 fn look_at(stream: UnixStream, launch: String) -> Option<Known> {
-    // Process, user, group: `struct ucred` of unix(7).
+    // The values are process, user and group: `struct ucred` of unix(7).
     let [pid, user, _group] = socket_option(&stream, libc::SO_PEERCRED).ok()?;
     let user = user.cast_unsigned();
     if user != rustix::process::geteuid().as_raw() && user != 0 {
         return None;
     }
-    // A process of another container has no number here.
+    // A process of another container has no id here.
     let process = match Pid::from_raw(pid) {
         Some(pid) => Some(process_of(&stream, pid)?),
         None => None,
@@ -334,19 +338,19 @@ fn look_at(stream: UnixStream, launch: String) -> Option<Known> {
 }
 
 impl Process {
-    /// The process at the other end of a connection: who has connected, or who listens. `None`: it has gone, or lives
-    /// in another container and has no number here.
+    /// Returns the process at the other end of a connection, either the client or the listener.
+    /// Returns `None` if it has ended, or lives in another container and has no id here.
     pub fn behind(stream: &UnixStream) -> Option<Process> {
         let [pid, _user, _group] = socket_option(stream, libc::SO_PEERCRED).ok()?;
         process_of(stream, Pid::from_raw(pid)?)
     }
 }
 
-/// The process that has connected, and nobody who was given its id since.
+/// Returns the connected process, but never a later process with the same id.
 fn process_of(stream: &UnixStream, pid: Pid) -> Option<Process> {
     let process = match peer_handle(stream) {
         Ok(fd) => Process::from_fd(pid, fd),
-        // Kernels before 6.5. If the process went in this very moment its id may be another's.
+        // Kernels before 6.5 do not have it. If the process ends now, its id may belong to another.
         Err(error) if error.raw_os_error() == Some(libc::ENOPROTOOPT) => {
             Process::open(pid.as_raw_nonzero().get().unsigned_abs(), None)?
         }
@@ -358,11 +362,11 @@ fn process_of(stream: &UnixStream, pid: Pid) -> Option<Process> {
 #[expect(unsafe_code, reason = "a number becomes the descriptor that it is")]
 fn peer_handle(stream: &UnixStream) -> io::Result<OwnedFd> {
     let [fd] = socket_option(stream, libc::SO_PEERPIDFD)?;
-    // SAFETY: the kernel has just opened this descriptor for us, and nobody else knows of it.
+    // SAFETY: the kernel has just opened this descriptor for this process; no other code knows it.
     Ok(unsafe { OwnedFd::from_raw_fd(fd) })
 }
 
-/// An option of a socket that consists of numbers.
+/// Returns a socket option that consists of numbers.
 #[expect(
     unsafe_code,
     reason = "rustix knows no handles of peers, and no peer without a number"
@@ -372,7 +376,8 @@ fn socket_option<const N: usize>(stream: &UnixStream, name: libc::c_int) -> io::
     let wanted = size_of_val(&value);
     let mut length = libc::socklen_t::try_from(wanted).map_err(io::Error::other)?;
     let (fd, to) = (stream.as_raw_fd(), value.as_mut_ptr().cast());
-    // SAFETY: `to` and `length` describe `value`, of which any bytes are numbers, and live through the call.
+    // SAFETY: `to` and `length` describe `value`, for which any bytes are valid numbers. Both live
+    // through the call.
     let done = unsafe { libc::getsockopt(fd, libc::SOL_SOCKET, name, to, &raw mut length) };
     match done {
         0 if usize::try_from(length) == Ok(wanted) => Ok(value),
@@ -399,7 +404,7 @@ mod tests {
         (instance, admission)
     }
 
-    /// A directory whose path is longer than a socket's may be.
+    /// Returns a directory with a path that is longer than a socket path may be.
     fn far(base: &Path) -> PathBuf {
         let far = base.join("x".repeat(120));
         std::fs::create_dir(&far).unwrap();
@@ -433,7 +438,7 @@ mod tests {
         let dir = tempfile::TempDir::new().unwrap();
         let (instance, mut admission) = admission(dir.path());
         let _own = introduce(&instance, key(1, 1)).unwrap();
-        // A process that says the same of itself.
+        // A process that makes the same statement.
         let bytes = statement(key(1, 2), "9:x");
         std::fs::write(dir.path().join("said"), bytes).unwrap();
         let script = "import socket, sys, time; s = socket.socket(socket.AF_UNIX); \
@@ -484,7 +489,7 @@ mod tests {
         stream.write_all(&not_text).unwrap();
         admission.receive_budget(Instant::now());
         assert!(admission.known.is_empty() && admission.silent.is_empty());
-        // Connections on which nothing is said, and statements that nobody asks for, are bounded.
+        // The number of silent connections and of unused statements is limited.
         for _ in 0..3 {
             for number in 0..TAKEN as u64 {
                 kept.push(introduce(&instance, key(number, 1)).unwrap());

@@ -1,4 +1,4 @@
-//! The broker's side of the document topics: lending slots, publishing, holding.
+//! The broker's side of the document topics: lends slots, publishes images and holds them.
 
 use std::collections::BTreeMap;
 use std::ops::{Deref, DerefMut};
@@ -17,71 +17,71 @@ use crate::memory::{RoomLocks, SharedMemory, free_shared_memory};
 use crate::pages::{back_with_memory, take_memory_from};
 use crate::ports::{self, Hub, PortError, Pub, Service, Sub, TopicService};
 
-/// Largest image, in bytes: offsets within an image are 32 bits wide.
+/// Maximum size of an image in bytes: offsets within an image are 32 bits wide.
 const MAX_IMAGE: usize = u32::MAX as usize;
 
-/// Why no slot could be lent.
+/// Reason why no slot is lent.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LoanError {
-    /// Shared memory has not enough room. Writing on would kill the process, so nothing was lent.
+    /// Shared memory lacks room. Writing anyway would kill the process, so no slot is lent.
     #[error(
         "not enough shared memory: {needed} bytes are needed, and so many are not free of the {size} bytes of /dev/shm, of which {reserve} are kept in reserve"
     )]
     NoSpace {
-        /// Bytes asked for.
+        /// Requested bytes.
         needed: u64,
-        /// Bytes of /dev/shm.
+        /// Size of /dev/shm in bytes.
         size: u64,
-        /// Bytes that stay free.
+        /// Bytes that must stay free.
         reserve: u64,
     },
-    /// Shared memory is too small, whoever lets go of whatever.
+    /// Shared memory is too small, even if all of it were released.
     #[error(
         "{needed} bytes of shared memory are needed, and /dev/shm has {size} in all, of which {kept} are kept for the bus itself; make it larger: `mount -o remount,size={advised}M /dev/shm`, for a container `docker run --shm-size={advised}m`"
     )]
     NeverFits {
-        /// Bytes asked for.
+        /// Requested bytes.
         needed: u64,
-        /// Bytes of /dev/shm.
+        /// Size of /dev/shm in bytes.
         size: u64,
-        /// Bytes of it that no document may have.
+        /// Bytes of /dev/shm that documents cannot use.
         kept: u64,
-        /// A size that would do, in MiB.
+        /// A sufficient size in MiB.
         advised: u64,
     },
-    /// The process may not map so much.
+    /// The address space limit of the process is too small for the mapping.
     #[error(
         "the address space of a process is limited to {limit} bytes here (`ulimit -v`), too little to map shared memory for {needed} bytes; raise it with `ulimit -v unlimited`"
     )]
     AddressSpace {
-        /// Bytes asked for.
+        /// Requested bytes.
         needed: u64,
         /// The limit in bytes.
         limit: u64,
     },
-    /// No image may be that large.
+    /// The image exceeds the maximum size.
     #[error("an image of {0} bytes is larger than any image may be")]
     TooLarge(usize),
-    /// As many documents as the limits allow are being filled or held. Let go of some.
+    /// The maximum number of documents is being filled or held. Release some documents first.
     #[error("as many documents as the bus carries at once are being filled or held")]
     Busy,
-    /// The bus refused, in its words.
+    /// The bus refuses, with this error text.
     #[error("the bus refused: {0}")]
     Bus(String),
 }
 
-/// Why an image could not be published.
+/// Reason why an image cannot be published.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PublishError {
-    /// More bytes were said to be used than were lent.
+    /// The number of used bytes exceeds the number of lent bytes.
     #[error("{used} bytes are used of {lent} lent")]
     TooMuchUsed {
-        /// As claimed.
+        /// Used bytes, as stated by the caller.
         used: usize,
-        /// As lent.
+        /// Lent bytes.
         lent: usize,
     },
-    /// The bus refused, in its words.
+    /// The bus refuses, with this error text.
     #[error("the bus refused: {0}")]
     Bus(String),
 }
@@ -91,12 +91,13 @@ struct Class {
     row: Topic,
     _service: TopicService<Block, DocumentHeader>,
     publisher: RwLock<Pub<Block, DocumentHeader>>,
-    /// Slots that were written since their memory was given back: where each begins, and bytes written at most.
+    /// Slots that were written since their memory was released: start address and maximum number of
+    /// bytes written.
     slots: Mutex<BTreeMap<usize, usize>>,
-    /// Whether something was published since the publisher was made.
+    /// Whether an image was published since the publisher was created.
     used: AtomicBool,
-    /// Our own subscriber: through it the broker holds what it has published. It is locked from
-    /// sending to receiving, so that what is received is what was sent.
+    /// The broker's own subscriber, through which it holds its published images. The lock is kept
+    /// from sending to receiving, so that the received image is the sent one.
     own: Mutex<Sub<Block, DocumentHeader>>,
     mapped_image: Arc<AtomicUsize>,
     lent: Arc<AtomicUsize>,
@@ -118,18 +119,18 @@ impl Class {
         })
     }
 
-    /// Bytes of shared memory that it may take to push everything out: what leads a slot, and its first block, may
-    /// lie on either side of a page's end.
+    /// Returns the bytes of shared memory that may be needed to push all documents out of the
+    /// history. The header of a slot and its first block may lie on different pages.
     fn letting_go_bytes(&self) -> u64 {
         let slots = self.row.history.max(self.row.buffer);
         (2 * rustix::param::page_size() * slots) as u64
     }
 
-    /// Gives back the memory of every slot that nobody has in hand. Without it a small /dev/shm would stay
-    /// full of documents that nobody needs, because only publishing pushes them out of the history. To be
-    /// called with a ticket to lend; does nothing when others have one.
+    /// Releases the memory of every slot that is not in use. Otherwise a small /dev/shm would stay
+    /// full of unneeded documents, because only publishing pushes them out of the history. The
+    /// caller must hold a loan permit. The function does nothing while others hold one.
     ///
-    /// The publisher stays the same: a confined peer could not connect to another one.
+    /// The publisher stays the same because a confined peer cannot connect to another one.
     fn empty(&self, shared: &Shared) {
         let _lock = shared.room_locks.take();
         let Some(_open) = shared.open() else {
@@ -142,8 +143,8 @@ impl Class {
         if self.lent.load(Ordering::Acquire) != 1 {
             return;
         }
-        // To lend a slot is to write to its head. Where others have filled the memory to its last page, that write
-        // would kill the process; what they take is not ours to give back.
+        // Lending a slot writes to its header. If other processes have filled the memory to the
+        // last page, that write would kill the process. Their memory cannot be released here.
         if free_shared_memory() < self.letting_go_bytes() {
             return;
         }
@@ -152,7 +153,7 @@ impl Class {
         }
         let mut used = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
         let mut free = Vec::new();
-        // The slot that was given back last is lent first: those never used come behind all others.
+        // The last released slot is lent first, so the slots that were never used come last.
         for _ in 0..used.len() {
             let Ok(mut sample) = publisher.loan_slice_uninit(1) else {
                 break;
@@ -172,7 +173,7 @@ impl Class {
         *longest = size_of_val(slot).max(*longest);
     }
 
-    /// Nobody is sent anything more from the history, and nobody has anything waiting.
+    /// Replaces the content of the history and of all subscriber buffers with release requests.
     fn push_everything_out(&self, publisher: &Pub<Block, DocumentHeader>) {
         let own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
         for _ in 0..self.row.history.max(self.row.buffer) {
@@ -190,18 +191,18 @@ struct Shared {
     generation: u64,
     classes: [Class; 2],
     reserve: u64,
-    /// What the bus takes for itself, in bytes.
+    /// Bytes that the bus itself needs.
     own: u64,
     room_locks: RoomLocks,
-    /// Whether nothing is lent or published any more. Read by whoever may make files of the bus, for as long as that
-    /// takes: what is made after they were removed would stay.
+    /// Whether lending and publishing has stopped. Code that may create files of the bus holds the
+    /// read lock meanwhile. A file created after the removal would stay.
     stopped: RwLock<bool>,
     /// Tells the broker's loop that peers wait for a document.
     again: Notify,
 }
 
 impl Shared {
-    /// `None` when it has stopped; it does not stop as long as this is held.
+    /// Returns a guard that prevents stopping, or `None` if lending has already stopped.
     fn open(&self) -> Option<RwLockReadGuard<'_, bool>> {
         let stopped = self.stopped.read().unwrap_or_else(PoisonError::into_inner);
         (!*stopped).then_some(stopped)
@@ -212,7 +213,7 @@ fn has_stopped() -> LoanError {
     LoanError::Bus("the broker has stopped".to_owned())
 }
 
-/// Lends slots for document images and publishes them. Cheap to clone; meant for worker threads.
+/// Lends slots for document images and publishes them. Cheap to clone; intended for worker threads.
 #[derive(Clone)]
 pub struct Documents {
     shared: Arc<Shared>,
@@ -241,7 +242,7 @@ impl Documents {
         })
     }
 
-    /// Bytes of shared memory that slots have, at most.
+    /// Returns the maximum number of bytes of shared memory that slots use.
     pub(crate) fn bytes(&self) -> usize {
         let of = |class: &Class| -> usize {
             let slots = class.slots.lock().unwrap_or_else(PoisonError::into_inner);
@@ -250,13 +251,13 @@ impl Documents {
         self.shared.classes.iter().map(of).sum()
     }
 
-    /// Lends at least `len` bytes, zero or not: write before you read. All of it is backed by
-    /// memory when this returns, so writing cannot fail.
+    /// Lends at least `len` bytes. Their content is undefined, so write before you read. All of it
+    /// is backed by memory when this returns, so writing cannot fail.
     ///
     /// # Errors
     /// See [`LoanError`].
     pub fn loan(&self, len: usize) -> Result<Loan, LoanError> {
-        // More than a subscriber's buffer takes would be lost on one that is slow.
+        // A slow subscriber would lose documents beyond the size of its buffer.
         self.lend(len, |row| row.buffer)
     }
 
@@ -275,7 +276,7 @@ impl Documents {
             if !matches!(error, LoanError::NoSpace { .. }) {
                 return Err(error);
             }
-            // Both: what is needed in one class may lie in the other.
+            // Memory of both classes is released, because one may occupy what the other needs.
             self.give_back(index);
             self.take(class, blocks, bytes)
         })?;
@@ -289,7 +290,7 @@ impl Documents {
         })
     }
 
-    /// Takes a slot, and all memory that it needs.
+    /// Takes a slot and all the memory that it needs.
     fn take(&self, class: &Class, blocks: usize, bytes: u64) -> Result<Uninit, LoanError> {
         let _lock = self.shared.room_locks.take();
         self.look_for(bytes)?;
@@ -302,7 +303,7 @@ impl Documents {
             .loan_slice_uninit(blocks)
             .map_err(|why| match why {
                 iceoryx2::port::LoanError::ExceedsMaxLoans => LoanError::Busy,
-                // All slots are taken, or larger ones could not be mapped.
+                // All slots are in use, or larger ones cannot be mapped.
                 iceoryx2::port::LoanError::OutOfMemory => {
                     let grows = bytes > class.row.slot_bytes() as u64;
                     let limited = || limited_addresses(bytes);
@@ -319,14 +320,14 @@ impl Documents {
         }
     }
 
-    /// Whether there is room beside the reserve.
+    /// Checks whether enough memory is free besides the reserve.
     fn look_for(&self, needed: u64) -> Result<(), LoanError> {
         let Ok(memory) = SharedMemory::now() else {
             return Err(self.no_space(needed));
         };
         let kept = self.shared.reserve.saturating_add(self.shared.own);
         let whole = needed.saturating_add(kept);
-        // A memory of size 0 has no limit.
+        // A size of 0 means that the memory has no limit.
         if memory.size > 0 && memory.size < whole {
             return Err(LoanError::NeverFits {
                 needed,
@@ -350,13 +351,14 @@ impl Documents {
         }
     }
 
-    /// Publishes a held image once more, for a peer that says that it lacks it. The bytes are
-    /// copied into a new slot: a slot in other hands cannot be sent again.
+    /// Publishes a held image again, for a peer that reports it as missing. The bytes are copied
+    /// into a new slot, because a slot held by others cannot be sent again.
     ///
     /// # Errors
     /// See [`LoanError`].
     pub fn publish_again(&self, mapped_image: &MappedImage) -> Result<(), LoanError> {
-        // Beside all that jobs need. One less than a subscriber may hold: receiving needs a hand free.
+        // This is in addition to the documents of all jobs. The limit is one below that of a
+        // subscriber, because receiving needs a free permit.
         let mut loan = self.lend(mapped_image.len(), |row| row.borrowed - 1)?;
         loan.copy_from_slice(mapped_image);
         loan.publish(
@@ -370,12 +372,12 @@ impl Documents {
         Ok(())
     }
 
-    /// Resolves when a document was published for peers that wait for it. Cancel-safe.
+    /// Waits until a document was published for peers that wait for it. Cancel-safe.
     pub(crate) async fn published_again(&self) {
         self.shared.again.notified().await;
     }
 
-    /// Connects new subscribers, which sends them the history.
+    /// Connects new subscribers. They then receive the history.
     pub(crate) fn update_connections(&self) {
         for class in &self.shared.classes {
             let publisher = class
@@ -388,7 +390,8 @@ impl Documents {
         }
     }
 
-    /// From now on nothing is lent or published: when this returns, nobody makes a file of the bus by it.
+    /// Stops lending and publishing. When this returns, documents no longer create files of the
+    /// bus.
     pub(crate) fn stop(&self) {
         let stopped = self.shared.stopped.write();
         *stopped.unwrap_or_else(PoisonError::into_inner) = true;
@@ -404,7 +407,7 @@ impl Documents {
     }
 }
 
-/// Why a slot cannot be had, where the address space is limited.
+/// Returns the reason why a slot is not available if the address space is limited.
 fn limited_addresses(needed: u64) -> Option<LoanError> {
     let limit = rustix::process::getrlimit(rustix::process::Resource::As).current;
     limit.map(|limit| LoanError::AddressSpace { needed, limit })
@@ -421,12 +424,12 @@ type Uninit = iceoryx2::sample_mut_uninit::SampleMutUninit<
     reason = "zeroing 100 MB only to overwrite it would cost more than sending it"
 )]
 fn initialised(sample: Uninit) -> SampleMut<Service, [Block], DocumentHeader> {
-    // SAFETY: the slot is shared memory from the kernel, so its bytes have values, zero or what a
-    // former image left; and every pattern of bytes is a valid `Block` (it is `Pod`).
+    // SAFETY: the slot is shared memory from the kernel, so its bytes are initialised: zero or the
+    // content of an earlier image. Every pattern of bytes is a valid `Block` (it is `Pod`).
     unsafe { sample.assume_init() }
 }
 
-/// A slot to be filled. Dropping it gives it back.
+/// A slot to be filled. Dropping it returns the slot.
 pub struct Loan {
     sample: SampleMut<Service, [Block], DocumentHeader>,
     class: usize,
@@ -437,7 +440,7 @@ pub struct Loan {
 }
 
 impl Loan {
-    /// Publishes the first `used` bytes to every peer, and keeps a hold of them.
+    /// Publishes the first `used` bytes to every peer and keeps holding them.
     ///
     /// # Errors
     /// See [`PublishError`].
@@ -469,7 +472,8 @@ impl Loan {
         class.used.store(true, Ordering::Release);
         let own = class.own.lock().unwrap_or_else(PoisonError::into_inner);
         let refused = |why: String| PublishError::Bus(why);
-        // An error may concern a single peer, so what counts is whether it comes back to us.
+        // An error may concern a single peer, so the check is whether the broker receives the
+        // image.
         let sent = sample.send();
         while let Some(back) = own.receive().map_err(|why| refused(format!("{why:?}")))? {
             if back.user_header().doc == doc.0 {

@@ -1,4 +1,4 @@
-//! A peer without manners, with which a broker's end of the bus is tried. For tests only.
+//! A misbehaving peer for tests of the broker's end of the bus. For tests only.
 
 use std::collections::VecDeque;
 use std::os::unix::net::UnixStream;
@@ -14,22 +14,22 @@ use crate::link::{FrameHeader, SessionKey};
 use crate::ports::{self, Hub, Pub, Sub, WakeNotifier};
 use crate::removal_lock::RemovalLock;
 
-/// What goes before a frame, to be filled with anything.
+/// Frame header that can be filled with anything.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Header {
-    /// As in `current`.
+    /// Generation, as in `current`.
     pub generation: u64,
-    /// As in the introduction.
+    /// Incarnation, as in the introduction.
     pub incarnation: u64,
-    /// As in the introduction.
+    /// Attempt, as in the introduction.
     pub attempt: u64,
     /// Number of the frame; the first is 1.
     pub seq: u64,
-    /// Last frame that arrived.
+    /// Number of the last frame that arrived.
     pub ack: u64,
     /// 1 data, 2 acknowledgement, 3 farewell.
     pub kind: u32,
-    /// Whether an acknowledgement is asked for.
+    /// Whether an acknowledgement is requested.
     pub urgent: u32,
 }
 
@@ -39,29 +39,31 @@ struct Channels {
     to: Option<Sub<u8, FrameHeader>>,
 }
 
-/// Somebody on the bus who says what he likes.
+/// Peer that can send arbitrary data.
 pub struct Rogue {
     services: Services,
     generation: u64,
     channels: Option<Channels>,
     hello: Pub<u8, HelloHeader>,
     wake: WakeNotifier,
-    /// Manners it needs none, but it leaves nothing in a memory that is removed: tests look.
+    /// Removal lock. A rogue uses it only so that it leaves no files in removed memory, because
+    /// tests check that.
     removal_lock: RemovalLock,
     hub: Hub,
     instance: Instance,
-    /// What says which process this is, the latest.
+    /// Latest proofs of the identity of this process.
     proofs: Mutex<VecDeque<UnixStream>>,
 }
 
-/// Proofs that are kept; whoever has more sessions at once has none of the first.
+/// Maximum number of proofs that are kept. With more simultaneous sessions the first ones have no
+/// proof.
 const PROOFS: usize = 64;
 
 impl Rogue {
-    /// Gets onto the bus of an instance, unannounced.
+    /// Joins the bus of an instance without registration.
     ///
     /// # Errors
-    /// In words, when there is no broker or the bus refuses.
+    /// A text, if there is no broker or the bus refuses.
     pub fn new(instance: &Instance) -> Result<Rogue, String> {
         let generation = Generation::current(instance).ok_or("no broker")?;
         let services = Services::new(&generation.limits);
@@ -92,12 +94,13 @@ impl Rogue {
         })
     }
 
-    /// Number of the broker's generation.
+    /// Returns the number of the broker's generation.
     pub fn generation(&self) -> u64 {
         self.generation
     }
 
-    /// Says hello, in whatever bytes, and lets the kernel say which process does. `false`: it was not taken.
+    /// Sends a hello with arbitrary bytes, and lets the kernel prove the identity of the process.
+    /// Returns `false` if it was not delivered.
     pub fn introduce(&self, incarnation: u64, attempt: u64, bytes: &[u8]) -> bool {
         self.prove(incarnation, attempt);
         let header = HelloHeader {
@@ -120,15 +123,16 @@ impl Rogue {
             attempt,
         };
         let mut proofs = self.proofs.lock().unwrap_or_else(PoisonError::into_inner);
-        // The broker bounds how many it listens to; then there is none.
+        // The broker limits the number of listened connections. Above the limit there is no proof.
         proofs.extend(introduce(&self.instance, key));
         while proofs.len() > PROOFS {
             proofs.pop_front();
         }
     }
 
-    /// Opens the channels of a session, if the broker has made them; with `reads`, also the one that
-    /// the broker writes to, without which no broker thinks that anybody is there.
+    /// Opens the channels of a session, if the broker has created them. With `reads` it also opens
+    /// the channel that the broker writes to. Without that one the broker assumes that the peer is
+    /// missing.
     pub fn connect(&mut self, incarnation: u64, attempt: u64, reads: bool) -> bool {
         let key = SessionKey {
             generation: self.generation,
@@ -155,7 +159,7 @@ impl Rogue {
         connected
     }
 
-    /// Puts a frame into the broker's buffer. `false`: it is full, or there is none.
+    /// Puts a frame into the broker's buffer. Returns `false` if the buffer is full or missing.
     pub fn send(&self, header: Header, bytes: &[u8]) -> bool {
         let Some(channels) = &self.channels else {
             return false;
@@ -176,7 +180,7 @@ impl Rogue {
         matches!(sent, Ok(recipients) if recipients > 0)
     }
 
-    /// Reads one frame of the broker: its number.
+    /// Reads one frame of the broker and returns its number.
     pub fn receive(&self) -> Option<u64> {
         let receiver = self.channels.as_ref()?.to.as_ref()?;
         let sample = receiver.receive().ok()??;
@@ -185,17 +189,18 @@ impl Rogue {
 
     /// Wakes the broker.
     pub fn ring(&self) {
-        // A broker that has gone needs no waking.
+        // The broker may be gone. Then it needs no wake-up.
         let _ = self.wake.notify();
     }
 
-    /// Closes the session's channels without a word.
+    /// Closes the session's channels without a farewell.
     pub fn hang_up(&mut self) {
         self.channels = None;
     }
 }
 
-/// A publisher's slots are its own business: no service says how large they may be.
+/// Returns the topic with growing slots. A publisher chooses its slot sizes itself, because no
+/// service limits them.
 fn growing(row: Topic) -> Topic {
     Topic {
         growth: Growth::PowerOfTwo,

@@ -1,8 +1,8 @@
-//! Generations: every start of a broker gets names that nobody has used before.
+//! Generations: every start of a broker gets names that were never used before.
 //!
-//! On stable names a broker killed in its first milliseconds can leave a service behind that can
-//! never be opened again, and dead entries pile up. So each start has its own prefix and its own
-//! directory, `current` names them, and what older generations left is unlinked.
+//! With stable names, a broker killed in its first milliseconds can leave a service behind that can
+//! never be opened again. Dead entries also accumulate. So each start has its own prefix and its
+//! own directory. `current` names them, and the remains of older generations are unlinked.
 
 use std::collections::hash_map::RandomState;
 use std::fs::{self, File};
@@ -26,18 +26,19 @@ use crate::removal_lock;
 
 const CURRENT: &str = "current";
 const IDENTITY: &str = "id";
-/// What a living broker keeps locked in its shared memory.
+/// File in the shared memory that a living broker keeps locked.
 const LIFE: &str = "broker";
-/// Its name until it is locked.
+/// Name of that file until it is locked.
 const UNNAMED_LIFE: &str = "broker.new";
-/// Bytes of what is in it.
+/// Length of the identity in bytes.
 const IDENTITY_LEN: usize = 18;
-/// A broker locks its shared memory within microseconds of making it, unless it is stopped in between.
+/// Age from which unlocked shared memory counts as stale. A broker locks its memory within
+/// microseconds of creating it, unless it is stopped in between.
 const UNLOCKED_FOR: Duration = Duration::from_secs(60);
-/// Names that are tried for such a directory; each is as good as new.
+/// Number of names that are tried for the root directory. Each name is random.
 const ATTEMPTS: usize = 16;
 
-/// What a broker writes for its peers.
+/// Description of a generation that a broker writes for its peers.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Generation {
     pub(crate) number: u64,
@@ -51,20 +52,20 @@ pub(crate) struct Generation {
 }
 
 impl Generation {
-    /// The generation in force, `None` when there is none or it cannot be read.
+    /// Returns the current generation, or `None` if there is none or it cannot be read.
     pub(crate) fn current(instance: &Instance) -> Option<Generation> {
         let text = fs::read(instance.dir().join(CURRENT)).ok()?;
         serde_json::from_slice(&text).ok()
     }
 
-    /// Whether the broker that wrote this still runs.
+    /// Returns the broker that wrote this, if it still runs.
     pub(crate) fn broker(&self) -> Option<Process> {
         Process::open(self.pid, self.pid_started)
     }
 
-    /// A new generation, not yet announced. To be called under the instance's lock.
+    /// Creates a new, unannounced generation. The caller must hold the instance's lock.
     pub(crate) fn begin(instance: &Instance, limits: Limits) -> Result<Generation, StartError> {
-        // What a broker leaves that is killed while it writes one of its files.
+        // A broker that is killed while it writes one of its files leaves these behind.
         for name in names_in(instance.dir()) {
             if name.starts_with(".tmp") {
                 let _ = fs::remove_file(instance.dir().join(name));
@@ -90,13 +91,14 @@ impl Generation {
         })
     }
 
-    /// Keeps its shared memory from [`sweep_strays`] as long as the file is open. It gets its name when it is
-    /// locked, or another start would take an unlocked one for that of a dead broker and remove the memory.
+    /// Protects its shared memory from [`sweep_strays`] while the returned file is open. The file
+    /// gets its final name after it is locked. Otherwise another start would take it for that of a
+    /// dead broker and remove the memory.
     pub(crate) fn lock_memory(&self) -> io::Result<File> {
         lock_life(&self.root, || {})
     }
 
-    /// Makes this the generation in force.
+    /// Makes this the current generation.
     pub(crate) fn announce(&self, instance: &Instance) -> io::Result<()> {
         let mut file = tempfile::NamedTempFile::new_in(instance.dir())?;
         file.write_all(&serde_json::to_vec(self)?)?;
@@ -105,8 +107,8 @@ impl Generation {
         Ok(())
     }
 
-    /// Makes again what was taken from the runtime directory. What somebody else has put into a file's
-    /// place stays.
+    /// Restores files that were removed from the runtime directory. A file that another process has
+    /// put in their place stays.
     pub(crate) fn restore(&self, instance: &Instance) -> io::Result<()> {
         if !instance.dir().join(IDENTITY).exists()
             && let Some(identity) = self.prefix.get(..IDENTITY_LEN)
@@ -124,16 +126,16 @@ impl Generation {
         Ok(())
     }
 
-    /// Withdraws it, so that peers stop trying to join.
+    /// Withdraws the generation, so that peers stop trying to join.
     pub(crate) fn withdraw(&self, instance: &Instance) {
         let _ = fs::remove_file(instance.dir().join(CURRENT));
     }
 }
 
 /// Unlinks everything of this instance, except the generation `keep`. The caller holds the
-/// instance's lock, so whatever is found belongs to nobody alive but peers that are leaving, or about
-/// to join; what they have mapped stays readable for them. What cannot be unlinked is said, and a later
-/// broker of the instance tries again.
+/// instance's lock, so only peers that leave or join can still use the files. Memory they have
+/// mapped stays readable for them. Failures are logged, and a later broker of the instance tries
+/// again.
 pub(crate) fn sweep(instance: &Instance, keep: Option<&Generation>) {
     let Ok(identity) = identity(instance) else {
         return;
@@ -147,7 +149,7 @@ pub(crate) fn sweep(instance: &Instance, keep: Option<&Generation>) {
         }
         let removed = match path.is_dir() {
             true => removal_lock::lock_and_remove(&path),
-            // Of a version that put its segments there.
+            // An older version put its segments there.
             false => fs::remove_file(&path),
         };
         if let Err(error) = removed {
@@ -169,7 +171,7 @@ pub(crate) fn sweep(instance: &Instance, keep: Option<&Generation>) {
     }
 }
 
-/// Unlinks what brokers left that were killed and whose runtime directory is gone, so that nobody knows of it.
+/// Unlinks the remains of killed brokers if their runtime directory no longer exists.
 pub(crate) fn sweep_strays() -> usize {
     let user = rustix::process::geteuid().as_raw();
     let is_own = |path: &Path| {
@@ -187,7 +189,7 @@ pub(crate) fn sweep_strays() -> usize {
         .count()
 }
 
-/// `unlocked` is called between making the file and locking it.
+/// Creates and locks the life file. `unlocked` is called between creating and locking.
 fn lock_life(root: &Path, unlocked: impl FnOnce()) -> io::Result<File> {
     let path = root.join(UNNAMED_LIFE);
     let mut how = File::options();
@@ -199,8 +201,9 @@ fn lock_life(root: &Path, unlocked: impl FnOnce()) -> io::Result<File> {
     Ok(file)
 }
 
-/// Nobody has it who lives. A broker that has not locked its own yet has no file of that name; nor has what somebody
-/// made too late, whom the broker had stopped waiting for.
+/// Checks whether no living broker owns this directory. The file is missing if a broker has not
+/// locked its memory yet. It is also missing if a peer created the directory after the broker
+/// stopped waiting.
 fn is_stray(root: &Path) -> bool {
     match File::options().write(true).open(root.join(LIFE)) {
         Ok(file) => flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok(),
@@ -233,7 +236,7 @@ fn last_number(instance: &Instance) -> u64 {
     announced.max(begun.unwrap_or(0))
 }
 
-/// A random name that all shared memory of this instance begins with. It is kept in the instance's
+/// Returns the random prefix of all shared memory of this instance. It is kept in the instance's
 /// directory and not derived from its path: two containers may share memory but not directories.
 fn identity(instance: &Instance) -> io::Result<String> {
     let path = instance.dir().join(IDENTITY);
@@ -262,18 +265,18 @@ fn write_identity(instance: &Instance, identity: &str) -> io::Result<()> {
     Ok(())
 }
 
-/// A random number; not for secrets.
+/// Returns a random number that is not suitable for secrets.
 pub(crate) fn random() -> u64 {
     RandomState::new().hash_one(std::process::id())
 }
 
-/// The directory of everything that iceoryx2 makes, segments and the small files that it writes for
-/// every service and port: in memory, and open to nobody else. Its name cannot be known beforehand, so
-/// nobody can take it first.
+/// Creates the directory for all iceoryx2 files: segments and the small files for every service and
+/// port. It lies in memory and only its user can access it. Its name is unpredictable, so another
+/// process cannot take it first.
 fn root_in_memory(prefix: &str) -> io::Result<PathBuf> {
     let mut last = io::ErrorKind::AlreadyExists.into();
     for _ in 0..ATTEMPTS {
-        // iceoryx2 binds Unix sockets in it, whose own names take up to 48 of the kernel's 107 bytes.
+        // iceoryx2 binds Unix sockets in it. Their names take up to 48 of the kernel's 107 bytes.
         let name = format!("{prefix}{:08x}", random() >> 32);
         let root = Path::new(SHARED_MEMORY).join(name);
         match fs::DirBuilder::new().mode(0o700).create(&root) {
@@ -284,8 +287,8 @@ fn root_in_memory(prefix: &str) -> io::Result<PathBuf> {
     Err(last)
 }
 
-/// Takes from group and others what iceoryx2 gives them of its own accord, whatever the umask is.
-/// They do not get into `root` anyhow; this is for the day on which somebody opens it to them.
+/// Removes the permissions that iceoryx2 gives to group and others, whatever the umask is. They
+/// cannot enter `root` anyway. This protects the files in case `root` is opened to them.
 pub(crate) fn close_to_others(root: &Path) -> io::Result<()> {
     for entry in fs::read_dir(root)? {
         let entry = entry?;
@@ -354,7 +357,7 @@ mod tests {
         let dir = tempfile::TempDir::new().unwrap();
         let instance = Instance::at(dir.path().to_owned());
         let prefix = identity(&instance).unwrap();
-        // A directory that we may not empty.
+        // A directory that this user cannot empty.
         let root = root_in_memory(&format!("{prefix}1_")).unwrap();
         let inner = root.join("inner");
         fs::create_dir(&inner).unwrap();
@@ -363,7 +366,7 @@ mod tests {
         fs::set_permissions(&inner, fs::Permissions::from_mode(0o500)).unwrap();
         sweep(&instance, None);
         let known = dir.path().join(IDENTITY).exists();
-        // For root nothing is forbidden.
+        // Root has no such restrictions.
         let is_left = root.exists();
         if is_left {
             fs::set_permissions(&inner, removable).unwrap();

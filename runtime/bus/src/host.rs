@@ -30,29 +30,29 @@ use crate::runtime_files::{LockSlot, RuntimeFiles};
 use crate::session::Session;
 use crate::wake::{TICK, Waker};
 
-/// Frames read from one peer before it is the next one's turn.
+/// Frames read from one peer before the next peer is served.
 const QUOTA: usize = 8;
-/// Turns without an event before everything else of the process gets its turn.
+/// Iterations without an event before the other tasks of the process run.
 const TURNS_IN_A_ROW: usize = 8;
-/// Introductions read in one turn.
+/// Introductions read in one iteration.
 const HELLOS: usize = 64;
-/// How long a session that has been ended waits for its last words to be read.
+/// Time that an ended session waits until the peer has read its final output.
 const LINGER: Duration = Duration::from_secs(1);
-/// How long a peer may take to prove who it is, from its introduction.
+/// Maximum time from a peer's introduction to the proof of its identity.
 const PROVE_WITHIN: Duration = Duration::from_secs(1);
-/// Those who have not proven it and are remembered, and for how long.
+/// Maximum number of remembered peers without proof of identity, and the time they are remembered.
 const MAX_STRANGERS: usize = 64;
 const STRANGE_FOR: Duration = Duration::from_secs(60);
-/// Sessions in which such are told why they may not take part.
+/// Maximum number of sessions that only tell such a peer why it may not join.
 const MAX_TOLD: usize = 4;
-/// Processes whose attempts are remembered; beyond that, only those in session.
+/// Maximum number of processes with remembered attempts. Beyond it, only those in session stay.
 const MAX_REMEMBERED: usize = 4096;
-/// Bytes of documents that may stay until the process ends.
+/// Maximum bytes of documents that may stay until the process ends.
 const LEFT_TO_THE_END: usize = 16 << 20;
-/// How often processes are looked at.
+/// Interval of the check of processes.
 const WATCH_EVERY: Duration = Duration::from_millis(20);
 
-/// One session with a peer; never used again for another.
+/// One session with a peer. The number is never used again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PeerId(pub u64);
 
@@ -62,38 +62,38 @@ impl fmt::Display for PeerId {
     }
 }
 
-/// Something that the broker has to know.
+/// An event that the broker must handle.
 #[derive(Debug)]
 pub enum HostEvent {
-    /// A peer wants to take part: answer with [`Host::accept`] or [`Host::refuse`].
+    /// A peer wants to join. Answer with [`Host::accept`] or [`Host::refuse`].
     Hello {
-        /// Its session, new.
+        /// Its new session.
         peer: PeerId,
-        /// Its introduction; with the true process id, 0 where the process cannot be seen from here.
+        /// Its introduction with the true process id, or 0 if the process is not visible from here.
         hello: Hello,
-        /// The process that it is, as the kernel says.
+        /// Its process, as reported by the kernel.
         process: Option<Process>,
-        /// What its starter has put into [`crate::LAUNCH`] of its environment, empty if nothing.
+        /// Value of [`crate::LAUNCH`] in its environment, set by its starter. Empty if unset.
         launch: String,
     },
-    /// Somebody wanted to take part and did not prove who it is; it was told why.
+    /// A process wanted to join without proving its identity. It was told the reason.
     TurnedAway {
-        /// For a person.
+        /// Text for a person.
         why: String,
     },
-    /// A peer says something.
+    /// A peer has sent a message.
     Message {
         /// The session.
         peer: PeerId,
-        /// What.
+        /// The message.
         message: FromPeer,
     },
-    /// A peer sends what nobody can understand. What it sent before and sends later counts, unless
-    /// the broker disconnects it.
+    /// A peer has sent an invalid message. Its earlier and later messages count, unless the broker
+    /// disconnects it.
     Garbage {
         /// The session.
         peer: PeerId,
-        /// For a person.
+        /// Text for a person.
         what: String,
     },
     /// A peer's process has ended or has left the bus. The session is over.
@@ -105,8 +105,8 @@ pub enum HostEvent {
 
 /// The broker's end of the bus: one generation of one instance.
 ///
-/// Everything is removed when it is dropped, also what `Documents` handed out still refers to;
-/// memory that somebody has mapped stays readable.
+/// Dropping it removes everything, including what a returned `Documents` still refers to. Memory
+/// that a process has mapped stays readable.
 pub struct Host {
     generation: Generation,
     runtime_files: Arc<RuntimeFiles>,
@@ -116,16 +116,16 @@ pub struct Host {
     sessions: BTreeMap<PeerId, Session>,
     /// The last attempt of every process to get a session.
     attempts: HashMap<u64, u64>,
-    /// Who has not proven who it is, since when, and whether it was told so.
+    /// Peers without proof of identity: since when, and whether they were told so.
     strangers: HashMap<SessionKey, (Instant, bool)>,
     next_peer: u64,
-    /// Whom something was read from last: the next turn begins behind it.
+    /// The peer that was read from last. The next iteration starts after it.
     last_read: PeerId,
     last_turn: Instant,
     last_tick: Instant,
     last_watch: Instant,
     admission: Admission,
-    // What follows is dropped in this order: ports, the janitor, the node.
+    // The following fields are dropped in this order: ports, the janitor, the node.
     waker: Waker,
     hello: Sub<u8, HelloHeader>,
     config: Pub<u8, ConfigHeader>,
@@ -136,7 +136,7 @@ pub struct Host {
     remains: Option<Remains>,
 }
 
-/// Dropped last: unlinks what is still there, and only then gives the instance up.
+/// Dropped last: unlinks the remaining files and only then releases the instance.
 struct Remains {
     instance: Instance,
     lock: LockSlot,
@@ -144,7 +144,7 @@ struct Remains {
 
 impl Drop for Remains {
     fn drop(&mut self) {
-        // The ports have unlinked what is theirs; this is for what workers and peers still hold.
+        // The ports have unlinked their own files. Workers and peers may still hold other files.
         sweep(&self.instance, None);
         let mut lock = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(lock) = lock.take() {
@@ -153,7 +153,7 @@ impl Drop for Remains {
     }
 }
 
-/// Goes before an introduction.
+/// Header of an introduction.
 #[derive(Debug, Clone, Copy, Default, ZeroCopySend)]
 #[type_name("qcbus.HelloHeader.1")]
 #[repr(C)]
@@ -162,7 +162,7 @@ pub(crate) struct HelloHeader {
     pub(crate) attempt: u64,
 }
 
-/// Goes before the configuration.
+/// Header of the configuration.
 #[derive(Debug, Clone, Copy, Default, ZeroCopySend)]
 #[type_name("qcbus.ConfigHeader.1")]
 #[repr(C)]
@@ -172,8 +172,8 @@ pub(crate) struct ConfigHeader {
 }
 
 impl Host {
-    /// Takes the instance's lock, begins a new generation and removes what older ones left. Must
-    /// be called within a tokio runtime.
+    /// Takes the instance's lock, begins a new generation and removes the remains of older ones.
+    /// Must be called within a tokio runtime.
     ///
     /// # Errors
     /// See [`StartError`].
@@ -208,7 +208,7 @@ impl Host {
         let memory_lock = generation
             .lock_memory()
             .map_err(StartError::shared_memory)?;
-        // Somebody who takes no turns may have been faster.
+        // A process that does not wait for the memory lock may have taken the room.
         keep_room(&generation.root, room).map_err(|error| StartError::no_room(error, needed))?;
         let hub = Hub::create(&generation.root)?;
         let documents = Documents::new(
@@ -257,17 +257,17 @@ impl Host {
         Ok(host)
     }
 
-    /// Ends for everybody else as when it is dropped: peers are told, all files go, the instance is free. What only
-    /// this process has is left to the kernel, which takes it when the process ends, as it is about to: to close and
-    /// unmap it port by port takes longer than many a file to check. Much shared memory is not kept so long: others
-    /// may wait for it. `false`: it was dropped.
+    /// Ends for all others as if it were dropped: peers are told, all files are removed, and the
+    /// instance is free. The kernel releases the private resources of this process when it ends.
+    /// Closing every port here takes longer than checking many a file. Returns `false` if it was
+    /// dropped instead, because others may wait for a large amount of shared memory.
     pub fn end_with_process(mut self) -> bool {
         if self.documents.bytes() > LEFT_TO_THE_END {
             return false;
         }
         self.say_goodbye();
         self.admission.close();
-        // Or it would make again what goes now.
+        // Otherwise the janitor would recreate the files that are now removed.
         self.janitor = None;
         self.remains = None;
         std::mem::forget(self);
@@ -282,18 +282,18 @@ impl Host {
         }
     }
 
-    /// Number of this start of a broker on this instance.
+    /// Returns the number of this start of a broker on this instance.
     pub fn generation(&self) -> u64 {
         self.generation.number
     }
 
-    /// The next event; meanwhile everything queued is sent. Cancel-safe: nothing is lost when the
-    /// future is dropped. Nothing moves on the bus unless this is awaited. However much peers say,
-    /// it is read in turns of a few milliseconds, and others get theirs in between.
+    /// Returns the next event and meanwhile sends everything queued. Cancel-safe: dropping the
+    /// future loses nothing. Nothing moves on the bus unless this is awaited. Reading is split into
+    /// intervals of a few milliseconds, so other tasks run however much peers send.
     pub async fn next(&mut self) -> HostEvent {
         let mut room_locks = 0;
         loop {
-            // Also while events wait, or nothing would be sent until the last of them is fetched.
+            // This also runs while events wait, or nothing would be sent until the last is fetched.
             let more = if self.waiting.is_empty() || self.last_turn.elapsed() >= TICK {
                 self.receive_budget()
             } else {
@@ -317,7 +317,7 @@ impl Host {
         }
     }
 
-    /// Welcomes a peer: what is sent to it from now on goes out behind the welcome.
+    /// Welcomes a peer. Later messages to it are sent after the welcome.
     pub fn accept(&mut self, peer: PeerId, welcome: &ToPeer) {
         self.send(peer, welcome);
         self.documents.update_connections();
@@ -329,7 +329,7 @@ impl Host {
         }
     }
 
-    /// Sends a peer away. The session ends when it has read why, or after a second.
+    /// Refuses a peer. The session ends when the peer has read the reason, or after a second.
     pub fn refuse(&mut self, peer: PeerId, reason: &str) {
         let message = ToPeer::Refused {
             reason: reason.to_owned(),
@@ -340,9 +340,8 @@ impl Host {
         }
     }
 
-    /// Sends a message: it is kept until the peer has acknowledged it. Never blocks. To a peer
-    /// that is unknown (any more) nothing is sent; messages above [`codec::MAX_MESSAGE`] are
-    /// refused and logged.
+    /// Sends a message and keeps it until the peer has acknowledged it. Never blocks. Messages to
+    /// an unknown peer are dropped. Messages above [`codec::MAX_MESSAGE`] are refused and logged.
     pub fn send(&mut self, peer: PeerId, message: &ToPeer) {
         let Some(session) = self.sessions.get_mut(&peer) else {
             return;
@@ -353,21 +352,21 @@ impl Host {
         }
     }
 
-    /// Bytes that the peer has not acknowledged.
+    /// Returns the bytes that the peer has not acknowledged.
     pub fn backlog(&self, peer: PeerId) -> usize {
         self.sessions
             .get(&peer)
             .map_or(0, |session| session.link.backlog())
     }
 
-    /// Bytes of what was read and is not yet fetched: that there is an end to it has to be tested.
+    /// Returns the bytes of messages that were read but not yet fetched, for tests of the limit.
     #[doc(hidden)]
     pub fn waiting_bytes(&self) -> usize {
         self.waiting.bytes()
     }
 
-    /// Ends a session at once and gives its window back, whether the peer reacts or not. A peer
-    /// that still lives may introduce itself again.
+    /// Ends a session at once and releases its window, even if the peer does not react. A peer that
+    /// is still alive may introduce itself again.
     pub fn disconnect(&mut self, peer: PeerId) {
         if let Some(session) = self.sessions.get_mut(&peer) {
             session.link.farewell("");
@@ -375,7 +374,7 @@ impl Host {
         self.sessions.remove(&peer);
     }
 
-    /// Publishes the configuration to everyone, also to those who come later.
+    /// Publishes the configuration to all peers, including later ones.
     pub fn set_config(&mut self, digest: Digest, bytes: &[u8]) {
         if let Err(why) = self.publish_config(digest, bytes) {
             tracing::error!(why, "the configuration was not published");
@@ -383,22 +382,22 @@ impl Host {
         self.ring();
     }
 
-    /// Why nobody can join any more, for a person; said once.
+    /// Returns the reason why no peer can join any more, for a person. It is returned only once.
     pub fn loss(&self) -> Option<String> {
         self.runtime_files.loss()
     }
 
-    /// Lends and publishes documents, from any thread.
+    /// Returns the object that lends and publishes documents, from any thread.
     pub fn documents(&self) -> Documents {
         self.documents.clone()
     }
 
-    /// Sends what there is and reads as much as one turn may, without waiting. `true`: there may be
-    /// more to read.
+    /// Sends the queued data and reads as much as one receive budget allows, without waiting.
+    /// Returns `true` if there may be more to read.
     fn receive_budget(&mut self) -> bool {
         let now = Instant::now();
         self.greet(now, &Budget::new(now));
-        // One of its own: whoever introduces himself again and again keeps nobody from being heard.
+        // Reading has its own budget, so repeated introductions cannot delay other messages.
         let more = self.read(&mut Budget::new(Instant::now()));
         let ticked = now.duration_since(self.last_tick) >= TICK;
         if ticked {
@@ -420,8 +419,8 @@ impl Host {
         more
     }
 
-    /// Reads from every peer in turn, a few frames each, beginning behind the one that was read from
-    /// last. `true` when it stopped although there may be more.
+    /// Reads a few frames from every peer, starting after the one that was read from last. Returns
+    /// `true` if it stopped although there may be more.
     fn read(&mut self, budget: &mut Budget) -> bool {
         let behind = (Bound::Excluded(self.last_read), Bound::Unbounded);
         let later = self.sessions.range(behind).map(|(peer, _)| *peer);
@@ -442,7 +441,8 @@ impl Host {
                     self.last_read = *peer;
                     progress = true;
                 }
-                // Afterwards, so that every turn hears somebody, however slow the machine is.
+                // The check comes afterwards, so that even a slow machine reads from one peer each
+                // time.
                 if progress && budget.is_spent() {
                     return true;
                 }
@@ -453,10 +453,10 @@ impl Host {
         }
     }
 
-    /// Opens a session for everyone who is new.
+    /// Opens a session for every new peer.
     fn greet(&mut self, now: Instant, budget: &Budget) {
         for read in 0..HELLOS {
-            // Opening a session takes longest of all.
+            // Opening a session is the slowest step.
             if read > 0 && budget.is_spent() {
                 return;
             }
@@ -474,8 +474,8 @@ impl Host {
                 incarnation: header.incarnation,
                 attempt: header.attempt,
             };
-            // Introductions are repeated until they are answered, so most are known; and those of
-            // a session that is over may still lie about.
+            // Introductions are repeated until they are answered, so most are known. Those of an
+            // ended session may still be queued.
             let known = self.attempts.get(&key.incarnation);
             if known.is_some_and(|attempt| *attempt >= key.attempt) {
                 continue;
@@ -488,14 +488,14 @@ impl Host {
         }
     }
 
-    /// Whoever has proven who it is gets a session.
+    /// Opens a session for a peer that has proven its identity.
     fn meet(&mut self, key: SessionKey, hello: Hello, now: Instant) {
-        // It has said who it is before it said hello.
+        // The peer states its identity before it introduces itself.
         self.admission.receive_budget(now);
         let Some(known) = self.admission.take(&key) else {
             return self.is_strange(key, &hello, now);
         };
-        // Who was told why it may not take part has no claim to anything.
+        // A session that only reports a refusal does not reserve the number.
         let mut sessions = self.sessions.values().filter(|it| !it.is_silent());
         let older = sessions.find(|it| it.key().incarnation == key.incarnation);
         if older.is_some_and(|it| !it.is_of(&known)) {
@@ -506,7 +506,7 @@ impl Host {
         self.open(key, hello, known, now);
     }
 
-    /// Somebody says hello and has not proven who it is. It may be about to.
+    /// Records an introduction without proof of identity. The proof may still arrive.
     fn is_strange(&mut self, key: SessionKey, hello: &Hello, now: Instant) {
         self.strangers
             .retain(|_, (since, _)| now.saturating_duration_since(*since) < STRANGE_FOR);
@@ -522,7 +522,7 @@ impl Host {
         }
     }
 
-    /// Tells somebody who is not believed why, once.
+    /// Tells a distrusted peer the reason, once.
     fn refuse_hello(&mut self, key: SessionKey, hello: &Hello, why: &str, now: Instant) {
         let told = self.sessions.values().filter(|it| it.is_silent()).count();
         if self.strangers.get(&key).is_some_and(|(_, told)| *told) || told >= MAX_TOLD {
@@ -591,7 +591,7 @@ impl Host {
         }
     }
 
-    /// A process has at most one session: a new one ends the one before.
+    /// Ends the older session of a process, because it has at most one.
     fn supersede(&mut self, key: &SessionKey) {
         let older = self
             .sessions
@@ -619,7 +619,7 @@ impl Host {
         self.attempts.insert(key.incarnation, key.attempt);
     }
 
-    /// Looks for peers that have died or left, and ends sessions whose time is over.
+    /// Looks for peers that have died or left, and ends expired sessions.
     fn watch(&mut self, now: Instant) {
         let over: Vec<(PeerId, bool)> = self
             .sessions
@@ -638,7 +638,7 @@ impl Host {
         }
     }
 
-    /// What a peer said before it went still counts; it fits into its buffer.
+    /// Reads the remaining messages of a departed peer, which still count. They fit its buffer.
     fn hear_out(&mut self, peer: PeerId) {
         let Some(session) = self.sessions.get_mut(&peer) else {
             return;
@@ -677,10 +677,10 @@ impl Drop for Host {
     }
 }
 
-/// Whether a broker has room to start.
+/// Checks whether shared memory has room for a broker.
 fn look_for_room(needed: u64) -> Result<(), StartError> {
     let SharedMemory { size, free } = SharedMemory::now().map_err(StartError::shared_memory)?;
-    // A memory of size 0 has no limit.
+    // A size of 0 means that the memory has no limit.
     match size == 0 || free >= needed {
         true => Ok(()),
         false => Err(StartError::NoSharedMemory { size, free, needed }),

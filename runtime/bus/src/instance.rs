@@ -11,37 +11,37 @@ use rustix::fs::{FlockOperation, flock};
 const LOCK: &str = "lock";
 const MAX_NAME: usize = 48;
 
-/// Where the broker of an instance and its peers find each other.
+/// Location where the broker of an instance and its peers find each other.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Instance {
     dir: PathBuf,
     name: String,
 }
 
-/// Why an instance's directory cannot be used.
+/// Reason why an instance's directory cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum InstanceError {
-    /// The name would leave the runtime directory, or cannot be told from another.
+    /// The name would lead out of the runtime directory or is ambiguous.
     #[error(
         "`{0}` is no name of an instance: use up to {MAX_NAME} letters, digits, `.`, `_`, `-`, not beginning with `.`"
     )]
     BadName(String),
-    /// The directory belongs to somebody else, who could read and replace what is in it.
+    /// The directory belongs to another user, who could read and replace its content.
     #[error("no runtime directory: {0}; or set XDG_RUNTIME_DIR to a directory of your own")]
     NotOurs(TrustError),
-    /// The directory cannot be made.
+    /// The directory cannot be created.
     #[error("cannot use the runtime directory {}: {source}", dir.display())]
     Io {
         /// The directory.
         dir: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
 
 impl Instance {
-    /// The instance of this name: `$XDG_RUNTIME_DIR/qcbus/NAME`, or `qcbus-UID/NAME` in the
-    /// directory for temporary files. The directory is made, readable by its owner only.
+    /// Returns the instance of this name: `$XDG_RUNTIME_DIR/qcbus/NAME`, or `qcbus-UID/NAME` in the
+    /// directory for temporary files. Creates the directory, readable by its owner only.
     ///
     /// # Errors
     /// See [`InstanceError`].
@@ -62,7 +62,7 @@ impl Instance {
         })
     }
 
-    /// The directory of all named instances of this user; made when it is missing.
+    /// Returns the directory of all named instances of this user and creates it if missing.
     pub(crate) fn base_dir() -> Result<PathBuf, InstanceError> {
         let base = match std::env::var_os("XDG_RUNTIME_DIR") {
             Some(dir) if Path::new(&dir).is_absolute() => Path::new(&dir).join("qcbus"),
@@ -72,7 +72,7 @@ impl Instance {
         Ok(base)
     }
 
-    /// The instance in this directory, which the broker makes when it is missing.
+    /// Returns the instance in this directory. The broker creates the directory if it is missing.
     pub fn at(dir: PathBuf) -> Instance {
         let name = dir.file_name().map_or_else(
             || "default".into(),
@@ -81,28 +81,28 @@ impl Instance {
         Instance { dir, name }
     }
 
-    /// The runtime directory.
+    /// Returns the runtime directory.
     pub fn dir(&self) -> &Path {
         &self.dir
     }
 
-    /// The name, for people.
+    /// Returns the name for display.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Process id of the broker that serves this instance at the moment, if one does.
+    /// Returns the process id of the broker that currently serves this instance, if there is one.
     pub fn broker_pid(&self) -> Option<u32> {
         let file = File::open(self.dir.join(LOCK)).ok()?;
         match flock(&file, FlockOperation::NonBlockingLockShared) {
-            // Free: nobody holds it. (Ours is released when `file` is closed.)
+            // The lock is free. (The lock taken here is released when `file` is closed.)
             Ok(()) => None,
             Err(_) => read_pid(&file),
         }
     }
 
-    /// Makes the directory when it is missing. One that is there keeps its permissions: it may
-    /// have been chosen by a person. Nobody else may write to it.
+    /// Creates the directory if it is missing. An existing one keeps its permissions, because a
+    /// person may have chosen them. Other users must not be able to write to it.
     pub(crate) fn create_dir(&self) -> Result<(), InstanceError> {
         match trust::directory(&self.dir) {
             Ok(_) => Ok(()),
@@ -112,14 +112,14 @@ impl Instance {
     }
 }
 
-/// `qcbus-UID` in the directory for temporary files.
+/// Returns `qcbus-UID` in the directory for temporary files.
 pub(crate) fn private_temporary_dir() -> PathBuf {
     let uid = rustix::process::getuid().as_raw();
     std::env::temp_dir().join(format!("qcbus-{uid}"))
 }
 
-/// Makes a directory that only we can read, or sees to it that it is one. What is not ours is left as
-/// it is.
+/// Creates a directory that only this user can read, or restricts an existing one. A directory of
+/// another user is left as it is.
 pub(crate) fn private_dir(dir: &Path) -> Result<(), InstanceError> {
     trust::make_private_directory(dir)?;
     Ok(())
@@ -134,21 +134,21 @@ impl From<TrustError> for InstanceError {
     }
 }
 
-/// The broker's claim on an instance; released by the kernel when the process ends.
+/// The broker's lock on an instance. The kernel releases it when the process ends.
 #[derive(Debug)]
 pub(crate) struct InstanceLock {
     file: File,
     path: PathBuf,
 }
 
-/// Why the claim failed.
+/// Reason why the lock cannot be taken.
 #[derive(Debug)]
 pub(crate) enum LockError {
     Taken { pid: Option<u32> },
     Io(io::Error),
 }
 
-/// Attempts, two milliseconds apart, while the holder of the lock lives.
+/// Attempts, two milliseconds apart, while the holder of the lock is alive.
 const ATTEMPTS: u32 = 50;
 
 /// Attempts when the holder is dead.
@@ -157,10 +157,10 @@ const ATTEMPTS_AFTER_A_DEATH: u32 = 2500;
 impl InstanceLock {
     pub(crate) fn take(instance: &Instance) -> Result<InstanceLock, LockError> {
         let path = instance.dir.join(LOCK);
-        // Somebody may hold the lock for a moment to look whether it is free, and a broker that
-        // stops removes the file; hence more than one attempt. A broker that was killed while it
-        // started a child has left its lock with that child until the child is a program of its
-        // own, which takes a while on a busy machine; hence many attempts when the holder is dead.
+        // More than one attempt is needed: a process may briefly hold the lock to check it, and a
+        // stopping broker removes the file. A broker killed while it started a child leaves its
+        // lock with that child until the child executes its own program. This takes a while on a
+        // busy machine, so there are many attempts when the holder is dead.
         let mut holder = None;
         for attempt in 0..ATTEMPTS_AFTER_A_DEATH {
             if attempt >= ATTEMPTS && holder.is_none_or(is_alive) {
@@ -189,12 +189,12 @@ impl InstanceLock {
         Err(LockError::Taken { pid: holder })
     }
 
-    /// Whether the file is there by which others see the claim.
+    /// Checks whether the lock file by which others see the lock still exists.
     pub(crate) fn is_there(&self) -> bool {
         is_still_there(&self.file, &self.path)
     }
 
-    /// Gives the instance up and leaves no file behind.
+    /// Releases the instance and removes the lock file.
     pub(crate) fn release(self) {
         let _ = fs::remove_file(&self.path);
     }
@@ -251,7 +251,7 @@ mod tests {
             InstanceLock::take(&instance),
             Err(LockError::Taken { pid: Some(pid) }) if pid == std::process::id()
         ));
-        // As the kernel does when a process dies: the file stays.
+        // The file stays, as when a process dies.
         drop(lock);
         assert!(dir.path().join(LOCK).exists());
         assert_eq!(instance.broker_pid(), None);

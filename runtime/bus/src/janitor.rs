@@ -1,4 +1,4 @@
-//! Cleaning up after the dead, off the broker's loop.
+//! Janitor: cleans up after dead processes, outside the broker's loop.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -13,11 +13,11 @@ use crate::ports::{clean_dead_nodes, generation_config};
 use crate::runtime_files::RuntimeFiles;
 
 const EVERY: Duration = Duration::from_millis(250);
-/// A clean-up takes milliseconds; one that hangs must not keep the broker from stopping.
+/// Maximum wait for a clean-up at a stop. It takes milliseconds, and must not block the stop.
 const STOP_WITHIN: Duration = Duration::from_secs(2);
 
-/// A thread that removes what older generations left, once, and what dead peers left, again and
-/// again; and that makes again what was taken from the runtime directory.
+/// A thread that removes the remains of older generations once, and those of dead peers repeatedly.
+/// It also restores files that were removed from the runtime directory.
 pub(crate) struct Janitor {
     stop: Option<Sender<()>>,
     stopped: Receiver<()>,

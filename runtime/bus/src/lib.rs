@@ -1,19 +1,21 @@
 //! The bus between one broker and its bundles and reporters, over iceoryx2.
 //!
-//! [`Host`] is the broker's end, [`Peer`] everybody else's. Messages travel as reliable, ordered
-//! streams, one per peer and direction; document images are published once and read in place by
-//! everyone ([`Documents`], [`MappedImage`]). Nothing here ever blocks: whoever does not read holds up
-//! nobody but himself.
+//! [`Host`] is the broker's end, [`Peer`] the end of all others. Messages travel as reliable,
+//! ordered streams, one per peer and direction. Document images are published once and read in
+//! place by all peers ([`Documents`], [`MappedImage`]). Nothing here ever blocks: a peer that does
+//! not read delays only itself.
 //!
-//! This is the only crate that names iceoryx2. How it is made:
+//! Only this crate uses iceoryx2. Its structure:
 //!
 //! * `private_root`: where iceoryx2 puts its memory; `ports`: its configuration, and the only
 //!   constructor of services and ports;
-//! * `stream`, `link`: the streams, first as arithmetic, then on the bus;
-//! * `instance`, `generation`, `runtime_files`, `process`, `janitor`: finding each other, noticing deaths, leaving
-//!   nothing behind; `removal_lock`: nobody makes files in memory that is removed; `admission`: who is at the other end;
-//! * `memory`: how shared memory is had before it is written to;
-//! * `host` with `options`, `session`, `receive_budget`, `documents`; `peer` with `membership`, `library`; `mapped_image`; `wake`.
+//! * `stream`, `link`: the streams, first the pure logic, then on the bus;
+//! * `instance`, `generation`, `runtime_files`, `process`, `janitor`: discovery, detection of
+//!   deaths, removal of all files; `removal_lock`: the removal lock of the memory; `admission`: the
+//!   identity of peers;
+//! * `memory`: reserves shared memory before it is written to;
+//! * `host` with `options`, `session`, `receive_budget`, `documents`; `peer` with `membership`,
+//!   `library`; `mapped_image`; `wake`.
 
 mod admission;
 mod documents;

@@ -1,4 +1,4 @@
-//! A peer's side of the document topics: what it holds, and what it lets go first.
+//! A peer's side of the document topics: which documents it holds and which it releases first.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -15,7 +15,7 @@ struct Subscription {
     subscriber: Sub<Block, DocumentHeader>,
     out: Arc<AtomicUsize>,
     books: BTreeMap<DocId, Book>,
-    /// Those that a job was given out for which the peer has not finished with, here or not.
+    /// Documents of jobs that the peer has not finished, whether they have arrived or not.
     wanted: BTreeSet<DocId>,
 }
 
@@ -33,7 +33,7 @@ pub(crate) struct Library {
     subscriptions: [Subscription; 2],
 }
 
-/// What is to be read next.
+/// Result of reading the next sample.
 enum Next {
     Document(MappedImage),
     /// The broker needs shared memory.
@@ -57,8 +57,8 @@ impl Library {
         })
     }
 
-    /// Takes in what was published; `arrived` gets the number of each document. `true`: the broker
-    /// needs shared memory, so that what is only kept is to be let go.
+    /// Receives published documents and calls `arrived` with the number of each. Returns `true` if
+    /// the broker needs shared memory, so that cached documents must be released.
     pub(crate) fn drain(&mut self, mut arrived: impl FnMut(DocId)) -> bool {
         let mut asked = false;
         for subscription in &mut self.subscriptions {
@@ -92,7 +92,7 @@ impl Library {
             .map(|book| book.mapped_image.clone())
     }
 
-    /// A job needs this document: it stays, as long as there is another that may go.
+    /// Marks a document as needed by a job. It stays as long as another one can be released.
     pub(crate) fn want(&mut self, doc: DocId) {
         for subscription in &mut self.subscriptions {
             subscription.wanted.insert(doc);
@@ -124,7 +124,7 @@ impl Subscription {
         })
     }
 
-    /// The next document, unless there is none or every hand is full with documents in use.
+    /// Returns the next document, unless there is none or documents in use take every permit.
     fn receive(&mut self, generation: u64) -> Next {
         loop {
             let Some(image_use) = self.hand() else {
@@ -132,7 +132,8 @@ impl Subscription {
             };
             match self.subscriber.receive() {
                 Ok(Some(sample)) if sample.user_header().doc == LET_GO => {
-                    // Also those that somebody still has in hand: they go when he drops them.
+                    // Documents in use are included: they are released when their holder drops
+                    // them.
                     self.books.retain(|_, book| !book.released);
                     return Next::LetGo;
                 }
@@ -150,7 +151,7 @@ impl Subscription {
         }
     }
 
-    /// A free hand; lets go of what is least needed when there is none.
+    /// Returns a free permit. If there is none, it releases the least needed document first.
     fn hand(&mut self) -> Option<ImageUse> {
         loop {
             if let Some(image_use) = ImageUse::take(&self.out, self.row.borrowed - 1) {
@@ -168,8 +169,8 @@ impl Subscription {
         }
     }
 
-    /// Keeps few of the documents that are finished with: a map may come again, but every one
-    /// kept is memory that the broker cannot use.
+    /// Keeps only a few finished documents. A map may be needed again, but each cached one takes
+    /// memory that the broker cannot use.
     fn tidy(&mut self) {
         let keep = self.row.buffer.div_ceil(4);
         let mut released: Vec<(u64, DocId)> = self

@@ -1,4 +1,4 @@
-//! One session's pair of channels: frames of two streams over two iceoryx2 services.
+//! The pair of channels of one session: frames of two streams over two iceoryx2 services.
 
 use std::time::Instant;
 
@@ -9,22 +9,22 @@ use crate::memory::Backing;
 use crate::ports::{Pub, Sub, WakeNotifier};
 use crate::stream::{BrokenStream, Incoming, Outgoing};
 
-/// Frames that arrive before an acknowledgement is sent on its own, when none could ride along.
-/// Well below the window, so that a sender does not stall.
+/// Received frames after which a separate acknowledgement is sent, if no data frame could carry it.
+/// This is well below the window, so that a sender does not stall.
 const ACKNOWLEDGE_EVERY: u32 = 8;
 
-/// Frames in a row that bring nothing before a stream counts as broken: duplicates, frames after a
-/// gap, acknowledgements of what is known. Honest ones send a window of them again at most every
-/// half a second, and are heard in between.
+/// Useless frames in a row before a stream counts as broken: duplicates, frames after a gap, known
+/// acknowledgements. A correct sender repeats one window of them at most every half a second, and
+/// its useful frames arrive in between.
 const MAX_USELESS: u32 = 4096;
 
-/// What a frame is for; see [`FrameHeader::kind`].
+/// Purpose of a frame; see [`FrameHeader::kind`].
 const DATA: u32 = 1;
 const ACKNOWLEDGEMENT: u32 = 2;
-/// The sender of this frame is closing the session, and why is in the payload.
+/// The sender of this frame closes the session. The payload has the reason.
 const FAREWELL: u32 = 3;
 
-/// Goes before every frame.
+/// Header of every frame.
 #[derive(Debug, Clone, Copy, Default, ZeroCopySend)]
 #[type_name("qcbus.FrameHeader.1")]
 #[repr(C)]
@@ -34,46 +34,46 @@ pub(crate) struct FrameHeader {
     pub(crate) attempt: u64,
     /// Number of the frame in its stream; 0 when it carries no data.
     pub(crate) seq: u64,
-    /// The last frame that arrived in the other direction.
+    /// Number of the last frame that arrived in the other direction.
     pub(crate) ack: u64,
     pub(crate) kind: u32,
-    /// 1: the sender waits for the acknowledgement, so please do not put it off.
+    /// 1 if the sender waits for the acknowledgement, so it must not be delayed.
     pub(crate) urgent: u32,
 }
 
-/// What a session is bound to; frames of another one are void.
+/// Identity of a session. Frames with another identity are invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) struct SessionKey {
     pub(crate) generation: u64,
     /// Random number of the peer's process.
     pub(crate) incarnation: u64,
-    /// Counts the sessions that the process has asked for.
+    /// Counter of the sessions that the process has requested.
     pub(crate) attempt: u64,
 }
 
 impl SessionKey {
-    /// The part of the service names that distinguishes this session's.
+    /// Returns the part of the service names that identifies this session.
     pub(crate) fn suffix(&self) -> String {
         format!("{:016x}-{}", self.incarnation, self.attempt)
     }
 }
 
-/// What a drain found besides messages.
+/// Result of a drain besides messages.
 #[derive(Debug, Default)]
 pub(crate) struct Drained {
     /// Frames read.
     pub(crate) frames: usize,
     /// Bytes in them.
     pub(crate) bytes: usize,
-    /// The other side has said farewell, and why.
+    /// Reason of the farewell, if the other side has sent one.
     pub(crate) farewell: Option<String>,
-    /// The other side sends what is no stream.
+    /// Error of the other side's stream, if it is broken.
     pub(crate) broken: Option<BrokenStream>,
-    /// Frames that belong to no session of ours.
+    /// Frames that belong to no known session.
     pub(crate) foreign: usize,
 }
 
-/// Whether whoever gets messages wants another frame of them.
+/// Whether the receiver of messages wants another frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Wants {
     More,
@@ -91,14 +91,14 @@ pub(crate) struct Link {
     incoming: Incoming,
     broken: bool,
     urgent: bool,
-    /// The other side waits for an acknowledgement.
+    /// Whether the other side waits for an acknowledgement.
     asked: bool,
-    /// Frames since the last one that brought something.
+    /// Frames since the last useful one.
     useless: u32,
 }
 
 impl Link {
-    /// The other side may send messages of up to `most` bytes.
+    /// Creates a link. The other side may send messages of up to `most` bytes.
     pub(crate) fn new(
         key: SessionKey,
         (sender, backing): (Pub<u8, FrameHeader>, Backing),
@@ -121,8 +121,8 @@ impl Link {
         }
     }
 
-    /// Queues an encoded message. Full frames leave at once, the rest with the next flush, so that
-    /// what is said together travels together.
+    /// Queues an encoded message. Full frames are sent at once, the rest with the next flush, so
+    /// that consecutive messages share a frame.
     pub(crate) fn push(&mut self, message: &[u8]) {
         self.out.push(message);
         if self.out.has_full_frame() {
@@ -134,12 +134,12 @@ impl Link {
         self.out.backlog()
     }
 
-    /// From now on acknowledgements are asked for at once: the session is about to end.
+    /// Requests immediate acknowledgements from now on, because the session is about to end.
     pub(crate) fn hurry(&mut self) {
         self.urgent = true;
     }
 
-    /// Puts on the bus what the window and the other side's buffer take.
+    /// Sends as much as the window and the other side's buffer allow.
     pub(crate) fn flush(&mut self) {
         let mut notify = false;
         let ack = self.incoming.arrived();
@@ -161,7 +161,7 @@ impl Link {
         }
     }
 
-    /// Sends what is owed, and again what got lost. To be called every [`crate::wake::TICK`].
+    /// Sends pending acknowledgements and repeats lost frames. Call it every [`crate::wake::TICK`].
     pub(crate) fn tick(&mut self, now: Instant) {
         self.out.tick(now);
         if self.urgent && self.out.backlog() > 0 {
@@ -184,8 +184,8 @@ impl Link {
         sent
     }
 
-    /// Tells the other side that the session ends. Not repeated: who misses it sees that the
-    /// services are gone.
+    /// Tells the other side that the session ends. This is not repeated: a peer that misses it sees
+    /// that the services no longer exist.
     pub(crate) fn farewell(&mut self, reason: &str) {
         let mut end = reason.len().min(1024);
         while !reason.is_char_boundary(end) {
@@ -197,7 +197,7 @@ impl Link {
         self.notify();
     }
 
-    /// Wakes the other side without a frame: something lies on a shared topic.
+    /// Wakes the other side without a frame, because a shared topic has new data.
     pub(crate) fn ring(&self) {
         self.notify();
     }
@@ -208,8 +208,8 @@ impl Link {
         }
     }
 
-    /// Reads up to `quota` frames; `deliver` gets each message that they complete, and says whether
-    /// it wants more.
+    /// Reads up to `quota` frames. `deliver` gets each completed message and returns whether it
+    /// wants more.
     pub(crate) fn drain(
         &mut self,
         quota: usize,
@@ -228,7 +228,7 @@ impl Link {
             };
             drained.frames += 1;
             drained.bytes += sample.len().min(FRAME_BYTES);
-            // Copied out once, so that what is checked is what is used.
+            // The header is copied once, so that the checked values are the used ones.
             let header = *sample.user_header();
             let taken = self.take(header, &sample, &mut drained, |message| {
                 wants = deliver(message);
@@ -248,7 +248,7 @@ impl Link {
         drained: &mut Drained,
         deliver: impl FnMut(&[u8]),
     ) -> Result<(), BrokenStream> {
-        // The sender's publisher says how long it is, and may have slots of any size.
+        // The sender's publisher sets the length and may have slots of any size.
         if bytes.len() > FRAME_BYTES {
             return Err(BrokenStream::Frame(bytes.len()));
         }
@@ -291,8 +291,8 @@ fn header(key: SessionKey, kind: u32, seq: u64, ack: u64, urgent: bool) -> Frame
     }
 }
 
-/// `true` when the other side's buffer took the frame. Everything else, `Ok(0)` included, means
-/// that it is not known to have arrived.
+/// Returns `true` if the other side's buffer took the frame. Any other result, `Ok(0)` included,
+/// means that its arrival is unknown.
 fn transmit(
     sender: &Pub<u8, FrameHeader>,
     backing: &mut Backing,

@@ -1,4 +1,4 @@
-//! Zero-copy holds of published document images.
+//! Zero-copy access to published document images.
 
 use std::fmt;
 use std::ops::Deref;
@@ -14,30 +14,30 @@ use qcbus_messages::{Digest, DocId};
 
 use crate::ports::Service;
 
-/// The unit in which images are lent: a cache line. (Asking iceoryx2 for the alignment of `[u8]`
-/// instead would make every slot 64 times larger.)
+/// Unit in which images are lent: a cache line. If iceoryx2 got the alignment of `[u8]` instead,
+/// every slot would be 64 times larger.
 #[derive(Debug, Clone, Copy, Pod, Zeroable, ZeroCopySend)]
 #[type_name("qcbus.Block.1")]
 #[repr(C)]
 #[repr(align(64))]
 pub(crate) struct Block([u8; BLOCK_BYTES]);
 
-/// Goes before every image.
+/// Header of every image.
 #[derive(Debug, Clone, Copy, Default, ZeroCopySend)]
 #[type_name("qcbus.DocumentHeader.1")]
 #[repr(C)]
 pub(crate) struct DocumentHeader {
     pub(crate) generation: u64,
     pub(crate) doc: u64,
-    /// Bytes of the image; the rest of the last block is padding.
+    /// Size of the image in bytes. The rest of the last block is padding.
     pub(crate) used: u64,
     pub(crate) digest: [u8; 32],
     pub(crate) kind: u32,
     pub(crate) reserved: u32,
 }
 
-/// Stands for no document: the broker needs shared memory back, so whoever has finished with
-/// documents lets go of them.
+/// Value that stands for no document: the broker needs shared memory back. Peers must release the
+/// documents that they have finished with.
 pub(crate) const LET_GO: u64 = u64::MAX;
 
 pub(crate) fn kind_code(kind: FileKind) -> u32 {
@@ -56,12 +56,12 @@ fn kind_of_code(code: u32) -> Option<FileKind> {
 
 pub(crate) type DocumentSample = Sample<Service, [Block], DocumentHeader>;
 
-/// Counts what is held against a limit.
+/// A counted hold. The number of holds is limited.
 #[derive(Debug)]
 pub(crate) struct ImageUse(Arc<AtomicUsize>);
 
 impl ImageUse {
-    /// `None` when `limit` are out already.
+    /// Takes one item, or returns `None` if `limit` items are already taken.
     pub(crate) fn take(counter: &Arc<AtomicUsize>, limit: usize) -> Option<ImageUse> {
         counter
             .fetch_update(Ordering::AcqRel, Ordering::Acquire, |out| {
@@ -78,7 +78,7 @@ impl Drop for ImageUse {
     }
 }
 
-/// A mapping of shared memory with what it shows.
+/// A mapping of shared memory with its metadata.
 struct Mapped {
     start: *const u8,
     len: usize,
@@ -86,7 +86,7 @@ struct Mapped {
     doc: DocId,
     digest: Digest,
     kind: FileKind,
-    // Keeps the mapping and the slot. Before the ticket: the slot is given back first.
+    // Keeps the mapping and the slot. It precedes the counter, so the slot is returned first.
     _sample: Mutex<DocumentSample>,
     _image_use: ImageUse,
 }
@@ -95,21 +95,21 @@ struct Mapped {
     unsafe_code,
     reason = "a raw pointer makes the type neither Send nor Sync by itself"
 )]
-// SAFETY: `start` points into the mapping that `_sample` keeps, which is read from any thread as
-// from one; what is read does not change (see `MappedImage::deref`). The sample itself is Send, and is only
-// touched when it is dropped.
+// SAFETY: `start` points into the mapping that `_sample` keeps, which may be read from any thread.
+// The content does not change (see `MappedImage::deref`). The sample itself is Send and only
+// accessed when it is dropped.
 unsafe impl Send for Mapped {}
 #[expect(unsafe_code, reason = "see above")]
 // SAFETY: as above; shared access only reads immutable memory.
 unsafe impl Sync for Mapped {}
 
-/// A published image, read in place. It stays readable as long as any clone lives, even when the
-/// broker has gone.
+/// A published image, read in place. It stays readable as long as any clone exists, even after the
+/// broker has ended.
 #[derive(Clone)]
 pub struct MappedImage(Arc<Mapped>);
 
 impl MappedImage {
-    /// `None` when the header claims what cannot be.
+    /// Wraps a sample, or returns `None` if its header is invalid.
     pub(crate) fn new(
         sample: DocumentSample,
         generation: u64,
@@ -133,29 +133,29 @@ impl MappedImage {
         })))
     }
 
-    /// Number of the document.
+    /// Returns the number of the document.
     pub fn doc(&self) -> DocId {
         self.0.doc
     }
 
-    /// What tells it from every other image that a broker of this instance has ever published:
-    /// the generation and the number. The bytes behind it never change; the same document has
-    /// another one as soon as a byte of it, or of a file that it includes, has changed.
+    /// Returns the generation and the number, which identify the image among all that brokers of
+    /// this instance ever published. The bytes behind it never change. A document gets a new
+    /// identity as soon as a byte of it, or of a file that it includes, changes.
     pub fn identity(&self) -> (u64, DocId) {
         (self.0.generation, self.0.doc)
     }
 
-    /// Digest that it was published under: that of its file, whatever that includes.
+    /// Returns the digest under which it was published: that of its file, without included files.
     pub fn digest(&self) -> Digest {
         self.0.digest
     }
 
-    /// What sort of file it was made of.
+    /// Returns the kind of file it was made from.
     pub fn kind(&self) -> FileKind {
         self.0.kind
     }
 
-    /// Whether nobody else in this process holds it.
+    /// Checks whether no other code in this process holds it.
     pub(crate) fn is_unused(&self) -> bool {
         Arc::strong_count(&self.0) == 1
     }
@@ -169,17 +169,18 @@ impl Deref for MappedImage {
         reason = "the image is read in place, in memory that Rust does not own"
     )]
     fn deref(&self) -> &[u8] {
-        // SAFETY: `start` and `len` were taken from the sample's payload, within its bounds, and the
-        // mapping lives as long as `self.0`. A slice must not change while it is borrowed:
-        // - this process cannot write there, for subscribers map the segment for reading only;
-        // - the broker, which publishes, lends no slot again before every hold of it was given back;
+        // SAFETY: `start` and `len` were taken from the sample's payload, within its bounds, and
+        // the mapping lives as long as `self.0`. A slice must not change while it is borrowed:
+        // - this process cannot write there, because subscribers map the segment read-only;
+        // - the broker, which publishes, lends a slot again only after every hold of it was
+        //   returned;
         // - other users cannot open the segment: it is 0600, in a directory that is 0700;
-        // - other bundles cannot open it for writing once they are confined.
-        // What is left is a program of the same user that nothing confines. It may as well write into
-        // the memory of this process itself, so nothing is promised against it: a text that it spoils
-        // while it is borrowed is a `str` that is none. Whatever else it spoils ends in wrong or absent
-        // values (`a_slot_that_is_rewritten_while_it_is_read` in `tests/bus/privacy.rs`), because the
-        // accessors of `qcbus_document` check what they use when they use it.
+        // - other bundles cannot open it for writing once they are confined. An unconfined program
+        //   of the same user remains. It could also write into the memory of this process itself,
+        //   so there is no guarantee against it. A text that it changes while borrowed may be an
+        //   invalid `str`. Any other change leads to wrong or missing values
+        //   (`a_slot_that_is_rewritten_while_it_is_read` in `tests/bus/privacy.rs`), because the
+        //   accessors of `qcbus_document` check everything on use.
         unsafe { std::slice::from_raw_parts(self.0.start, self.0.len) }
     }
 }

@@ -24,25 +24,25 @@ use crate::wake::{TICK, Waker};
 
 /// How often an introduction is repeated.
 const HELLO_EVERY: Duration = Duration::from_millis(50);
-/// So many introductions, and it is said again which process this is.
+/// Number of introductions after which the process states its identity again.
 const PROVE_EVERY: u32 = 20;
-/// Frames read before documents are looked at.
+/// Frames read before documents are read.
 const QUOTA: usize = 32;
 
-/// How things stand between peer and broker.
+/// State of the relation between peer and broker.
 #[derive(Debug)]
 pub(crate) enum MembershipState {
-    /// Not answered yet.
+    /// The broker has not answered yet.
     Waiting,
-    /// Welcomed in this turn.
+    /// The broker has just welcomed the peer.
     JustWelcomed,
     /// In session.
     Welcome,
-    /// Sent away.
+    /// The broker has refused the peer.
     Refused(String),
-    /// Over, without a reason: another session may be had.
+    /// The session is over without a reason. Another one is possible.
     Ended,
-    /// Over, because something failed on this side.
+    /// The session is over because of a failure on this side.
     Failed(String),
 }
 
@@ -63,7 +63,7 @@ impl From<PortError> for BeginError {
     }
 }
 
-/// The channels of a session, once the broker has made them.
+/// The channels of a session, created by the broker.
 struct Channels {
     link: Link,
     waker: Waker,
@@ -81,14 +81,14 @@ pub(crate) struct Membership {
     hellos: u32,
     proves: bool,
     instance: Instance,
-    /// Where we have said who we are; the broker sees by them whether we live.
+    /// Statements of this process's identity. Through them the broker sees whether it lives.
     said: Vec<Statement>,
-    /// Until it is welcome it makes files.
+    /// Removal lock, needed because the peer creates files until it is welcome.
     removal_lock: RemovalLock,
     last_tick: Instant,
     welcome: bool,
     refused: Option<String>,
-    // Ports before the node.
+    // Ports are dropped before the node.
     channels: Option<Channels>,
     library: Library,
     config: Sub<u8, ConfigHeader>,
@@ -98,8 +98,8 @@ pub(crate) struct Membership {
 }
 
 impl Membership {
-    /// Joins the generation and subscribes to what is shared, so that the broker's answer to the
-    /// introduction finds subscribers for documents and configuration.
+    /// Joins the generation and subscribes to the shared topics, so that the broker's answer finds
+    /// subscribers for documents and configuration.
     pub(crate) fn begin(
         instance: &Instance,
         generation: Generation,
@@ -153,7 +153,7 @@ impl Membership {
         })
     }
 
-    /// Where everything of the generation lies.
+    /// Returns the root directory of the generation.
     pub(crate) fn root(&self) -> &Path {
         &self.generation.root
     }
@@ -207,8 +207,8 @@ impl Membership {
         }
     }
 
-    /// Returns when the broker has woken us or, before there are channels, has made them, or after `limit`.
-    /// Cancel-safe.
+    /// Returns when the broker has woken this peer, or after `limit`. While there are no channels,
+    /// it returns when the broker has created them. Cancel-safe.
     pub(crate) async fn wait(&self, limit: Duration) {
         match &self.channels {
             Some(channels) => channels.waker.wait(limit).await,
@@ -219,7 +219,7 @@ impl Membership {
         }
     }
 
-    /// Does as much as can be done without waiting.
+    /// Does everything that is possible without waiting.
     pub(crate) fn receive_budget(
         &mut self,
         now: Instant,
@@ -251,8 +251,8 @@ impl Membership {
         }
     }
 
-    /// Reads messages first and documents after them: then the documents of a job that has been
-    /// read are there, because they were published before it was sent. `true` when the broker
+    /// Reads messages first and documents after them. The documents of a received job have then
+    /// arrived, because they were published before the job was sent. Returns `true` if the broker
     /// has ended the session.
     pub(crate) fn read(
         &mut self,
@@ -281,8 +281,8 @@ impl Membership {
         if asked {
             events.push_back(PeerEvent::LetGo);
         }
-        // Documents and configurations before the messages that speak of them; but nothing
-        // before the welcome.
+        // Documents and configurations precede the messages that refer to them, but the welcome
+        // comes first.
         let behind = events.len();
         for message in messages {
             self.hear(message, events);
@@ -332,7 +332,7 @@ impl Membership {
         }
     }
 
-    /// Introduces itself, again and again, until the broker has made the channels.
+    /// Introduces itself repeatedly until the broker has created the channels.
     fn connect(&mut self, now: Instant) -> Result<(), String> {
         let due = self
             .last_hello
@@ -397,7 +397,7 @@ impl Membership {
         Ok(())
     }
 
-    /// Whether the broker lives, serves the same generation, and keeps this session.
+    /// Checks whether the broker lives, serves the same generation and keeps this session.
     pub(crate) fn broker_is_there(&mut self, instance: &Instance) -> bool {
         let kept = match &mut self.channels {
             Some(channels) => {
@@ -407,15 +407,15 @@ impl Membership {
             }
             None => true,
         };
-        // A file that is not there says nothing: a broker that goes closes its channels, and one whose
-        // directory was cleaned makes it again.
+        // A missing file proves nothing. A stopping broker closes its channels, and a running one
+        // recreates the file after its directory was cleaned.
         let told = Generation::current(instance);
         kept && self.broker.is_alive() && told.is_none_or(|current| current == self.generation)
     }
 }
 
-/// Makes room for what joining takes: out of what the broker has kept for it, else out of what is
-/// free.
+/// Provides the memory for joining, from the broker's reserve for peers or else from the free
+/// memory.
 fn take_part(root: &Path, needed: u64) -> Result<(), PortError> {
     let free = free_shared_memory();
     if take_room(root, needed) || free >= needed {

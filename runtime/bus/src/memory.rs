@@ -1,9 +1,10 @@
-//! Shared memory: how much there is, and how it is taken.
+//! Shared memory: measures its size and reserves it.
 //!
-//! The first write to a page of /dev/shm that cannot be had is a SIGBUS. So nothing is written that
-//! was not had before. Whoever takes much looks at what is free, and takes it, while no other
-//! process of the same user does; what a broker's peers will need is had before they come, in a file
-//! of which each takes its part; and the slots of a stream are had a few ahead of those in use.
+//! Writing to a page of /dev/shm that cannot be allocated raises SIGBUS. So all memory is allocated
+//! before it is written to. A process that needs much checks and takes the free memory while no
+//! other process of the same user does. The broker allocates the memory of its peers in advance in
+//! a file, from which each takes its part. The slots of a stream are allocated a few ahead of those
+//! in use.
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -20,43 +21,44 @@ use rustix::io::{Errno, retry_on_intr};
 
 use crate::instance::Instance;
 
-/// Where it is.
+/// Path of the shared memory.
 pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 
-/// A turn takes milliseconds, and several processes may stand in line on a busy machine. Whoever waits
-/// longer waits for a process that was stopped in its turn. Well below the time in which a peer must have joined.
+/// Maximum wait for the lock. Each holder takes milliseconds, and several processes may wait on a
+/// busy machine. A longer wait means that a stopped process holds the lock. This is well below the
+/// time in which a peer must join.
 const IN_LINE: Duration = Duration::from_secs(2);
 
-/// Whether this process has last waited for a turn in vain. It does not wait again before it has had one: each wait
-/// would be as long, and whoever joins would be too late.
+/// Whether the last wait of this process for the lock has timed out. It does not wait again until
+/// it has held the lock. Otherwise each wait would be as long, and a peer would join too late.
 static IN_VAIN: AtomicBool = AtomicBool::new(false);
 
-/// Bytes that are had by one call: some hundred microseconds.
+/// Bytes allocated by one call, which takes some hundred microseconds.
 const HAVE_STEP: u64 = 256 << 10;
 
 /// The shared memory of this system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SharedMemory {
-    /// Bytes in all.
+    /// Total bytes.
     pub size: u64,
     /// Bytes that an ordinary user may still take.
     pub free: u64,
 }
 
 impl SharedMemory {
-    /// Whether it is mounted for reading only, so that no broker can start.
+    /// Checks whether it is mounted read-only, so that no broker can start.
     ///
     /// # Errors
-    /// When there is none.
+    /// Fails if there is no shared memory.
     pub fn is_read_only() -> io::Result<bool> {
         let stat = rustix::fs::statvfs(SHARED_MEMORY)?;
         Ok(stat.f_flag.contains(rustix::fs::StatVfsMountFlags::RDONLY))
     }
 
-    /// As it is now.
+    /// Returns the current size and free bytes.
     ///
     /// # Errors
-    /// When there is none.
+    /// Fails if there is no shared memory.
     pub fn now() -> io::Result<SharedMemory> {
         let stat = rustix::fs::statvfs(SHARED_MEMORY)?;
         Ok(SharedMemory {
@@ -66,13 +68,13 @@ impl SharedMemory {
     }
 }
 
-/// Bytes that an ordinary user may still take in /dev/shm.
+/// Returns the bytes that an ordinary user may still take in /dev/shm.
 pub(crate) fn free_shared_memory() -> u64 {
     SharedMemory::now().map_or(0, |memory| memory.free)
 }
 
-/// The reserve asked for, but not more than an eighth of a small /dev/shm. A memory without a limit
-/// (of size 0) has room for any.
+/// Returns the requested reserve, limited to an eighth of /dev/shm. For a memory without a limit
+/// (size 0) the reserve is 0.
 pub(crate) fn fitting_reserve(wanted: u64) -> u64 {
     match SharedMemory::now() {
         Ok(memory) => wanted.min(memory.size / 8),
@@ -80,18 +82,18 @@ pub(crate) fn fitting_reserve(wanted: u64) -> u64 {
     }
 }
 
-/// Sees to it that of all processes of this user one at a time takes shared memory.
+/// A lock by which only one process of this user at a time takes shared memory.
 pub(crate) struct RoomLocks(Mutex<Option<File>>);
 
 impl RoomLocks {
-    /// Where the lock cannot be had, every process goes by what is free alone.
+    /// Opens the lock file. If that fails, the process relies on the free memory alone.
     pub(crate) fn new() -> RoomLocks {
         let open = || -> Option<File> {
             let path = Instance::base_dir().ok()?.join(".memory");
             let mut how = OpenOptions::new();
             how.read(true).write(true).create(true).truncate(false);
             how.mode(0o600).custom_flags(libc::O_NOFOLLOW);
-            // A bundle that the broker has started may write nothing there, and needs not: a lock is all.
+            // A bundle started by the broker cannot write there. Read access is enough for a lock.
             let read = || {
                 let mut how = OpenOptions::new();
                 how.read(true).custom_flags(libc::O_NOFOLLOW).open(&path)
@@ -101,7 +103,7 @@ impl RoomLocks {
         RoomLocks(Mutex::new(open()))
     }
 
-    /// Waits for a turn, but not for ever: whoever was stopped in its turn must not stop the others.
+    /// Waits for the lock, up to a limit. A stopped holder must not block the other processes.
     pub(crate) fn take(&self) -> RoomLock<'_> {
         let file = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let locked = file.as_ref().is_some_and(wait_for);
@@ -109,7 +111,7 @@ impl RoomLocks {
     }
 }
 
-/// Whether the lock was had within the time.
+/// Checks whether the lock was taken within the time limit.
 fn wait_for(file: &File) -> bool {
     let patience = match IN_VAIN.load(Ordering::Relaxed) {
         true => Duration::ZERO,
@@ -127,7 +129,7 @@ fn wait_for(file: &File) -> bool {
     locked
 }
 
-/// Nobody else takes shared memory meanwhile.
+/// Guard of the lock: no other process takes shared memory meanwhile.
 pub(crate) struct RoomLock<'t> {
     file: MutexGuard<'t, Option<File>>,
     locked: bool,
@@ -141,10 +143,10 @@ impl Drop for RoomLock<'_> {
     }
 }
 
-/// Has shared memory for those who will join a generation: a file of that size.
+/// Reserves shared memory for the peers that will join a generation, as a file of that size.
 ///
 /// # Errors
-/// When it cannot be had; then nothing of it is kept.
+/// Fails if the memory cannot be allocated. The file is then removed.
 pub(crate) fn keep_room(root: &Path, bytes: u64) -> io::Result<()> {
     let path = room(root);
     let mut how = OpenOptions::new();
@@ -155,12 +157,13 @@ pub(crate) fn keep_room(root: &Path, bytes: u64) -> io::Result<()> {
     })
 }
 
-/// Has the memory of a part of a file.
+/// Allocates the memory of a part of a file.
 fn have(file: &File, flags: FallocateFlags, part: Range<u64>) -> Result<(), Errno> {
     in_steps(part, |from, bytes| fallocate(file, flags, from, bytes))
 }
 
-/// Older kernels end a call at any signal and undo it, so it is done in short steps, and each is repeated.
+/// Runs an allocation in short steps and retries each step. Older kernels end a call at any signal
+/// and undo it.
 fn in_steps(
     part: Range<u64>,
     mut take: impl FnMut(u64, u64) -> Result<(), Errno>,
@@ -174,7 +177,7 @@ fn in_steps(
     Ok(())
 }
 
-/// Gives back a part of what was kept for those who join. `false`: there is not so much left.
+/// Releases a part of the memory reserved for peers. Returns `false` if not enough is left.
 pub(crate) fn take_room(root: &Path, bytes: u64) -> bool {
     let mut how = OpenOptions::new();
     let file = how.write(true).custom_flags(libc::O_NOFOLLOW);
@@ -192,24 +195,24 @@ fn room(root: &Path) -> PathBuf {
     root.join("room")
 }
 
-/// The memory of one publisher's slots of a fixed size. It is had some slots ahead of those in use:
-/// slots are used for the first time one after the other, and most never are.
+/// The memory of one publisher's slots of a fixed size, allocated some slots ahead of those in use.
+/// Slots are first used one after the other, and most never are.
 pub(crate) struct Backing {
     file: Option<File>,
-    /// Bytes of the segment.
+    /// Size of the segment in bytes.
     len: u64,
-    /// Bytes from its beginning that are had.
+    /// Bytes allocated from its beginning.
     had: u64,
-    /// Address of the first slot that was lent, and the highest end of all that were, seen from there.
+    /// Address of the first lent slot, and the highest end of all lent slots relative to it.
     first: Option<usize>,
     used: u64,
 }
 
 impl Backing {
-    /// That of the publisher with this id, which has lent nothing yet.
+    /// Returns the memory of the publisher with this id, which has not lent anything yet.
     ///
     /// # Errors
-    /// When there is no room, or what else the system says.
+    /// Returns the error of the operating system, for example if there is no room.
     pub(crate) fn of(root: &Path, publisher: u128) -> io::Result<Backing> {
         let mut backing = Backing {
             file: segment(root, publisher),
@@ -226,15 +229,15 @@ impl Backing {
         Ok(backing)
     }
 
-    /// All of it at once.
+    /// Allocates the whole memory at once.
     ///
     /// # Errors
-    /// When there is no room, or what else the system says.
+    /// Returns the error of the operating system, for example if there is no room.
     pub(crate) fn whole(root: &Path, publisher: u128) -> io::Result<()> {
         Backing::of(root, publisher)?.reach(u64::MAX)
     }
 
-    /// Whether the next slot may be lent. To be asked before every loan.
+    /// Checks whether the next slot may be lent. Must be called before every loan.
     pub(crate) fn is_ahead(&mut self) -> bool {
         let ahead = self.go_ahead();
         if let Err(error) = &ahead {
@@ -247,12 +250,12 @@ impl Backing {
         self.reach(self.used + STREAM_STEP_BYTES / 2)
     }
 
-    /// A slot of so many bytes was lent at this address.
+    /// Records that a slot of this size was lent at this address.
     pub(crate) fn lent(&mut self, address: usize, bytes: usize) {
         let first = *self.first.get_or_insert(address);
         self.used = match address.checked_sub(first) {
             Some(offset) => self.used.max((offset + bytes) as u64),
-            // Not in the order that is expected: all may be used.
+            // The order of addresses is unexpected, so all slots may be in use.
             None => self.len,
         };
     }
@@ -267,7 +270,7 @@ impl Backing {
         let until = wanted.saturating_add(STREAM_STEP_BYTES / 2).min(self.len);
         match have(file, FallocateFlags::KEEP_SIZE, self.had..until) {
             Ok(()) => self.had = until,
-            // A file system without it: there the reserve alone has to do.
+            // The file system does not support this, so the reserve alone must suffice.
             Err(Errno::OPNOTSUPP) => self.had = self.len,
             Err(error) => return Err(error.into()),
         }
@@ -275,7 +278,7 @@ impl Backing {
     }
 }
 
-/// The segment of a publisher: its name ends with the publisher's number, which nobody else has.
+/// Opens the segment of a publisher. Its name ends with the publisher's unique number.
 fn segment(root: &Path, publisher: u128) -> Option<File> {
     let end = format!("_{publisher}.data");
     let mut entries = fs::read_dir(root).ok()?.flatten();

@@ -1,4 +1,4 @@
-//! What a broker's end of the bus is made for, and why it cannot be had.
+//! Options of the broker's end of the bus, and the reasons why it cannot start.
 
 use qcbus_messages::services::{Limits, Services};
 
@@ -7,25 +7,25 @@ use crate::memory::SharedMemory;
 use crate::memory::fitting_reserve;
 use crate::ports::PortError;
 
-/// What the bus is made for.
+/// Options of the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HostOptions {
-    /// Bundles and reporters at once.
+    /// Maximum number of bundles and reporters at the same time.
     pub max_peers: usize,
-    /// Documents that jobs under way may need, in the small class. The broker keeps its active
-    /// jobs below it, or slow peers have to ask for documents again.
+    /// Maximum number of documents that running jobs need, in the small class. The broker keeps its
+    /// active jobs below it. Otherwise slow peers must request documents again.
     pub active_documents: usize,
     /// The same in the large class.
     pub large_active_documents: usize,
-    /// Largest image of the small class, in bytes.
+    /// Maximum size of an image of the small class in bytes.
     pub small_class_bytes: usize,
-    /// Bytes of /dev/shm that stay free; at most an eighth of a small one is kept.
+    /// Bytes of /dev/shm that stay free. At most an eighth of /dev/shm is reserved.
     pub shm_reserve_bytes: u64,
-    /// Bundles and reporters that are expected: for so many there is shared memory from the
+    /// Number of expected bundles and reporters. Shared memory for them is reserved from the
     /// beginning.
     pub expected_peers: usize,
-    /// Whether a configuration may come that is larger than 64 KiB. Being ready for it takes a megabyte
-    /// of private memory, in every peer, too.
+    /// Whether a configuration may be larger than 64 KiB. Supporting this takes a megabyte of
+    /// private memory, also in every peer.
     pub config_grows: bool,
 }
 
@@ -44,8 +44,8 @@ impl Default for HostOptions {
     }
 }
 
-/// Sizes for a process that may not map much: images of the small class, and what the large class
-/// begins with.
+/// Sizes for a process with a limited address space: the maximum image of the small class, and the
+/// initial size of the large class.
 const FEW_ADDRESSES: [usize; 2] = [128 << 10, 1 << 20];
 
 fn with_few_addresses(limits: Limits) -> Limits {
@@ -58,22 +58,22 @@ fn with_few_addresses(limits: Limits) -> Limits {
 }
 
 impl HostOptions {
-    /// Bytes of shared memory that a broker takes or keeps free, without documents: what it needs
-    /// itself, as much for each peer that is expected as that will take, and the reserve.
+    /// Returns the bytes of shared memory that a broker takes or keeps free, without documents.
+    /// These are its own needs, those of each expected peer, and the reserve.
     pub fn shared_memory_bytes(&self) -> u64 {
         let services = Services::new(&self.limits());
         let peers = self.expected_peers as u64 * services.peer_bytes();
         services.broker_bytes() + peers + fitting_reserve(self.shm_reserve_bytes)
     }
 
-    /// Bytes of addresses that a broker needs at least, and to carry everything.
+    /// Returns the bytes of address space that a broker needs at least, and for all limits.
     pub fn address_bytes(&self) -> (u64, u64) {
         let all = self.limits();
         let needed = |limits: &Limits| Services::new(limits).address_bytes();
         (needed(&self.least(all)), needed(&all))
     }
 
-    /// The same bus for small images alone, and for few peers.
+    /// Returns the limits of a bus for small images only and for few peers.
     fn least(&self, limits: Limits) -> Limits {
         Limits {
             peers: limits.peers.min(self.expected_peers + 1),
@@ -81,7 +81,7 @@ impl HostOptions {
         }
     }
 
-    /// What the bus looks like within a limited address space.
+    /// Returns the limits of the bus that fit into a limited address space.
     pub(crate) fn limits_within(&self, space: Option<u64>) -> Result<Limits, StartError> {
         let limits = self.limits();
         let Some(space) = space else {
@@ -114,7 +114,7 @@ impl HostOptions {
     }
 }
 
-/// Why the bus could not be set up.
+/// Reason why the bus cannot start.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
     /// Another broker serves this instance.
@@ -122,7 +122,7 @@ pub enum StartError {
     AlreadyRunning {
         /// The instance.
         instance: String,
-        /// The other broker.
+        /// Process id of the other broker.
         pid: Option<u32>,
     },
     /// The runtime directory cannot be used.
@@ -131,38 +131,38 @@ pub enum StartError {
     /// A file in the runtime directory cannot be written.
     #[error("cannot write to the runtime directory: {0}")]
     Io(#[from] std::io::Error),
-    /// There is no room for the bus itself; without it, the first write is a bus error.
+    /// There is no room for the bus itself. Without this check, the first write raises SIGBUS.
     #[error(
         "not enough shared memory: {free} of {size} bytes are free in /dev/shm, a broker needs {needed} to start; {}", way_out(*size, *free, *needed)
     )]
     NoSharedMemory {
-        /// Bytes of /dev/shm.
+        /// Size of /dev/shm in bytes.
         size: u64,
         /// Free bytes.
         free: u64,
         /// Bytes that must be free.
         needed: u64,
     },
-    /// Shared memory cannot be used, for another reason than its size.
+    /// Shared memory cannot be used, for a reason other than its size.
     #[error(
         "cannot use the shared memory in /dev/shm: {source}{}",
         shared_memory_way_out(source)
     )]
     SharedMemory {
-        /// What the system says.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// The process may not map the bus.
+    /// The address space limit of the process is too small for the bus.
     #[error(
         "the address space of this process is limited to {limit} bytes (`ulimit -v`), a broker for so many bundles needs {needed}; raise it with `ulimit -v unlimited`"
     )]
     AddressSpace {
         /// The limit, in bytes.
         limit: u64,
-        /// Bytes of addresses that would do.
+        /// Sufficient bytes of address space.
         needed: u64,
     },
-    /// The bus refused, in its words.
+    /// The bus refuses, with this error text.
     #[error("the bus refused: {0}")]
     Bus(String),
 }
@@ -172,7 +172,7 @@ impl StartError {
         StartError::SharedMemory { source }
     }
 
-    /// Why room was not had, although so many bytes were free a moment ago.
+    /// Returns the error for a failed reservation, although enough bytes were free a moment ago.
     pub(crate) fn no_room(source: std::io::Error, needed: u64) -> StartError {
         let is_full = source.kind() == std::io::ErrorKind::StorageFull;
         match SharedMemory::now() {
@@ -183,7 +183,7 @@ impl StartError {
         }
     }
 
-    /// Whether it may pass by itself, when others let go of shared memory.
+    /// Checks whether the error may pass by itself when others release shared memory.
     pub fn may_pass(&self) -> bool {
         match self {
             StartError::NoSharedMemory { size, needed, .. } => needed <= size,
@@ -193,7 +193,7 @@ impl StartError {
     }
 }
 
-/// Sizes are advised in steps of so many bytes: people remember them.
+/// Step of recommended sizes in bytes. Round sizes are easy to remember.
 const STEP: u64 = 64 << 20;
 
 fn shared_memory_way_out(source: &std::io::Error) -> &'static str {
@@ -210,7 +210,7 @@ fn shared_memory_way_out(source: &std::io::Error) -> &'static str {
 
 fn way_out(size: u64, free: u64, needed: u64) -> String {
     let taken = size.saturating_sub(free);
-    // What is missing, and as much again for what is to be checked.
+    // The size covers the needs of the bus and as much again for documents.
     let wanted = taken.saturating_add(needed.saturating_mul(2));
     let advised = wanted.div_ceil(STEP).saturating_mul(STEP) >> 20;
     let make = format!(

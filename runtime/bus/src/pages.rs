@@ -1,12 +1,13 @@
-//! The pages of shared memory behind a slot: taken before it is written to, given back when nobody needs it.
+//! The pages of shared memory behind a slot: allocates them before writing, and releases unneeded
+//! ones.
 
 use std::sync::OnceLock;
 
-/// Has the kernel back the pages now. Without it the first write to a page that cannot be had
-/// is a SIGBUS; here it is an error. Kernels before 5.14 do not know the request: there the
-/// reserve alone has to do.
+/// Makes the kernel allocate the pages now. Otherwise the first write to an unavailable page raises
+/// SIGBUS; here it is an error. Kernels before 5.14 do not know the request. There the reserve
+/// alone must suffice.
 ///
-/// New pages take as long as parsing what will be written to them: several threads ask for many.
+/// Allocating pages takes as long as parsing the data for them, so several threads allocate many.
 pub(crate) fn back_with_memory<T: Send>(blocks: &mut [T]) -> Result<(), ()> {
     let parts = (size_of_val(blocks) / PART).min(cores()).min(MOST_PARTS);
     let done = match parts {
@@ -23,10 +24,10 @@ pub(crate) fn back_with_memory<T: Send>(blocks: &mut [T]) -> Result<(), ()> {
     }
 }
 
-/// At least so many bytes for each thread that asks for pages, which takes it milliseconds.
+/// Minimum bytes for each thread that allocates pages, which takes it milliseconds.
 const PART: usize = 4 << 20;
 
-/// More threads than these wait for each other in the kernel.
+/// Maximum number of threads: more would wait for each other in the kernel.
 const MOST_PARTS: usize = 4;
 
 fn cores() -> usize {
@@ -46,7 +47,7 @@ fn populate_by<T: Send>(parts: usize, blocks: &mut [T]) -> Result<(), rustix::io
         let others: Vec<_> = parts.map(ask).collect();
         let done = own.map_or(Ok(()), populate);
         others.into_iter().try_fold(done, |done, thread| {
-            // Without a thread to be had, its part is left.
+            // If a thread cannot be started, this thread populates all parts.
             let other = thread.ok()?.join().ok()?;
             Some(done.and(other))
         })
@@ -61,19 +62,20 @@ fn populate<T>(blocks: &mut [T]) -> Result<(), rustix::io::Errno> {
     let first: *mut std::ffi::c_void = blocks.as_mut_ptr().cast::<u8>().wrapping_sub(lead).cast();
     let len = (lead + size_of_val(blocks)).next_multiple_of(page);
     #[expect(unsafe_code, reason = "madvise takes raw pointers")]
-    // SAFETY: populating pages changes no byte. The range is of the lent slot, widened to whole
-    // pages, which belong to the same mapping.
+    // SAFETY: populating pages changes no byte. The range is that of the lent slot, widened to
+    // whole pages, which belong to the same mapping.
     unsafe {
         rustix::mm::madvise(first, len, rustix::mm::Advice::LinuxPopulateWrite)
     }
 }
 
-/// Gives back what was had of a slot that is too large.
+/// Releases the allocated memory of a slot that is too large.
 fn give_up<T>(blocks: &mut [T]) {
     take_memory_from(blocks.as_mut_ptr().cast(), size_of_val(blocks));
 }
 
-/// Has the kernel take the pages that are a slot's alone; they read as zeroes until they are written again.
+/// Makes the kernel release the pages that belong to this slot only. They read as zeroes until they
+/// are written again.
 pub(crate) fn take_memory_from(start: *mut u8, len: usize) {
     let page = rustix::param::page_size();
     let lead = start.addr().next_multiple_of(page) - start.addr();
@@ -83,8 +85,9 @@ pub(crate) fn take_memory_from(start: *mut u8, len: usize) {
     }
     let first: *mut std::ffi::c_void = start.wrapping_add(lead).cast();
     #[expect(unsafe_code, reason = "madvise takes raw pointers")]
-    // SAFETY: the pages lie wholly in a slot that is lent to us, of which at least this much was asked for before;
-    // nobody else reads or writes it. The kernel zeroes them, which is a valid value of every block.
+    // SAFETY: the pages lie wholly in a slot that is lent to this process. At least this much of it
+    // was requested before. No other code reads or writes it. The kernel zeroes the pages, which is
+    // a valid value of every block.
     let done = unsafe { rustix::mm::madvise(first, whole, rustix::mm::Advice::LinuxRemove) };
     if let Err(error) = done {
         tracing::warn!(%error, "cannot give shared memory back");
@@ -95,7 +98,7 @@ pub(crate) fn take_memory_from(start: *mut u8, len: usize) {
 mod tests {
     use super::*;
 
-    /// Pages of this process that are there, in bytes.
+    /// Returns the bytes of this process's resident pages.
     fn resident() -> usize {
         let statm = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
         let pages = statm.split(' ').nth(1).and_then(|it| it.parse().ok());
@@ -110,7 +113,7 @@ mod tests {
             let before = resident();
             assert_eq!(populate_by(parts, room.spare_capacity_mut()), Ok(()));
             let come = resident().saturating_sub(before);
-            // Other tests of this process take and give back some.
+            // Other tests of this process allocate and release some.
             assert!(come > LEN - (8 << 20), "{come} bytes by {parts}");
         }
     }

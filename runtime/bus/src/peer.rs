@@ -15,34 +15,35 @@ use crate::ports::ICEORYX2_VERSION;
 use crate::send_side;
 use crate::wake::TICK;
 
-/// How often somebody without a session looks for one.
+/// Interval at which a peer without a session looks for one.
 const SEEK_EVERY: Duration = Duration::from_millis(3);
-/// How long somebody who comes looks again and again without giving the processor away for longer than
-/// [`EAGER_EVERY`]: who is started beside its broker comes when that is nearly there, and a timer takes milliseconds.
+/// Time during which a new peer looks for a broker at intervals of at most [`EAGER_EVERY`]. A peer
+/// started together with its broker arrives when the broker is almost ready, and a timer takes
+/// milliseconds.
 const EAGER_FOR: Duration = Duration::from_millis(60);
 const EAGER_EVERY: Duration = Duration::from_micros(200);
-/// How long to wait after an attempt that failed on this side.
+/// Wait after an attempt that failed on this side.
 const SEEK_AGAIN_AFTER: Duration = Duration::from_millis(50);
-/// How often a peer looks whether its broker is still there.
+/// Interval at which a peer checks whether its broker still exists.
 const WATCH_EVERY: Duration = Duration::from_millis(60);
-/// How long leaving waits for the last acknowledgement.
+/// Maximum wait for the last acknowledgement when leaving.
 const LEAVE_WITHIN: Duration = Duration::from_secs(3);
-/// Events that wait to be fetched before reading pauses.
+/// Maximum number of unfetched events before reading pauses.
 const MAX_WAITING: usize = 256;
 
-/// Why a session is closed that no other one follows.
+/// Reason for closing a lost session that is not followed by another one.
 const LOST: &str = "the session was lost";
 
-/// How patient a peer is.
+/// Time limits and rejoin behaviour of a peer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PeerOptions {
-    /// How long to look for a broker when joining for the first time.
+    /// Time to look for a broker when joining for the first time.
     pub patience: Duration,
-    /// How long to survive the loss of the broker.
+    /// Time to wait for a broker after its loss.
     pub grace: Duration,
-    /// Whether a session that is lost is followed by another one. A process that can open nothing any more has
-    /// no second one: it is closed at once. Nor can it take down what the first one has made, so that stays until
-    /// the process ends, which it is to do soon after.
+    /// Whether a new session follows a lost one. A process that cannot open files any more gets no
+    /// second session: it is closed at once. It cannot remove the files of the first session
+    /// either. They stay until the process ends, which must happen soon after.
     pub rejoins: bool,
 }
 
@@ -56,13 +57,13 @@ impl Default for PeerOptions {
     }
 }
 
-/// What a peer claims.
+/// Statements of a peer about itself.
 #[doc(hidden)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Claims {
     /// Version of the messages.
     pub protocol: u32,
-    /// Whether it proves which process it is.
+    /// Whether it proves its identity.
     pub proves: bool,
 }
 
@@ -75,10 +76,10 @@ impl Default for Claims {
     }
 }
 
-/// Why a peer could not join.
+/// Reason why a peer cannot join.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum JoinError {
-    /// Nobody serves the instance.
+    /// No broker serves the instance.
     #[error("no broker serves instance `{instance}`; start one with `qcbus serve`")]
     NoBroker {
         /// The instance.
@@ -104,47 +105,47 @@ pub enum JoinError {
         /// Version of the broker.
         theirs: String,
     },
-    /// The broker does not want this peer, and says why.
+    /// The broker refuses this peer, with this reason.
     #[error("the broker refused: {0}")]
     Refused(String),
     /// The introduction does not fit a slot.
     #[error("the introduction is too large: {0}")]
     HelloTooLarge(String),
-    /// There is a broker, but it does not answer.
+    /// A broker exists, but it does not answer.
     #[error("the broker, process {pid}, does not answer{}", .why.as_ref().map(|why| format!(": {why}")).unwrap_or_default())]
     NoAnswer {
-        /// The broker.
+        /// Process id of the broker.
         pid: u32,
-        /// The last thing that went wrong on this side.
+        /// The last failure on this side.
         why: Option<String>,
     },
 }
 
-/// Something that a peer has to know.
+/// An event that a peer must handle.
 #[derive(Debug)]
 pub enum PeerEvent {
-    /// The broker says something. The first is always the welcome.
+    /// The broker has sent a message. The first one is always the welcome.
     Message(ToPeer),
-    /// A document has arrived: [`Peer::document`] has it.
+    /// A document has arrived. [`Peer::document`] returns it.
     Document(DocId),
-    /// The broker needs shared memory: whoever keeps documents that no job is about drops them.
+    /// The broker needs shared memory. Cached documents that no job uses must be dropped.
     LetGo,
-    /// A configuration has arrived: [`Peer::config`] has it.
+    /// A configuration has arrived. [`Peer::config`] returns it.
     Config(Digest),
-    /// This is a new session, the old one ended without a word: everything older is void, jobs,
-    /// document numbers and messages not yet sent. Documents held stay readable. A welcome follows.
+    /// This is a new session after the old one ended without a message. Older jobs, document
+    /// numbers and unsent messages are invalid. Held documents stay readable. A welcome follows.
     Rejoined,
-    /// The session is over and there will be no other.
+    /// The session is over and no other one follows.
     Closed {
-        /// For a person.
+        /// Text for a person.
         reason: String,
     },
 }
 
 enum State {
-    /// In a session, or on the way into one.
+    /// The peer has a session or is joining.
     Member(Box<Membership>),
-    /// Without a broker.
+    /// The peer has no broker.
     Seeking,
     Closed(String),
 }
@@ -157,7 +158,7 @@ pub struct Peer {
     options: PeerOptions,
     attempts: u64,
     state: State,
-    /// Since when there has been no session.
+    /// Time since which there is no session.
     lost: Option<Instant>,
     joined_before: bool,
     last_error: Option<String>,
@@ -168,8 +169,8 @@ pub struct Peer {
 }
 
 impl Peer {
-    /// Joins the broker of an instance. Must be called within a tokio runtime. `hello.protocol`,
-    /// `hello.pid` are filled in here.
+    /// Joins the broker of an instance. Must be called within a tokio runtime. It fills in
+    /// `hello.protocol` and `hello.pid`.
     ///
     /// # Errors
     /// See [`JoinError`].
@@ -185,8 +186,8 @@ impl Peer {
         Peer::join_claiming(Claims::default(), instance, hello, options).await
     }
 
-    /// Joins with these claims, and says to be the process that `hello` says: how a broker takes a peer of
-    /// another version, or one that lies, has to be tested.
+    /// Joins with these claims and with the process id in `hello`. This is for tests of how a
+    /// broker treats a peer of another version, or one with false claims.
     #[doc(hidden)]
     pub async fn join_claiming(
         claims: Claims,
@@ -202,7 +203,7 @@ impl Peer {
             },
             proves: claims.proves,
             options,
-            // Processes that follow each other may bear the same incarnation.
+            // Successive processes may have the same incarnation.
             attempts: u64::from(std::process::id()) << 32,
             state: State::Seeking,
             lost: Some(Instant::now()),
@@ -214,7 +215,7 @@ impl Peer {
             config: None,
         };
         let until = Instant::now() + options.patience;
-        // A broker that is there gets longer: it may be busy starting.
+        // An existing broker gets more time, because it may be busy starting.
         let answer_until = until.max(Instant::now() + options.grace);
         loop {
             peer.receive_budget()?;
@@ -246,9 +247,9 @@ impl Peer {
         }
     }
 
-    /// The next event; meanwhile everything queued is sent. Cancel-safe: nothing is lost when the
-    /// future is dropped. Nothing moves on the bus unless this is awaited. After
-    /// [`PeerEvent::Closed`] it says so again and again.
+    /// Returns the next event and meanwhile sends everything queued. Cancel-safe: dropping the
+    /// future loses nothing. Nothing moves on the bus unless this is awaited. After
+    /// [`PeerEvent::Closed`], every call returns it again.
     pub async fn next(&mut self) -> PeerEvent {
         loop {
             if let Some(event) = self.events.pop_front() {
@@ -268,9 +269,9 @@ impl Peer {
         }
     }
 
-    /// Sends a message: it is kept until the broker has acknowledged it. Never blocks. Without a
-    /// session nothing is sent, because a new session voids everything older. One that is larger than
-    /// the broker takes ([`codec::MAX_FROM_PEER`]) ends the session.
+    /// Sends a message and keeps it until the broker has acknowledged it. Never blocks. Without a
+    /// session it sends nothing, because a new session invalidates everything older. A message
+    /// above the broker's limit ([`codec::MAX_FROM_PEER`]) ends the session.
     pub fn send(&mut self, message: &FromPeer) {
         let State::Member(membership) = &mut self.state else {
             return;
@@ -279,13 +280,14 @@ impl Peer {
             Ok(bytes) => membership.push(&bytes),
             Err(error) => {
                 tracing::error!(%error, "a message cannot be sent, the session ends");
-                // Were it left out, the rest would be taken for the whole. Nothing is no message.
+                // Without it, the broker would take the other messages for complete. Empty ones are
+                // invalid.
                 membership.push(&[]);
             }
         }
     }
 
-    /// Sends bytes that are no message: how a broker takes garbage has to be tested.
+    /// Sends bytes that are not a message, for tests of the broker.
     #[doc(hidden)]
     pub fn send_garbage(&mut self, bytes: &[u8]) {
         if let State::Member(membership) = &mut self.state {
@@ -293,7 +295,7 @@ impl Peer {
         }
     }
 
-    /// Bytes that the broker has not acknowledged.
+    /// Returns the bytes that the broker has not acknowledged.
     pub fn backlog(&self) -> usize {
         match &self.state {
             State::Member(membership) => membership.backlog(),
@@ -301,7 +303,7 @@ impl Peer {
         }
     }
 
-    /// A document, read in place; `None` when it has not arrived or was let go to make room.
+    /// Returns a document, read in place, or `None` if it has not arrived or was released for room.
     pub fn document(&self, doc: DocId) -> Option<MappedImage> {
         match &self.state {
             State::Member(membership) => membership.library().get(doc),
@@ -309,19 +311,19 @@ impl Peer {
         }
     }
 
-    /// This document is finished with: it may go first when room is needed.
+    /// Marks a document as finished, so that it is released first when room is needed.
     pub fn forget(&mut self, doc: DocId) {
         if let State::Member(membership) = &mut self.state {
             membership.library_mut().forget(doc);
         }
     }
 
-    /// The latest configuration and its digest.
+    /// Returns the latest configuration and its digest.
     pub fn config(&self) -> Option<(Digest, Arc<[u8]>)> {
         self.config.clone()
     }
 
-    /// Ends the session when the broker has acknowledged everything, or has not for three seconds.
+    /// Ends the session when the broker has acknowledged everything, or after three seconds.
     pub async fn leave(mut self) {
         let until = Instant::now() + LEAVE_WITHIN;
         if let State::Member(membership) = &mut self.state {
@@ -335,13 +337,13 @@ impl Peer {
                 return;
             }
             membership.wait(TICK).await;
-            // What arrives now is nobody's concern any more, but acknowledgements are among it.
+            // Messages that arrive now are ignored, but the acknowledgements among them are needed.
             membership.read(usize::MAX, &mut VecDeque::new(), &mut None);
         }
     }
 
-    /// The directory in which everything of its generation lies: whoever may read the files there needs nothing
-    /// besides to take part. `None`: it is in no session.
+    /// Returns the root directory of its generation, or `None` without a session. Read access to
+    /// its files is all that a peer in session needs.
     pub fn memory(&self) -> Option<&Path> {
         match &self.state {
             State::Member(membership) => Some(membership.root()),
@@ -349,7 +351,8 @@ impl Peer {
         }
     }
 
-    /// Whether it is closed because its session was lost and it does not rejoin (see [`PeerOptions::rejoins`]).
+    /// Checks whether it is closed because its session was lost and it does not rejoin (see
+    /// [`PeerOptions::rejoins`]).
     pub fn has_lost_its_session(&self) -> bool {
         matches!(&self.state, State::Closed(reason) if reason == LOST)
     }
@@ -372,7 +375,7 @@ impl Peer {
         }
     }
 
-    /// Whether it has just begun to look for a broker, and no attempt to join one has failed.
+    /// Checks whether it has just started to look for a broker and no attempt to join has failed.
     fn is_eager(&self) -> bool {
         let since = self.lost.filter(|_| !self.joined_before);
         since.is_some_and(|since| since.elapsed() < EAGER_FOR) && self.seek_at <= Instant::now()
@@ -382,8 +385,8 @@ impl Peer {
         self.change(State::Closed(reason));
     }
 
-    /// What a session has made is taken down, unless this process may not do so any more: then the broker's janitor
-    /// does, when the process has ended.
+    /// Changes the state and drops the files of the old session. If this process may no longer
+    /// remove them, the broker's janitor does so after the process has ended.
     fn change(&mut self, state: State) {
         let earlier = std::mem::replace(&mut self.state, state);
         if self.joined_before && !self.options.rejoins {
@@ -391,7 +394,7 @@ impl Peer {
         }
     }
 
-    /// Does as much as can be done without waiting.
+    /// Does everything that is possible without waiting.
     fn receive_budget(&mut self) -> Result<(), JoinError> {
         let now = Instant::now();
         if matches!(self.state, State::Seeking) && now >= self.seek_at {
@@ -435,12 +438,12 @@ impl Peer {
         } else {
             State::Seeking
         });
-        // What was not fetched belongs to the session that is over.
+        // Unfetched events belong to the session that is over.
         self.events.clear();
         self.lost.get_or_insert(now);
     }
 
-    /// Tries to get into the generation in force, if there is one.
+    /// Tries to join the current generation, if there is one.
     fn seek(&mut self) -> Result<(), JoinError> {
         let Some(generation) = Generation::current(&self.instance) else {
             return Ok(());
@@ -463,7 +466,7 @@ impl Peer {
             Err(crate::membership::BeginError::Hello(why)) => {
                 return Err(JoinError::HelloTooLarge(why));
             }
-            // The broker may just have gone, or not be ready: the next attempt will tell.
+            // The broker may have just ended or may not be ready. The next attempt shows it.
             Err(crate::membership::BeginError::Port(why)) => self.last_error = Some(why),
         }
         Ok(())
@@ -473,7 +476,7 @@ impl Peer {
         if let State::Member(membership) = &mut self.state
             && !membership.broker_is_there(&self.instance)
         {
-            // What it said before it went is void, because the next session starts afresh.
+            // Its earlier messages are invalid, because the next session starts afresh.
             self.lose(now);
         }
     }

@@ -1,6 +1,6 @@
-//! The one place where iceoryx2 is configured, and where services and ports come from.
+//! The one place that configures iceoryx2 and creates services and ports.
 //!
-//! Whoever wants a service hands in a row of [`qcbus_messages::services`]; there is no other way.
+//! Every service is created from a row of [`qcbus_messages::services`]; there is no other way.
 
 use std::fmt::Debug;
 use std::path::{Path, PathBuf};
@@ -25,12 +25,11 @@ pub(crate) type WakeService = event::PortFactory<Service>;
 pub(crate) type WakeListener = Listener<Service>;
 pub(crate) type WakeNotifier = Notifier<Service>;
 
-/// Version of iceoryx2, part of every name on the bus: both sides must have the same.
-/// The version of iceoryx2 that is linked in; peers must link the same.
+/// Version of the linked iceoryx2. Both sides must have the same version.
 pub const ICEORYX2_VERSION: &str = "0.10.0";
 
-/// Something that iceoryx2 refused, in words. Its errors are no type of ours: callers can only
-/// tell a person.
+/// Error of iceoryx2 as text. The error types of iceoryx2 are not exposed: callers can only report
+/// them to a person.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{what}: {why}")]
 pub(crate) struct PortError {
@@ -39,7 +38,7 @@ pub(crate) struct PortError {
 }
 
 impl PortError {
-    /// A descriptor cannot be waited on.
+    /// Returns the error for a descriptor that cannot be waited on.
     pub(crate) fn waiting(why: &std::io::Error) -> PortError {
         PortError {
             what: "waiting for the other side".to_owned(),
@@ -47,7 +46,7 @@ impl PortError {
         }
     }
 
-    /// There is no shared memory for a topic's slots.
+    /// Returns the error for missing shared memory for a topic's slots.
     fn memory(row: &Topic, why: &std::io::Error) -> PortError {
         PortError {
             what: format!("shared memory for {}", row.name),
@@ -55,7 +54,7 @@ impl PortError {
         }
     }
 
-    /// There is no shared memory for one more who joins.
+    /// Returns the error for missing shared memory for another peer.
     pub(crate) fn no_room(needed: u64, free: u64) -> PortError {
         PortError {
             what: "joining".to_owned(),
@@ -74,7 +73,7 @@ fn error(what: impl Into<String>) -> impl FnOnce(Box<dyn Debug>) -> PortError {
     }
 }
 
-/// Attaches words to an error of iceoryx2.
+/// Adds a description to an error of iceoryx2.
 trait Explain<T> {
     fn explain(self, what: impl Into<String>) -> Result<T, PortError>;
 }
@@ -85,7 +84,7 @@ impl<T, E: Debug + 'static> Explain<T> for Result<T, E> {
     }
 }
 
-/// Who makes a service: the broker creates, everyone else opens.
+/// How a process gets a service: the broker creates it, all others open it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Access {
     Create,
@@ -96,16 +95,16 @@ enum Access {
 pub(crate) struct Hub {
     node: Node<Service>,
     access: Access,
-    /// Where everything of the generation lies.
+    /// Root directory of the generation.
     root: PathBuf,
 }
 
-/// What iceoryx2's files begin with. Short, for sockets are among them; they lie in a directory of
-/// their own, so it need not tell them from others.
+/// Prefix of the files of iceoryx2. It is short because some of them are sockets. They lie in a
+/// directory of their own, so the prefix need not distinguish them from others.
 const PREFIX: &[u8] = b"q_";
 
-/// iceoryx2's settings for one generation. Never the global ones: those read a file from the
-/// working directory.
+/// Returns the settings of iceoryx2 for one generation. The global settings are never used, because
+/// they come from a file in the working directory.
 pub(crate) fn generation_config(root: &Path) -> Result<Config, PortError> {
     let mut config = Config::default();
     let root = iceoryx2::prelude::Path::new(root.as_os_str().as_encoded_bytes())
@@ -113,8 +112,8 @@ pub(crate) fn generation_config(root: &Path) -> Result<Config, PortError> {
     config.global.set_root_path(&root);
     config.global.prefix = FileName::new(PREFIX).explain("the prefix")?;
     config.global.creation_timeout = Duration::from_millis(500);
-    // Dead nodes are cleaned by the broker's janitor and by nobody else: a peer has no business
-    // there, and the broker's loop has no 20 ms to give away.
+    // Only the broker's janitor cleans up dead nodes. Peers must not do so, and the broker's loop
+    // cannot spend 20 ms on it.
     config.global.service.cleanup_dead_nodes_on_open = false;
     config.global.node.cleanup_dead_nodes_on_creation = false;
     config.global.node.cleanup_dead_nodes_on_destruction = false;
@@ -126,18 +125,18 @@ pub(crate) fn generation_config(root: &Path) -> Result<Config, PortError> {
 }
 
 impl Hub {
-    /// The broker's, which makes all services.
+    /// Creates the broker's hub, which creates all services.
     pub(crate) fn create(root: &Path) -> Result<Hub, PortError> {
         Hub::new(root, Access::Create)
     }
 
-    /// Joins a generation, whose memory cannot go meanwhile.
+    /// Joins a generation. Its memory cannot be removed meanwhile.
     pub(crate) fn join(inside: &Inside) -> Result<Hub, PortError> {
         Hub::new(inside.root(), Access::Open)
     }
 
     fn new(root: &Path, access: Access) -> Result<Hub, PortError> {
-        // What iceoryx2 has to say arrives as error values; it prints nothing of its own.
+        // iceoryx2 reports errors as values, so its own output is disabled.
         set_log_level_from_env_or(LogLevel::Fatal);
         let config = generation_config(root)?;
         let node = NodeBuilder::new()
@@ -149,7 +148,7 @@ impl Hub {
         Ok(Hub { node, access, root })
     }
 
-    /// A publisher of a stream, with the memory that its slots need.
+    /// Creates a publisher of a stream, with the memory that its slots need.
     pub(crate) fn stream_publisher<H>(
         &self,
         service: &TopicService<u8, H>,
@@ -164,7 +163,7 @@ impl Hub {
         Ok((publisher, backing))
     }
 
-    /// A publisher with few and small slots, all of whose memory is there from the beginning.
+    /// Creates a publisher with few and small slots. All their memory is allocated at once.
     pub(crate) fn small_publisher<H>(
         &self,
         service: &TopicService<u8, H>,
@@ -179,8 +178,8 @@ impl Hub {
         Ok(publisher)
     }
 
-    /// The only constructor of publish-subscribe services. `key` distinguishes the services of
-    /// one session; it is empty for shared ones.
+    /// Creates or opens a publish-subscribe service; the only constructor of these. `key`
+    /// distinguishes the services of one session. It is empty for shared ones.
     pub(crate) fn topic<T, H>(
         &self,
         row: &Topic,
@@ -210,7 +209,7 @@ impl Hub {
         }
     }
 
-    /// The only constructor of event services.
+    /// Creates or opens an event service; the only constructor of these.
     pub(crate) fn wake(&self, row: &Wake, key: &str) -> Result<WakeService, PortError> {
         let name = service_name(row.name, key)?;
         let builder = self
@@ -243,8 +242,8 @@ fn service_name(name: &str, key: &str) -> Result<ServiceName, PortError> {
     ServiceName::new(&full).explain(full)
 }
 
-/// A publisher as its row wants it that lends so many slots at once: those of the row, or all that there
-/// are, if whoever borrows counts by himself.
+/// Creates a publisher with the settings of its row. The number of slots lent at once is that of
+/// the row, or all if the caller counts them itself.
 pub(crate) fn publisher<T, H>(
     service: &TopicService<T, H>,
     row: &Topic,
@@ -264,13 +263,13 @@ where
         })
         .max_loaned_samples(loans)
         .override_sample_preallocation(move |_| slots)
-        // Nothing on this bus ever blocks a sender: it is told, and keeps what was not taken.
+        // No sender on this bus ever blocks. It learns that a frame was not taken and keeps it.
         .backpressure_strategy(BackpressureStrategy::DiscardData)
         .create()
         .explain(format!("a publisher of {}", row.name))
 }
 
-/// A subscriber as its row wants it.
+/// Creates a subscriber with the settings of its row.
 pub(crate) fn subscriber<T, H>(
     service: &TopicService<T, H>,
     row: &Topic,
@@ -287,7 +286,7 @@ where
         .explain(format!("a subscriber of {}", row.name))
 }
 
-/// Who wakes.
+/// Creates the port that wakes the other side.
 pub(crate) fn notifier(service: &WakeService) -> Result<WakeNotifier, PortError> {
     service
         .notifier_builder()
@@ -296,13 +295,13 @@ pub(crate) fn notifier(service: &WakeService) -> Result<WakeNotifier, PortError>
         .explain("a notifier")
 }
 
-/// Who is woken.
+/// Creates the port that is woken by the other side.
 pub(crate) fn listener(service: &WakeService) -> Result<WakeListener, PortError> {
     service.listener_builder().create().explain("a listener")
 }
 
-/// Removes what dead processes of a generation left behind. Takes 6 to 20 ms per dead process,
-/// so it is called off the loop only.
+/// Removes the remains of dead processes of a generation. It takes 6 to 20 ms per dead process, so
+/// it must be called outside the loop.
 pub(crate) fn clean_dead_nodes(config: &Config) {
     let mut dead = Vec::new();
     let listed = Node::<Service>::list(config, |state| {

@@ -1,19 +1,19 @@
-//! What private instances leave behind when their process is killed.
+//! Private instances: removes their remains after their process was killed.
 
 use std::path::Path;
 
 use crate::generation::{sweep, sweep_strays};
 use crate::instance::{Instance, InstanceLock};
 
-/// Private instances (of `qcbus check`) begin with this and are nobody's but their process'.
+/// Prefix of private instances (of `qcbus check`). Each belongs to a single process.
 pub const PRIVATE_PREFIX: &str = "check-";
 
-/// Private instances of living processes that are younger than this may be on the way to taking their lock.
+/// Age below which a private instance of a living process may not have taken its lock yet.
 const YOUNG: std::time::Duration = std::time::Duration::from_secs(10);
 
-/// Removes what dead private instances have left: their directories and their shared memory; and the shared memory of
-/// any dead broker whose directory somebody has removed.
-/// Returns how many there were. Instances whose broker lives are left alone.
+/// Removes the directories and the shared memory of dead private instances. It also removes the
+/// shared memory of any dead broker with a removed directory. Returns the number of removed
+/// instances. Instances with a living broker stay.
 pub fn sweep_private_instances() -> usize {
     sweep_known() + sweep_strays()
 }
@@ -39,7 +39,7 @@ fn sweep_known() -> usize {
     swept
 }
 
-/// Whether the process that made it, whose id is in the name, is gone.
+/// Checks whether the process that created it has ended. Its id is in the name.
 fn maker_is_dead(directory: &Path) -> bool {
     let name = directory.file_name().unwrap_or_default().to_string_lossy();
     let rest = name.strip_prefix(PRIVATE_PREFIX);
@@ -54,7 +54,7 @@ fn is_young(directory: &Path) -> bool {
 
 fn sweep_one(directory: &Path) -> bool {
     let instance = Instance::at(directory.to_path_buf());
-    // Whoever holds the lock is alive.
+    // A holder of the lock is alive.
     let Ok(lock) = InstanceLock::take(&instance) else {
         return false;
     };

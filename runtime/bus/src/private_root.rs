@@ -1,9 +1,9 @@
-//! iceoryx2 within one directory.
+//! iceoryx2 within a private root directory.
 //!
-//! Its own setup makes shared memory by `shm_open`: in /dev/shm itself, where every user sees the
-//! names and may take the next ones first, and with a segment in between that everybody may write
-//! to, whatever the umask is. Here everything is a file below the generation's root, which only its
-//! user may enter. The root lies in /dev/shm, so it is the same memory.
+//! Its standard service creates shared memory by `shm_open`, directly in /dev/shm. There every user
+//! sees the names and may take the next ones first. An intermediate segment is writable by
+//! everybody, whatever the umask is. Here everything is a file below the generation's root, which
+//! only its user may enter. The root lies in /dev/shm, so it is the same memory.
 
 use std::fmt::Debug;
 
@@ -23,7 +23,7 @@ use iceoryx2_cal::zero_copy_connection;
 
 type Ipc = ipc_threadsafe::Service;
 
-/// As [`ipc_threadsafe`], with files in the place of `shm_open`.
+/// Like [`ipc_threadsafe`], with files instead of `shm_open`.
 #[derive(Debug, Clone)]
 pub(crate) struct PrivateRoot {}
 

@@ -1,4 +1,4 @@
-//! Whether another process is alive, safe against reused process ids.
+//! Checks whether another process is alive, safe against reused process ids.
 
 use std::fs;
 use std::os::fd::OwnedFd;
@@ -10,7 +10,7 @@ use rustix::process::{
     Pid, PidfdFlags, Signal, getpgid, kill_process_group, pidfd_open, pidfd_send_signal,
 };
 
-/// A handle on a process that stays with it when the id is used again.
+/// A handle on a process. It stays valid for this process when the id is reused.
 #[derive(Debug, Clone)]
 pub struct Process {
     pid: Pid,
@@ -18,12 +18,12 @@ pub struct Process {
 }
 
 impl Process {
-    /// `None` when there is no such process (any more), or it is not the one that started at
-    /// `started`, in clock ticks since boot.
+    /// Opens a process. Returns `None` if it does not exist, or if it did not start at `started`,
+    /// in clock ticks since boot.
     pub fn open(pid: u32, started: Option<u64>) -> Option<Process> {
         let id = Pid::from_raw(i32::try_from(pid).ok()?)?;
         let process = Process::from_fd(id, pidfd_open(id, PidfdFlags::empty()).ok()?);
-        // The handle was opened first: when the start time fits now, it fits the handle.
+        // The handle was opened first. If the start time matches now, it matches the handle.
         let same = started.is_none_or(|started| start_time(pid) == Some(started));
         (same && process.is_alive()).then_some(process)
     }
@@ -33,49 +33,50 @@ impl Process {
         Process { pid, fd }
     }
 
-    /// Its id; only while it lives nobody else has the same.
+    /// Returns its id, which is unique only while the process lives.
     pub fn id(&self) -> u32 {
         self.pid.as_raw_nonzero().get().unsigned_abs()
     }
 
-    /// A process that has ended but was not yet waited for counts as dead.
+    /// Checks whether it is alive. An ended process that was not waited for counts as dead.
     pub fn is_alive(&self) -> bool {
         !self.ends_within(Duration::ZERO)
     }
 
-    /// Waits for its end.
+    /// Waits for its end, up to a limit, and returns whether it has ended.
     pub fn ends_within(&self, limit: Duration) -> bool {
         let mut fds = [PollFd::new(&self.fd, PollFlags::IN)];
         let limit = Timespec::try_from(limit).ok();
         matches!(poll(&mut fds, limit.as_ref()), Ok(ready) if ready > 0)
     }
 
-    /// Whether somebody has stopped it, so that it does nothing until it is continued.
+    /// Checks whether the process is stopped, so that it does nothing until it is continued.
     pub fn is_stopped(&self) -> bool {
         let state = stat(self.id()).and_then(|rest| rest.chars().next());
         matches!(state, Some('T' | 't')) && self.is_alive()
     }
 
-    /// Kills it, with its group where it leads one. One that is dead stays so, and whoever has been given
-    /// its id since is let alone.
+    /// Kills the process, with its group if it leads one. A later process with the same id is not
+    /// affected.
     pub fn kill(&self) {
         let leads = self.is_alive() && getpgid(Some(self.pid)) == Ok(self.pid);
         if leads {
-            // It lived a moment ago, so the id is its own, and its group's as long as anybody is in it.
+            // It lived a moment ago, so it owns the id. Its group owns the id as long as it has a
+            // member.
             let _ = kill_process_group(self.pid, Signal::KILL);
         }
-        // It may have gone by itself.
+        // The process may have ended by itself.
         let _ = pidfd_send_signal(&self.fd, Signal::KILL);
     }
 }
 
-/// When a process started, in clock ticks since boot: with the id it names a process for good.
+/// Returns the start time of a process in clock ticks since boot. With the id it is unique.
 pub(crate) fn start_time(pid: u32) -> Option<u64> {
-    // The 22nd field of all.
+    // This is the 22nd field of the whole line.
     stat(pid)?.split_whitespace().nth(19)?.parse().ok()
 }
 
-/// What proc(5) says of a process, from the third field on, its state.
+/// Returns the data of a process from proc(5), starting with the third field, its state.
 fn stat(pid: u32) -> Option<String> {
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
     // The second field is the command in parentheses and may contain anything.
@@ -114,7 +115,7 @@ mod tests {
             assert_eq!(process.id(), child.id());
             process.kill();
             assert!(!child.wait().unwrap().success());
-            // There is no such process any more.
+            // The process no longer exists.
             process.kill();
             assert!(bystander.try_wait().unwrap().is_none());
             bystander.kill().unwrap();

@@ -1,24 +1,24 @@
-//! How much the broker takes from its peers before everybody else has a turn.
+//! Receive budget: limits how much the broker reads from its peers before other tasks run.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use crate::host::HostEvent;
 
-/// Bytes of frames read in one turn.
+/// Bytes of frames read per receive budget.
 const TURN_BYTES: usize = 1 << 20;
-/// How long a turn reads.
+/// Time of reading per receive budget.
 const TURN_TIME: Duration = Duration::from_millis(2);
-/// What a frame costs besides its bytes, so that empty ones are not for free.
+/// Cost of a frame in addition to its bytes, so that empty frames also count.
 const FRAME_COSTS: usize = 1 << 10;
-/// Events that wait to be fetched before reading pauses.
+/// Maximum number of unfetched events before reading pauses.
 const MAX_WAITING: usize = 512;
-/// Bytes of messages that wait to be fetched before reading pauses.
+/// Maximum bytes of unfetched messages before reading pauses.
 const MAX_WAITING_BYTES: usize = 8 << 20;
-/// Events that one peer adds before it is the next one's turn. (A frame is read to its end.)
+/// Maximum number of events from one peer in a row. (A frame is read to its end.)
 const MAX_IN_A_ROW: usize = 128;
 
-/// What is left of a turn.
+/// Remaining receive budget.
 #[derive(Debug)]
 pub(crate) struct Budget {
     bytes: usize,
@@ -33,7 +33,7 @@ impl Budget {
         }
     }
 
-    /// Frames were read.
+    /// Subtracts the cost of the frames that were read.
     pub(crate) fn spend(&mut self, frames: usize, bytes: usize) {
         let costs = bytes.saturating_add(frames.saturating_mul(FRAME_COSTS));
         self.bytes = self.bytes.saturating_sub(costs);
@@ -52,7 +52,7 @@ pub(crate) struct Waiting {
 }
 
 impl Waiting {
-    /// An event that was `bytes` long when it was a message.
+    /// Adds an event that was `bytes` long as a message.
     pub(crate) fn push(&mut self, event: HostEvent, bytes: usize) {
         self.bytes += bytes;
         self.events.push_back((event, bytes));
@@ -76,12 +76,12 @@ impl Waiting {
         self.events.is_empty()
     }
 
-    /// Whether reading has to pause.
+    /// Checks whether reading must pause.
     pub(crate) fn is_full(&self) -> bool {
         self.events.len() >= MAX_WAITING || self.bytes >= MAX_WAITING_BYTES
     }
 
-    /// Whether one peer has added enough since there were `before`.
+    /// Checks whether one peer has added enough events, if there were `before` previously.
     pub(crate) fn is_enough_since(&self, before: usize) -> bool {
         self.is_full() || self.events.len() >= before + MAX_IN_A_ROW
     }

@@ -1,9 +1,10 @@
-//! The door of a generation: nobody makes a file in its shared memory while that is removed, or afterwards.
+//! The removal lock of a generation: prevents the creation of files in its shared memory during and
+//! after its removal.
 //!
-//! A directory in which somebody makes a file cannot be removed, and iceoryx2 makes a directory that is missing
-//! again, with all above it, for whoever makes a node or a port: a peer that came a moment too late would leave
-//! shared memory behind of which no broker knows. So whoever may make files is inside of the door meanwhile, and
-//! who removes the memory shuts it first. Both are locks of the kernel's: it opens them when a process dies.
+//! A directory cannot be removed while a process creates files in it. iceoryx2 also recreates
+//! missing directories whenever a node or port is created. A late peer would thus leave shared
+//! memory behind that no broker knows. Therefore a process that may create files holds the lock
+//! shared, and the remover locks it first. The kernel releases these locks when a process dies.
 
 use std::fs::{self, File};
 use std::io;
@@ -14,38 +15,40 @@ use std::time::{Duration, Instant};
 
 use rustix::fs::{FlockOperation, flock};
 
-/// Its name in the directory of a generation.
+/// Name of the lock file in the directory of a generation.
 const REMOVAL_LOCK: &str = "removal-lock";
-/// What is in it once nobody may enter any more: whoever has it open sees that, whatever has become of the file.
+/// Content of the file once it is locked for removal. A process that has the file open sees this
+/// even after the file is deleted.
 const LOCKED: &[u8] = b"locked";
-/// And once nobody waits any longer for those who are inside.
+/// Content of the file once the remover no longer waits for the holders of the lock.
 const GONE: &[u8] = b"locked, gone";
-/// A peer is inside for less than a millisecond at a time, unless it was stopped there. That one tidies up behind
-/// itself when it goes on.
+/// Maximum wait for the holders of the lock. A peer holds it for less than a millisecond, unless it
+/// is stopped meanwhile. A stopped peer cleans up itself when it continues.
 const OUT_WITHIN: Duration = Duration::from_secs(2);
-/// Attempts at removing a directory in which somebody who was stopped makes files, or whose files go meanwhile.
+/// Attempts to remove a directory. A resumed process may create files in it, or files may disappear
+/// meanwhile.
 const ATTEMPTS: usize = 50;
 
-/// The way into the memory of a generation.
+/// Access to the removal lock of a generation.
 #[derive(Debug, Clone)]
 pub(crate) struct RemovalLock {
     file: Arc<File>,
     root: PathBuf,
 }
 
-/// As long as this lives, the memory stays.
+/// A shared hold of the removal lock. The memory stays while this exists.
 #[derive(Debug)]
 pub(crate) struct Inside {
     removal_lock: RemovalLock,
 }
 
-/// Why nobody comes in.
+/// Reason why the lock cannot be taken.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum NoEntry {
-    /// The broker goes, or has gone.
+    /// The broker is ending or has ended.
     #[error("the broker is about to end, or somebody has removed its shared memory")]
     Locked,
-    /// It may be open: this process cannot use it.
+    /// The generation may be usable, but this process cannot use it.
     #[error("cannot use the shared memory of the broker in {root}: {source}")]
     Failed { root: PathBuf, source: io::Error },
 }
@@ -53,7 +56,7 @@ pub(crate) enum NoEntry {
 impl NoEntry {
     fn of(root: &Path, source: io::Error) -> NoEntry {
         match source.kind() {
-            // Somebody who has locked it is about to shut it.
+            // A process that holds the exclusive lock is about to remove the generation.
             io::ErrorKind::NotFound | io::ErrorKind::WouldBlock => NoEntry::Locked,
             _ => NoEntry::Failed {
                 root: root.to_path_buf(),
@@ -63,10 +66,10 @@ impl NoEntry {
     }
 }
 
-/// Gives a generation its door.
+/// Creates the lock file of a generation.
 ///
 /// # Errors
-/// What the system says.
+/// Returns the error of the operating system.
 pub(crate) fn make(root: &Path) -> io::Result<()> {
     let mut how = File::options();
     let how = how.write(true).create_new(true).mode(0o600);
@@ -74,7 +77,7 @@ pub(crate) fn make(root: &Path) -> io::Result<()> {
 }
 
 impl RemovalLock {
-    /// The door of a generation that is there.
+    /// Opens the lock file of an existing generation.
     pub(crate) fn of(root: &Path) -> Result<RemovalLock, NoEntry> {
         let mut how = File::options();
         let how = how.read(true).custom_flags(libc::O_NOFOLLOW);
@@ -86,7 +89,8 @@ impl RemovalLock {
         })
     }
 
-    /// Goes in for a moment. Of one door one at a time is inside: the kernel does not count locks of one file.
+    /// Takes the lock shared for a short time. Each open file allows one hold at a time, because
+    /// the kernel does not count the locks of one file.
     pub(crate) fn enter(&self) -> Result<Inside, NoEntry> {
         let locked = flock(&self.file, FlockOperation::NonBlockingLockShared);
         locked.map_err(|error| NoEntry::of(&self.root, error.into()))?;
@@ -106,7 +110,7 @@ impl RemovalLock {
 }
 
 impl Inside {
-    /// The directory of the generation.
+    /// Returns the directory of the generation.
     pub(crate) fn root(&self) -> &Path {
         &self.removal_lock.root
     }
@@ -114,7 +118,7 @@ impl Inside {
 
 impl Drop for Inside {
     fn drop(&mut self) {
-        // It did not come out in time: what it made since then is nobody's.
+        // The remover has stopped waiting for this process. Files created since then have no owner.
         if self.removal_lock.says_at_least(GONE) {
             let _ = remove(&self.removal_lock.root);
         }
@@ -122,21 +126,23 @@ impl Drop for Inside {
     }
 }
 
-/// Shuts the door of a generation for good and removes its memory. What peers have mapped stays readable for them.
+/// Locks a generation for removal and removes its memory. Memory mapped by peers stays readable for
+/// them.
 ///
 /// # Errors
-/// What the system says; then something of it is still there.
+/// Returns the error of the operating system. Some files then still exist.
 pub(crate) fn lock_and_remove(root: &Path) -> io::Result<()> {
     let _locked = lock_for_removal(root);
     remove(root)
 }
 
-/// Waits until nobody is inside, but not for ever. `None`: it has no door, or none that we can shut.
+/// Waits for the holders of the lock, up to a limit. Returns `None` if there is no lock file or it
+/// cannot be opened for writing.
 fn lock_for_removal(root: &Path) -> Option<File> {
     let mut how = File::options();
     let how = how.write(true).custom_flags(libc::O_NOFOLLOW);
     let file = how.open(root.join(REMOVAL_LOCK)).ok()?;
-    // First, or those who come and go would keep it open.
+    // This is written first. Otherwise a continuous sequence of holders would keep it open.
     file.write_all_at(LOCKED, 0).ok()?;
     let until = Instant::now() + OUT_WITHIN;
     while flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() && Instant::now() < until
@@ -155,7 +161,7 @@ fn remove(root: &Path) -> io::Result<()> {
         }
         match fs::remove_dir_all(root) {
             Ok(()) => return Ok(()),
-            // Not: one of its files. Those may be removed by whoever made them.
+            // The root must be missing, not just one of its files, which their creators may remove.
             Err(_) if !root.exists() => return Ok(()),
             Err(error) => last = Err(error),
         }
@@ -237,7 +243,7 @@ mod tests {
                         let removal_lock = RemovalLock::of(root);
                         for number in 0.. {
                             let inside = removal_lock.as_ref().ok().and_then(|it| it.enter().ok());
-                            // As iceoryx2 does.
+                            // iceoryx2 does the same.
                             if inside.is_some() {
                                 fs::create_dir_all(root.join("nodes")).unwrap();
                                 fs::write(root.join(format!("nodes/{maker}-{number}")), "")

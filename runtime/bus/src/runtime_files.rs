@@ -1,41 +1,41 @@
-//! What a broker has in its runtime directory while it runs, and gets back when it is taken away.
+//! Runtime files of a broker: creates them and restores them when they are removed.
 //!
-//! Temporary directories are cleaned: files go that nobody has changed for days. What peers look for is
-//! made again; bundles that have joined notice nothing.
+//! Cleaners of temporary directories remove files that have not changed for days. The files that
+//! peers look for are restored. Joined bundles are not affected.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::generation::Generation;
 use crate::instance::{Instance, InstanceLock, LockError};
 
-/// The broker's claim on its instance, until it is given up.
+/// The broker's lock on its instance, until it is released.
 pub(crate) type LockSlot = Arc<Mutex<Option<InstanceLock>>>;
 
-/// A broker that is to be found.
+/// The runtime files of one broker.
 pub(crate) struct RuntimeFiles {
     instance: Instance,
     generation: Generation,
     lock: LockSlot,
     state: Mutex<State>,
-    /// What was said last about what cannot be made again yet.
+    /// Last logged failure to restore a file.
     trouble: Mutex<String>,
-    /// What cannot be had back, until it has been asked for.
+    /// Description of a permanent loss, until it is fetched.
     lost: Mutex<Option<String>>,
 }
 
-/// What is done about what is missing.
+/// How missing files are treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
-    /// It is made again.
+    /// They are restored.
     Kept,
-    /// Nothing any more: it cannot be had back, and that has been said.
+    /// They are no longer restored: a loss is permanent and was reported.
     Lost,
-    /// Nothing: the broker is not ready yet, or is going.
+    /// They are not restored: the broker is not ready yet, or is ending.
     Hidden,
 }
 
 impl RuntimeFiles {
-    /// Of a broker that is not to be found yet.
+    /// Creates the runtime files of a broker that is still hidden.
     pub(crate) fn new(
         instance: &Instance,
         generation: &Generation,
@@ -51,7 +51,7 @@ impl RuntimeFiles {
         }
     }
 
-    /// Makes the generation known. Last step of a start.
+    /// Announces the generation. This is the last step of a start.
     pub(crate) fn announce(&self) -> std::io::Result<()> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         self.generation.announce(&self.instance)?;
@@ -59,14 +59,16 @@ impl RuntimeFiles {
         Ok(())
     }
 
-    /// Peers stop trying to join, and nothing is made again. First step of a stop.
+    /// Withdraws the generation: peers stop trying to join, and files are no longer restored. This
+    /// is the first step of a stop.
     pub(crate) fn withdraw(&self) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         *state = State::Hidden;
         self.generation.withdraw(&self.instance);
     }
 
-    /// Makes again what was taken away; says what cannot be. To be called now and then, off the loop.
+    /// Restores removed files and reports those that cannot be restored. Must be called
+    /// periodically, outside the loop.
     pub(crate) fn look_after(&self) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         if *state != State::Kept {
@@ -80,7 +82,7 @@ impl RuntimeFiles {
         }
     }
 
-    /// What cannot be had back, for a person; said once.
+    /// Returns the permanent loss, for a person. It is returned only once.
     pub(crate) fn loss(&self) -> Option<String> {
         let mut lost = self.lost.lock().unwrap_or_else(PoisonError::into_inner);
         lost.take()
@@ -101,7 +103,7 @@ impl RuntimeFiles {
         Ok(())
     }
 
-    /// Once, however often it is tried.
+    /// Logs a failure once, however often it occurs.
     fn say(&self, what: &str, error: &std::io::Error) {
         let text = format!("{what}: {error}");
         let mut said = self.trouble.lock().unwrap_or_else(PoisonError::into_inner);
@@ -111,7 +113,7 @@ impl RuntimeFiles {
         }
     }
 
-    /// A lock whose file is gone keeps nobody out.
+    /// Restores the lock file. Without the file, the lock does not exclude other brokers.
     fn restore_lock(&self) -> Result<(), String> {
         let mut lock = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
         if lock.as_ref().is_none_or(InstanceLock::is_there) {
@@ -136,7 +138,7 @@ impl RuntimeFiles {
                     "somebody has removed the lock of the runtime directory, and another broker{pid} has taken it since"
                 ))
             }
-            // Next time, perhaps.
+            // The next call tries again.
             Err(LockError::Io(error)) => {
                 self.say(
                     "cannot make the lock of the runtime directory again",

@@ -1,4 +1,5 @@
-//! Whom this process speaks to on its stderr: a broker listens to what it has started until that has joined.
+//! Target of this process's stderr. A broker reads the stderr of a started process until it has
+//! joined.
 
 use std::os::fd::{AsFd as _, BorrowedFd, OwnedFd};
 
@@ -6,12 +7,13 @@ use rustix::fs::fstat;
 use rustix::io::{FdFlags, fcntl_dupfd_cloexec, fcntl_setfd};
 use rustix::stdio::dup2_stderr;
 
-/// The environment variable in which whoever starts a peer, and listens to its stderr until it has joined, says which
-/// descriptor is the lasting one: its number, device and inode, with colons between.
+/// Environment variable that names the lasting stderr: its descriptor number, device and inode,
+/// separated by colons. It is set by a process that starts a peer and reads its stderr until it
+/// joins.
 pub const STDERR: &str = "QCBUS_STDERR";
 
-/// The broker's own stderr, for what may outlive the broker: this process has the broker's ear for its stderr, which
-/// goes with the broker. `None`: nobody listens.
+/// Returns the broker's own stderr, for output that may outlive the broker. The stderr of this
+/// process is read by the broker and ends with it. Returns `None` if the stderr is not read.
 #[expect(
     unsafe_code,
     reason = "a descriptor that was handed over is known by its number only"
@@ -26,25 +28,27 @@ pub fn lasting_stderr() -> Option<OwnedFd> {
     }
     // SAFETY: the descriptor is only borrowed, for calls that refuse a number that is not open.
     let handed = unsafe { BorrowedFd::borrow_raw(number) };
-    // The variable may have come here without the descriptor, and the number may be that of another one.
+    // The variable may be inherited without the descriptor, and the number may belong to another
+    // one.
     let stat = fstat(handed).ok()?;
     if (stat.st_dev, stat.st_ino) != (device, inode) {
         return None;
     }
-    // What this process starts in its turn has no use for it.
+    // Children of this process do not need it.
     fcntl_setfd(handed, FdFlags::CLOEXEC).ok()?;
     fcntl_dupfd_cloexec(handed, 3).ok()
 }
 
-/// This process has joined: what it says from now on goes to the log, also when another broker has taken over.
+/// Redirects stderr to the log after this process has joined. This lasts even if another broker
+/// takes over.
 pub(crate) fn joined() {
     if let Some(lasting) = lasting_stderr() {
-        // Where that fails, it goes on as it is.
+        // If this fails, stderr stays as it is.
         let _ = dup2_stderr(&lasting);
     }
 }
 
-/// The two that a process may speak to, for one that has others join.
+/// The two targets of stderr, for a process that lets others join.
 #[derive(Debug)]
 pub struct SendSide {
     heard: OwnedFd,
@@ -52,19 +56,19 @@ pub struct SendSide {
 }
 
 impl SendSide {
-    /// `None`: nobody listens.
+    /// Returns both targets, or `None` if the stderr is not read.
     pub fn take() -> Option<SendSide> {
         let lasting = lasting_stderr()?;
         let heard = fcntl_dupfd_cloexec(std::io::stderr().as_fd(), 3).ok()?;
         Some(SendSide { heard, lasting })
     }
 
-    /// The broker listens.
+    /// Redirects stderr to the broker, which reads it.
     pub fn is_heard(&self) {
         let _ = dup2_stderr(&self.heard);
     }
 
-    /// The broker may end, and this process goes on.
+    /// Redirects stderr to the lasting target, because this process may outlive the broker.
     pub fn lasts(&self) {
         let _ = dup2_stderr(&self.lasting);
     }

@@ -12,7 +12,7 @@ use crate::link::{FrameHeader, Link, SessionKey, Wants};
 use crate::ports::{self, Hub, PortError, TopicService, WakeService};
 use crate::receive_budget::{Budget, Waiting};
 
-/// How long a peer may take to open its channels after its introduction.
+/// Maximum time from a peer's introduction until it opens its channels.
 const CONNECT_WITHIN: Duration = Duration::from_secs(10);
 
 pub(crate) struct Session {
@@ -21,17 +21,17 @@ pub(crate) struct Session {
     to: TopicService<u8, FrameHeader>,
     _from: TopicService<u8, FrameHeader>,
     _wake: WakeService,
-    /// `None`: it has not said who it is, and is told so.
+    /// Facts about the peer. `None` if it is unproven; the session then only reports this.
     known: Option<Known>,
     opened: Instant,
     connected: bool,
     farewell: bool,
-    /// When it ends, once it has been refused, and why.
+    /// End of the session and its reason, after a refusal.
     ends: Option<(Instant, String)>,
 }
 
 impl Session {
-    /// Makes the services and ports. Takes about 2 ms.
+    /// Creates the services and ports. This takes about 2 ms.
     pub(crate) fn open(
         hub: &Hub,
         services: &Services,
@@ -41,10 +41,10 @@ impl Session {
         let suffix = key.suffix();
         let wake = hub.wake(&services.wake_peer, &suffix)?;
         let from = hub.topic(&services.from_peer, &suffix)?;
-        // Before the peer can have its end: it connects to whoever is there when it makes it, and not to
-        // anybody later once it is confined.
+        // This port must exist before the peer creates its end. The peer connects to the existing
+        // ports then, and cannot connect to later ones once it is confined.
         let receiver = ports::subscriber(&from, &services.from_peer)?;
-        // Last: the peer opens this one first, and then finds the others.
+        // This service is created last: the peer opens it first and then finds the others.
         let to = hub.topic(&services.to_peer, &suffix)?;
         let link = Link::new(
             key,
@@ -71,17 +71,17 @@ impl Session {
         self.key
     }
 
-    /// Who is at the other end.
+    /// Records the verified facts about the peer.
     pub(crate) fn is_known(&mut self, known: Known) {
         self.known = Some(known);
     }
 
-    /// Whether it is one of this process.
+    /// Checks whether the session belongs to this process.
     pub(crate) fn is_of(&self, known: &Known) -> bool {
         self.known.as_ref().is_some_and(|own| own.is_same(known))
     }
 
-    /// Reads up to `quota` frames; `true` when there was one.
+    /// Reads up to `quota` frames and returns `true` if there was one.
     pub(crate) fn read(
         &mut self,
         peer: PeerId,
@@ -111,7 +111,7 @@ impl Session {
         drained.frames > 0
     }
 
-    /// Whether the peer's process lives and has its end of the channel open.
+    /// Checks whether the peer's process lives and has its end of the channel open.
     pub(crate) fn is_there(&mut self) -> bool {
         let subscribed = self.to.dynamic_config().number_of_subscribers() > 0;
         self.connected |= subscribed;
@@ -121,18 +121,18 @@ impl Session {
         alive && !left && !never_came && !self.farewell
     }
 
-    /// The peer was refused: end when it has read why, at the latest at `at`.
+    /// Ends the session of a refused peer when it has read the reason, at the latest at `at`.
     pub(crate) fn end(&mut self, at: Instant, reason: &str) {
         self.link.hurry();
         self.ends = Some((at, reason.to_owned()));
     }
 
-    /// Whether the broker has done with this session.
+    /// Checks whether the broker has finished this session.
     pub(crate) fn is_silent(&self) -> bool {
         self.ends.is_some()
     }
 
-    /// Whether a session that was ended may be removed.
+    /// Checks whether an ended session may be removed.
     pub(crate) fn is_over(&mut self, now: Instant) -> bool {
         let Some((at, reason)) = &self.ends else {
             return false;

@@ -1,9 +1,9 @@
-//! A reliable, ordered stream of messages over frames that may not arrive: pure, no I/O.
+//! A reliable, ordered stream of messages over frames that may get lost: pure logic, no I/O.
 //!
 //! A message is written as a length of four bytes and its bytes. Messages are packed into frames
-//! back to back, so a frame carries many small ones and a large one spans many frames. Frames are
-//! numbered from 1. The sender keeps each until it is acknowledged; the receiver takes only the
-//! next in order, drops duplicates and what comes after a gap, and acknowledges cumulatively.
+//! back to back. So a frame carries many small ones and a large one spans many frames. Frames are
+//! numbered from 1. The sender keeps each frame until it is acknowledged. The receiver takes only
+//! the next in order, drops duplicates and frames after a gap, and acknowledges cumulatively.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -11,21 +11,21 @@ use std::time::{Duration, Instant};
 use qcbus_messages::codec::MAX_MESSAGE;
 use qcbus_messages::services::{FRAME_BYTES, FRAME_WINDOW};
 
-/// After this long without an acknowledgement, frames that were taken are sent again. A frame
-/// that the receiver's buffer took is not normally lost, so this is for surprises only.
+/// Time without an acknowledgement after which taken frames are sent again. A frame in the
+/// receiver's buffer is not normally lost, so this only covers unexpected cases.
 const RESEND_AFTER: Duration = Duration::from_millis(500);
 const RESEND_AT_MOST_EVERY: Duration = Duration::from_secs(8);
 
 /// The sending half.
 #[derive(Debug)]
 pub(crate) struct Outgoing {
-    /// Unacknowledged frames in order; the last one may still be filled when it was never sent.
+    /// Unacknowledged frames in order. The last one may still be filled if it was never sent.
     frames: VecDeque<Vec<u8>>,
     /// Number of the first of `frames`.
     base: u64,
-    /// How many of `frames` were taken by the receiver's buffer.
+    /// Number of `frames` that the receiver's buffer has taken.
     taken: usize,
-    /// How many of `frames` were ever tried, and so must not change any more.
+    /// Number of `frames` that were tried at least once and must not change any more.
     sealed: usize,
     spare: Vec<Vec<u8>>,
     bytes: usize,
@@ -47,7 +47,7 @@ impl Outgoing {
         }
     }
 
-    /// Appends a message. The caller has checked that it is not larger than [`MAX_MESSAGE`].
+    /// Appends a message. The caller must check that it is not larger than [`MAX_MESSAGE`].
     pub(crate) fn push(&mut self, message: &[u8]) {
         debug_assert!(message.len() <= MAX_MESSAGE);
         let length = u32::try_from(message.len()).unwrap_or(u32::MAX);
@@ -75,8 +75,8 @@ impl Outgoing {
         }
     }
 
-    /// The next frame to put on the bus, with its number; `None` when everything was taken or the
-    /// window is full. Once handed out, a frame no longer changes.
+    /// Returns the next frame to send, with its number. Returns `None` if all frames were taken or
+    /// the window is full. A returned frame no longer changes.
     pub(crate) fn next(&mut self) -> Option<(u64, &[u8])> {
         if self.taken >= self.frames.len().min(FRAME_WINDOW) {
             return None;
@@ -85,7 +85,7 @@ impl Outgoing {
         Some((self.base + self.taken as u64, &self.frames[self.taken]))
     }
 
-    /// The receiver's buffer took the frame that [`Outgoing::next`] handed out.
+    /// Records that the receiver's buffer took the frame returned by [`Outgoing::next`].
     pub(crate) fn was_taken(&mut self, now: Instant) {
         if self.taken == 0 {
             self.last_progress = now;
@@ -93,8 +93,8 @@ impl Outgoing {
         self.taken += 1;
     }
 
-    /// Everything up to and including `seq` has arrived. Numbers never sent are ignored; `true` when
-    /// this is news.
+    /// Records that everything up to and including `seq` has arrived. Numbers that were never sent
+    /// are ignored. Returns `true` if this is new.
     pub(crate) fn acknowledge(&mut self, seq: u64, now: Instant) -> bool {
         if seq < self.base || seq >= self.base + self.sealed as u64 {
             return false;
@@ -115,7 +115,7 @@ impl Outgoing {
         true
     }
 
-    /// Goes back to the first unacknowledged frame when there was no sign of it for too long.
+    /// Goes back to the first unacknowledged frame after too long without progress.
     pub(crate) fn tick(&mut self, now: Instant) {
         if self.taken > 0 && now.duration_since(self.last_progress) >= self.patience {
             self.taken = 0;
@@ -124,32 +124,32 @@ impl Outgoing {
         }
     }
 
-    /// Bytes not yet acknowledged.
+    /// Returns the bytes not yet acknowledged.
     pub(crate) fn backlog(&self) -> usize {
         self.bytes
     }
 
-    /// Whether more waits than one frame holds.
+    /// Checks whether more than one frame waits.
     pub(crate) fn has_full_frame(&self) -> bool {
         self.frames.len() > self.taken + 1
     }
 }
 
-/// What arrived is no stream of ours.
+/// Reason why the received data is not a valid stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum BrokenStream {
-    /// A length that no message has.
+    /// The length of a message is invalid.
     #[error("a message of {announced} bytes was announced; at most {most} are allowed")]
     Message {
-        /// Bytes.
+        /// Announced length in bytes.
         announced: usize,
-        /// That the sender may say in one message.
+        /// Maximum length of a message from this sender in bytes.
         most: usize,
     },
-    /// A length that no frame has.
+    /// The length of a frame is invalid.
     #[error("a frame of {0} bytes came; at most {FRAME_BYTES} are allowed")]
     Frame(usize),
-    /// A flood.
+    /// Too many useless frames arrived in a row.
     #[error("{0} frames in a row brought nothing")]
     Useless(u32),
 }
@@ -157,18 +157,18 @@ pub(crate) enum BrokenStream {
 /// The receiving half.
 #[derive(Debug)]
 pub(crate) struct Incoming {
-    /// Bytes of the largest message that the other side may send.
+    /// Maximum size of a message from the other side in bytes.
     most: usize,
     /// Number of the last frame taken.
     arrived: u64,
-    /// Frames since the last acknowledgement went out.
+    /// Frames since the last acknowledgement was sent.
     owed: u32,
     length: Vec<u8>,
     body: Vec<u8>,
 }
 
 impl Incoming {
-    /// Nothing has arrived yet; no message may have more than `most` bytes.
+    /// Creates the receiving half. No message may have more than `most` bytes.
     pub(crate) fn new(most: usize) -> Incoming {
         Incoming {
             most,
@@ -179,10 +179,10 @@ impl Incoming {
         }
     }
 
-    /// Takes a frame; `deliver` gets each message that it completes.
+    /// Takes a frame and calls `deliver` with each message that it completes.
     ///
     /// # Errors
-    /// [`BrokenStream`]; nothing after it can be understood, so the session has to end.
+    /// Returns [`BrokenStream`]. Later frames cannot be understood, so the session must end.
     pub(crate) fn accept(
         &mut self,
         seq: u64,
@@ -206,14 +206,14 @@ impl Incoming {
                 continue;
             };
             if self.body.is_empty() && bytes.len() >= expected {
-                // The whole message lies in this frame: no need to gather it.
+                // The whole message lies in this frame, so it need not be copied.
                 let (message, rest) = bytes.split_at(expected);
                 deliver(message);
                 bytes = rest;
                 self.length.clear();
                 continue;
             }
-            // Memory grows with what arrives, not with what is announced.
+            // Memory grows with the received bytes, not with the announced length.
             bytes = fill(&mut self.body, expected, bytes);
             if self.body.len() == expected {
                 deliver(&self.body);
@@ -229,17 +229,17 @@ impl Incoming {
         Some(u32::from_le_bytes(length) as usize)
     }
 
-    /// Number of the last frame taken in order.
+    /// Returns the number of the last frame taken in order.
     pub(crate) fn arrived(&self) -> u64 {
         self.arrived
     }
 
-    /// Frames that arrived since [`Incoming::acknowledged`] was called.
+    /// Returns the number of frames that arrived since [`Incoming::acknowledged`] was called.
     pub(crate) fn owed(&self) -> u32 {
         self.owed
     }
 
-    /// An acknowledgement is on its way.
+    /// Records that an acknowledgement was sent.
     pub(crate) fn acknowledged(&mut self) {
         self.owed = 0;
     }
@@ -258,7 +258,7 @@ mod tests {
 
     use super::*;
 
-    /// A wire that may refuse, drop or repeat a frame, and may lose acknowledgements.
+    /// A simulated wire that may refuse, drop or repeat a frame, and may lose acknowledgements.
     #[derive(Debug, Clone, Copy)]
     enum Fate {
         Arrives,
@@ -308,7 +308,7 @@ mod tests {
                 } else if out.backlog() == 0 {
                     break;
                 }
-                // A wire whose every fate is bad gets better in the end.
+                // After a limited number of rounds every frame arrives, so that the test ends.
                 let fate = fates.next().filter(|_| round < 2_000).unwrap_or(Fate::Arrives);
                 if let Some((seq, bytes)) = out.next() {
                     match fate {
@@ -356,7 +356,7 @@ mod tests {
         assert_eq!((seq, bytes.len()), (1, 100 * 104));
         out.was_taken(now);
         assert!(out.next().is_none());
-        // What was handed out does not change; more goes into the next frame.
+        // A returned frame does not change. More data goes into the next frame.
         out.push(&[8; 10]);
         assert_eq!(
             out.next().unwrap(),

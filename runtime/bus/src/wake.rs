@@ -1,4 +1,4 @@
-//! Being woken by another process, on tokio.
+//! Wake-ups by another process, on tokio.
 
 use std::os::fd::{AsRawFd, RawFd};
 use std::time::Duration;
@@ -9,7 +9,7 @@ use tokio::io::unix::AsyncFd;
 
 use crate::ports::WakeListener;
 
-/// How long a lost wake-up can last.
+/// Maximum delay after a lost wake-up.
 pub(crate) const TICK: Duration = Duration::from_millis(20);
 
 struct ListenerFd(WakeListener);
@@ -20,16 +20,16 @@ impl AsRawFd for ListenerFd {
         reason = "iceoryx2 hands out its descriptor only this way"
     )]
     fn as_raw_fd(&self) -> RawFd {
-        // SAFETY: the descriptor belongs to the listener, which lives as long as `self`, and is
-        // neither closed nor read from through this handle, only waited on.
+        // SAFETY: the descriptor belongs to the listener, which lives as long as `self`. Through
+        // this handle it is only waited on, and neither closed nor read from.
         unsafe { self.0.file_descriptor().native_handle() }
     }
 }
 
 #[expect(unsafe_code, reason = "tokio asks for a descriptor that stays valid")]
 fn register(listener: ListenerFd) -> std::io::Result<AsyncFd<ListenerFd>> {
-    // SAFETY: `as_raw_fd` gives the same descriptor every time, and it is open until the listener
-    // is dropped, which only happens together with the registration.
+    // SAFETY: `as_raw_fd` returns the same descriptor every time. It is open until the listener is
+    // dropped, which only happens together with the registration.
     let registered = unsafe { AsyncFd::register_with_interest(listener, Interest::READABLE) };
     registered.map_err(Into::into)
 }
@@ -40,21 +40,21 @@ pub(crate) struct Waker {
 }
 
 impl Waker {
-    /// Registers with the runtime that this is called in.
+    /// Registers with the runtime in which it is called.
     ///
     /// # Errors
-    /// When there is no runtime with I/O enabled, or the descriptor cannot be watched.
+    /// Fails if there is no runtime with I/O enabled, or if the descriptor cannot be watched.
     pub(crate) fn new(listener: WakeListener) -> std::io::Result<Waker> {
         Ok(Waker {
             fd: register(ListenerFd(listener))?,
         })
     }
 
-    /// Returns when somebody has notified, or after `limit`. Cancel-safe.
+    /// Returns on a notification or after `limit`. Cancel-safe.
     pub(crate) async fn wait(&self, limit: Duration) {
         let woken = tokio::time::timeout(limit, self.fd.readable()).await;
-        // The descriptor must be empty before readiness is cleared. It is emptied after a
-        // timeout as well: that heals a wake-up whose readiness got lost.
+        // The descriptor must be empty before readiness is cleared. It is also emptied after a
+        // timeout, which repairs a wake-up with lost readiness.
         self.empty();
         match woken {
             Ok(Ok(mut guard)) => guard.clear_ready(),
@@ -66,8 +66,8 @@ impl Waker {
         }
     }
 
-    /// One `try_wait` may leave notifications behind, and with them a readiness that never fires
-    /// again; hence until there is nothing left. Bounded, because a peer may notify without end.
+    /// Reads until no notification is left. One `try_wait` may leave some, and their readiness
+    /// never fires again. The reads are limited, because a peer may notify without end.
     fn empty(&self) {
         for _ in 0..1024 {
             match self.fd.get_ref().0.try_wait(|_| {}) {

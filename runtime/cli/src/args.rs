@@ -27,7 +27,7 @@ pub use bundle::{
 3 undetermined or timeout · 4 no broker · 5 internal error"
 )]
 pub struct Args {
-    /// What to do.
+    /// Command to run.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -35,46 +35,46 @@ pub struct Args {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Check files and directories once, and print what was found
+    /// Check files and directories once, and print the findings
     Check(Box<CheckArgs>),
-    /// Watch directories and judge whatever appears in them
+    /// Watch directories and check all files in them
     Serve(Box<ServeArgs>),
-    /// Let a running broker finish what it has and stop
+    /// Let a running broker finish its work and stop
     Down(InstanceArgs),
-    /// Show how a running broker is doing
+    /// Show the state of a running broker
     Status(StatusArgs),
-    /// Wait for the verdict on a file's present content
+    /// Wait for the verdict on a file's current content
     Wait(WaitArgs),
-    /// Let a running broker read its configuration and bundle manifests again
+    /// Make a running broker reload its configuration and bundle manifests
     Reload(InstanceArgs),
     /// List, run, add, upgrade or remove checker bundles
     #[command(subcommand)]
     Bundle(BundleCommand),
-    /// Report on results that are there already, also ASAM's own
+    /// Report on existing results, including ASAM's
     Report(ReportArgs),
     /// Run a reporter
     #[command(subcommand, hide = true)]
     Reporter(ReporterCommand),
     /// Explain a rule, or list all of them
     Rule(RuleArgs),
-    /// Look at a configuration without using it
+    /// Check a configuration without using it
     #[command(subcommand)]
     Config(ConfigCommand),
     /// Compile XML schemas to tables
     #[command(subcommand)]
     Schema(SchemaCommand),
-    /// Make a plain scenario of a modular one
+    /// Convert a modular scenario to a plain scenario
     Expand(ExpandArgs),
-    /// Pack a modular scenario and what it refers to into an archive
+    /// Pack a modular scenario and its referenced files into an archive
     Pack(PackArgs),
-    /// Look for what may keep a broker from working, and say what to do
+    /// Look for problems that may affect a broker, and suggest fixes
     Doctor(DoctorArgs),
 }
 
-/// The instance that is meant when none is named.
+/// Default instance.
 pub const DEFAULT_INSTANCE: &str = "default";
 
-/// Which broker.
+/// Selection of the broker.
 #[derive(Debug, Clone, Default, ClapArgs)]
 pub struct InstanceArgs {
     /// Name of the instance
@@ -90,66 +90,66 @@ pub struct InstanceArgs {
     pub instance_dir: Option<PathBuf>,
 }
 
-/// How results are written.
+/// Options for result files.
 #[derive(Debug, Clone, ClapArgs)]
 pub struct OutputArgs {
     /// Directory for results (default: qcbus-out)
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Form of the .xqar files
+    /// Format of the .xqar files
     #[arg(long, value_enum, default_value_t = DialectArg::Current)]
     pub xqar_dialect: DialectArg,
 }
 
-/// The forms of a result file.
+/// Formats of a result file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum DialectArg {
-    /// As ASAM's framework writes today
+    /// The current format of ASAM's framework
     Current,
-    /// As QC4OpenX 1.0.0 wrote in 2023
+    /// The format of QC4OpenX 1.0.0 from 2023
     Qc4openx,
 }
 
-/// Caps on what is read.
+/// Limits for input files and bundles.
 #[derive(Debug, Clone, ClapArgs)]
 #[command(next_help_heading = "Limits")]
 pub struct LimitArgs {
-    /// Largest file on disk, in MiB
+    /// Maximum size of a file on disk, in MiB
     #[arg(long, value_name = "MIB", hide_short_help = true)]
     pub max_file: Option<u64>,
-    /// Largest file after unpacking, in MiB
+    /// Maximum size of a file after unpacking, in MiB
     #[arg(long, value_name = "MIB", hide_short_help = true)]
     pub max_unpacked: Option<u64>,
-    /// Largest ratio of unpacked to packed size
+    /// Maximum ratio of unpacked to packed size
     #[arg(long, value_name = "N", hide_short_help = true)]
     pub max_ratio: Option<u32>,
-    /// Most members of an archive
+    /// Maximum number of members of an archive
     #[arg(long, value_name = "N", hide_short_help = true)]
     pub max_members: Option<u32>,
-    /// Deepest nesting of elements
+    /// Maximum nesting depth of elements
     #[arg(long, value_name = "N", hide_short_help = true)]
     pub max_depth: Option<u16>,
-    /// A bundle must end a file within this time
+    /// Time within which a bundle must finish a file
     #[arg(long, value_name = "TIME", value_parser = duration, hide_short_help = true)]
     pub job_deadline: Option<Duration>,
-    /// A bundle with work that says nothing for this long is taken for dead
+    /// Time without a message after which a bundle with work counts as dead
     #[arg(long, value_name = "TIME", value_parser = duration, hide_short_help = true)]
     pub silence_limit: Option<Duration>,
-    /// A bundle that must judge and is not there is waited for this long, then files are undetermined; an
-    /// ASAM module that is being started for two minutes at least
+    /// Time to wait for a missing required bundle before files become undetermined; at least two
+    /// minutes for an ASAM module that is starting
     #[arg(long, value_name = "TIME", value_parser = duration, hide_short_help = true)]
     pub absence_limit: Option<Duration>,
-    /// A file without room in shared memory is waited for this long while nothing moves
+    /// Time without any progress for which a file waits for space in shared memory
     #[arg(long, value_name = "TIME", value_parser = duration, hide_short_help = true)]
     pub room_limit: Option<Duration>,
-    /// Threads with which a bundle that comes with qcbus checks; unless told otherwise, as many as this process may
-    /// use processors
+    /// Number of threads of a bundle that comes with qcbus (default: the number of processors
+    /// available to this process)
     #[arg(long, value_name = "N", value_parser = threads, hide_short_help = true)]
     pub threads: Option<usize>,
-    /// Most private memory of a bundle, in MiB
+    /// Maximum private memory of a bundle, in MiB
     #[arg(long, value_name = "MIB", hide_short_help = true)]
     pub memory_limit: Option<u64>,
-    /// Restarts of a bundle within a minute before it rests
+    /// Maximum number of restarts of a bundle within a minute before it pauses
     #[arg(long, value_name = "N", hide_short_help = true)]
     pub max_restarts: Option<u32>,
 }
@@ -160,53 +160,53 @@ pub struct CheckArgs {
     /// Files and directories; with -c the default is the configuration's InputFile
     #[arg(value_name = "PATH")]
     pub paths: Vec<PathBuf>,
-    /// ASAM configuration: run what it demands, as it demands it
+    /// ASAM configuration that selects the bundles and checkers to run
     #[arg(short, long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Pass over files that a .qcignore excludes, also those that are named: for hooks and editors
+    /// Skip files that a .qcignore excludes, also if they are named; for hooks and editors
     #[arg(long)]
     pub force_exclude: bool,
-    /// How results are written.
+    /// Options for result files.
     #[command(flatten)]
     pub output: OutputArgs,
-    /// Ask only these checkers: ids, rule UIDs, their beginnings or last parts, families, bundles
+    /// Run only these checkers: ids, rule UIDs, their beginnings or last parts, families, bundles
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub select: Vec<String>,
-    /// Do not ask these checkers; results and verdicts say what was left out
+    /// Do not run these checkers; results and verdicts list them
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub ignore: Vec<String>,
-    /// Judge each file by itself: a rejected map does not reject the scenarios on it
+    /// Check each file independently: a rejected map does not reject the scenarios that use it
     #[arg(long)]
     pub own_verdict: bool,
-    /// What is printed, and what ends how.
+    /// Options for the output and the exit code.
     #[command(flatten)]
     pub print: PrintArgs,
-    /// Directory of manifests of further bundles
+    /// Directory of manifests of additional bundles
     #[arg(long, value_name = "DIR")]
     pub bundles_d: Option<PathBuf>,
-    /// Directory of XML schemas (.xsd, .tbl) to use instead of those that come with qcbus
+    /// Directory of XML schemas (.xsd, .tbl) to use instead of the built-in ones
     #[arg(long, value_name = "DIR")]
     pub schema_dir: Option<PathBuf>,
-    /// Do not confine bundles: they may write, connect and signal as you may
+    /// Do not sandbox bundles: they may write, connect and send signals with your permissions
     #[arg(long, hide_short_help = true)]
     pub no_sandbox: bool,
-    /// Do not ask a broker that runs already: start bundles of its own
+    /// Do not use a running broker: start separate bundles
     #[arg(long)]
     pub cold: bool,
-    /// Whom to ask.
+    /// Selection of the broker.
     #[command(flatten)]
     pub instance: InstanceArgs,
-    /// Caps.
+    /// Limits for input files and bundles.
     #[command(flatten)]
     pub limits: LimitArgs,
 }
 
-/// What `check` prints, and with which exit code it ends.
+/// Options for the output and the exit code of `check`.
 #[derive(Debug, Clone, ClapArgs)]
 #[command(next_help_heading = "Output")]
 pub struct PrintArgs {
-    /// What to print, or to write to FILE; several with commas [default: full for one file, concise for
-    /// several]
+    /// Formats to print, or to write to FILE; separate several with commas [default: full for one
+    /// file, concise for several]
     #[arg(
         long,
         visible_alias = "format",
@@ -215,38 +215,38 @@ pub struct PrintArgs {
         value_parser = OutputFormats
     )]
     pub output_format: Vec<OutputFormat>,
-    /// Count findings by rule, the most frequent first
+    /// Print the number of findings by rule, the most frequent first
     #[arg(long)]
     pub statistics: bool,
-    /// Print findings and nothing else
+    /// Print only findings
     #[arg(short, long, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Print everything of every file, also what was skipped and why
+    /// Print everything about every file, also the skipped checkers and the reasons
     #[arg(short, long)]
     pub verbose: bool,
-    /// End with 1 from this level of findings on
+    /// Exit with code 1 from this level of findings
     #[arg(long, value_name = "LEVEL", value_enum, default_value_t = FailLevel::Error)]
     pub fail_level: FailLevel,
-    /// End with 0 whatever is found; with 3 still when something could not be checked
+    /// Exit with code 0 despite findings; still with 3 if a check was not possible
     #[arg(long)]
     pub exit_zero: bool,
-    /// Whether to colour
+    /// When to use colour
     #[arg(long, value_name = "WHEN", value_enum, default_value_t = ColorArg::Auto)]
     pub color: ColorArg,
 }
 
-/// From which level on findings end in exit code 1.
+/// Lowest level of findings that cause exit code 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum FailLevel {
-    /// Errors: what is rejected
+    /// Errors, which cause a rejection
     Error,
-    /// Warnings, too
+    /// Errors and warnings
     Warning,
-    /// Everything that is found
+    /// All findings
     Information,
 }
 
-/// Whether to colour what is printed.
+/// When to use colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ColorArg {
     /// On a terminal, unless NO_COLOR is set
@@ -257,19 +257,19 @@ pub enum ColorArg {
     Never,
 }
 
-/// A format, and the file that it goes to.
+/// A format and its output file.
 #[derive(Debug, Clone)]
 pub struct OutputFormat {
-    /// As it was typed.
+    /// Name as the user typed it.
     name: String,
-    /// Who writes it.
+    /// Reporter that writes the format.
     pub registration: &'static Registration,
-    /// The file; `None` for stdout.
+    /// Path of the file; `None` for stdout.
     pub file: Option<PathBuf>,
 }
 
 impl OutputFormat {
-    /// How the program itself prints it, if it does.
+    /// Returns the terminal format if the program prints this format itself.
     pub fn terminal(&self) -> Option<TerminalFormat> {
         match self.registration.alias {
             "text" => Some(TerminalFormat::Full),
@@ -278,7 +278,7 @@ impl OutputFormat {
         }
     }
 
-    /// Whether it is a page to look at, which nobody wants on a terminal.
+    /// Checks whether the output is a page for a browser, which is not suitable for a terminal.
     pub fn is_page(&self) -> bool {
         self.registration.is_page
     }
@@ -290,16 +290,16 @@ impl std::fmt::Display for OutputFormat {
     }
 }
 
-/// Formats that the program prints itself, as results come.
+/// Formats that the program prints itself as results arrive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TerminalFormat {
-    /// Each finding with its line of the file.
+    /// Each finding with its source line.
     Full,
     /// A line for each finding.
     Concise,
 }
 
-/// Takes `FORMAT` and `FORMAT=FILE`.
+/// Parser of `FORMAT` and `FORMAT=FILE`.
 #[derive(Debug, Clone)]
 struct OutputFormats;
 
@@ -334,7 +334,7 @@ impl TypedValueParser for OutputFormats {
             }),
             None => {
                 let parser = PossibleValuesParser::new(self.values());
-                // It says which there are, and which is near.
+                // This parser's error lists the possible values and suggests a similar one.
                 let refused = parser.parse_ref(command, arg, std::ffi::OsStr::new(&name));
                 Err(refused.err().unwrap_or_else(|| {
                     clap::Error::new(clap::error::ErrorKind::InvalidValue).with_cmd(command)
@@ -358,7 +358,7 @@ impl OutputFormats {
     }
 }
 
-/// The text report is called `full` beside `concise`.
+/// Returns the alias of a format. The text report is called `full`, in contrast to `concise`.
 fn standard_alias(name: &str) -> &str {
     match name {
         "full" => "text",
@@ -366,12 +366,12 @@ fn standard_alias(name: &str) -> &str {
     }
 }
 
-/// How a rule is printed.
+/// Output format of a rule.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// For people
     Text,
-    /// One JSON document per file and line
+    /// One JSON document on one line
     Json,
 }
 
@@ -381,82 +381,84 @@ pub struct ServeArgs {
     /// Directories to watch
     #[arg(value_name = "DIR", required = true)]
     pub directories: Vec<PathBuf>,
-    /// Which instance to be.
+    /// Instance to start.
     #[command(flatten)]
     pub instance: InstanceArgs,
-    /// ASAM configuration; read again whenever it changes
+    /// ASAM configuration; reloaded after each change
     #[arg(short, long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// How results are written.
+    /// Options for result files.
     #[command(flatten)]
     pub output: OutputArgs,
-    /// Directory of what must survive a restart (default: OUT/.qcbus)
+    /// Directory of data that must survive a restart (default: OUT/.qcbus)
     #[arg(long, value_name = "DIR")]
     pub state: Option<PathBuf>,
-    /// Directory of bundle manifests, watched (default: STATE/bundles.d)
+    /// Directory of bundle manifests; it is watched (default: STATE/bundles.d)
     #[arg(long, value_name = "DIR")]
     pub bundles_d: Option<PathBuf>,
-    /// Directory of XML schemas (.xsd, .tbl) to use instead of those that come with qcbus
+    /// Directory of XML schemas (.xsd, .tbl) to use instead of the built-in ones
     #[arg(long, value_name = "DIR")]
     pub schema_dir: Option<PathBuf>,
-    /// Publish accepted files here, and only those
+    /// Directory in which only accepted files are published
     #[arg(long, value_name = "DIR")]
     pub gate: Option<PathBuf>,
-    /// Judge each file by itself: a rejected map does not reject the scenarios on it
+    /// Check each file independently: a rejected map does not reject the scenarios that use it
     #[arg(long)]
     pub own_verdict: bool,
-    /// What becomes behind the gate of a file that depends on others outside of DIR
+    /// Treatment by the gate of a file that depends on files outside of DIR
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = OutsideArg::Name, hide_short_help = true)]
     pub gate_outside: OutsideArg,
     /// Run a reporter; may be given several times
     #[arg(long, value_name = "NAME", value_parser = reporter())]
     pub report: Vec<&'static Registration>,
-    /// Look around at intervals instead of relying on file events (network file systems)
+    /// Scan at intervals instead of relying on file events (for network file systems)
     #[arg(long, value_name = "TIME", num_args = 0..=1, default_missing_value = "2s", value_parser = duration)]
     pub poll: Option<Duration>,
-    /// Judge a file that is written in place when it has rested this long, also once it is closed (uploads that
-    /// close and open files again; default: when it is closed, else after 250ms)
+    /// Time without changes after which a file that is written in place is checked, also after it
+    /// was closed. For uploads that close and reopen files (default: when it is closed, else after
+    /// 250ms)
     #[arg(long, value_name = "TIME", value_parser = rest)]
     pub settle: Option<Duration>,
-    /// How long the history of jobs is kept
+    /// Retention time of the job history
     #[arg(long, value_name = "TIME", default_value = "90d", value_parser = duration)]
     pub retention: Duration,
-    /// Look through everything this often even when file events arrive
+    /// Interval of a full scan even if file events arrive
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = duration, hide_short_help = true)]
     pub rescan: Duration,
-    /// Finish within this time when told to stop
+    /// Maximum time to finish after a request to stop
     #[arg(long, value_name = "TIME", default_value = "30s", value_parser = duration, hide_short_help = true)]
     pub drain_limit: Duration,
     /// Do not start the standard bundles
     #[arg(long, hide_short_help = true)]
     pub no_standard_bundles: bool,
-    /// Do not confine bundles: they may write, connect and signal as you may
+    /// Do not sandbox bundles: they may write, connect and send signals with your permissions
     #[arg(long, hide_short_help = true)]
     pub no_sandbox: bool,
-    /// Caps.
+    /// Limits for input files and bundles.
     #[command(flatten)]
     pub limits: LimitArgs,
 }
 
-/// What becomes behind the gate of a file that depends on others outside of what is watched.
+/// Treatment by the gate of a file that depends on files outside of the watched directories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum OutsideArg {
-    /// It is published, and its verdict file names them
+    /// Publish the file, and list the outside files in its verdict file
     Name,
-    /// It is not published
+    /// Do not publish the file
     Refuse,
 }
 
 /// `qcbus status`.
 #[derive(Debug, ClapArgs)]
 pub struct StatusArgs {
-    /// Which broker.
+    /// Selection of the broker.
     #[command(flatten)]
     pub instance: InstanceArgs,
-    /// For programs
+    /// Print JSON for programs
     #[arg(long)]
     pub json: bool,
-    /// Say only whether it needs a look, and why: ends with 0 when it is healthy, 1 when not, 4 without a broker
+    /// Print only whether the broker is healthy, and the reasons; exit code 0 if it is healthy, 1
+    /// if not, 4 without a broker
     #[arg(long, conflicts_with = "json")]
     pub health: bool,
 }
@@ -464,21 +466,21 @@ pub struct StatusArgs {
 /// `qcbus wait`.
 #[derive(Debug, ClapArgs)]
 pub struct WaitArgs {
-    /// The file
+    /// File to wait for
     pub file: PathBuf,
-    /// Wait for the reports on it, too: every reporter that the broker runs has written its own
+    /// Wait also until every reporter of the broker has written its report on the file
     #[arg(long)]
     pub reports: bool,
-    /// Give up after this time (30s, 5m); without it, wait for ever
+    /// Maximum time to wait (30s, 5m); no limit by default
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub timeout: Option<Duration>,
-    /// Which broker.
+    /// Selection of the broker.
     #[command(flatten)]
     pub instance: InstanceArgs,
-    /// For programs
+    /// Print JSON for programs
     #[arg(long)]
     pub json: bool,
-    /// Say nothing, only end with the exit code
+    /// Print nothing, only set the exit code
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -488,10 +490,10 @@ pub struct WaitArgs {
 pub enum ReporterCommand {
     /// Run a reporter on the bus
     Run {
-        /// Which one
+        /// Name of the reporter
         #[arg(value_parser = reporter())]
         name: &'static Registration,
-        /// How to join the bus.
+        /// Options to join the bus.
         #[command(flatten)]
         bus: BusArgs,
     },
@@ -500,19 +502,19 @@ pub enum ReporterCommand {
 /// `qcbus report`.
 #[derive(Debug, ClapArgs)]
 pub struct ReportArgs {
-    /// Which report
+    /// Name of the report
     #[arg(value_parser = reporter())]
     pub format: &'static Registration,
     /// Result files (.xqar)
     #[arg(value_name = "FILE.xqar", required_unless_present = "config")]
     pub results: Vec<PathBuf>,
-    /// Where the report goes (default: stdout; a page goes beside the result)
+    /// Output file of the report (default: stdout; a page is written beside the result)
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
-    /// ASAM configuration: the parameters of this reporter's ReportModule
+    /// ASAM configuration with the parameters of this reporter's ReportModule
     #[arg(short, long, value_name = "CONFIG")]
     pub config: Option<PathBuf>,
-    /// A parameter of the reporter, such as LineWidth=80; may be given several times
+    /// Parameter of the reporter, such as LineWidth=80; may be given several times
     #[arg(short, long, value_name = "NAME=VALUE", value_parser = name_value)]
     pub param: Vec<(String, String)>,
 }
@@ -522,10 +524,10 @@ pub struct ReportArgs {
 pub struct RuleArgs {
     /// A checker id, a rule UID, or the end of one
     pub id: Option<String>,
-    /// How to print it
+    /// Output format
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
-    /// Which broker to ask about the rules of other bundles.
+    /// Broker to ask about the rules of other bundles.
     #[command(flatten)]
     pub instance: InstanceArgs,
 }
@@ -540,7 +542,7 @@ reference leads nowhere, which value is meant is open, or a limit is exceeded."
 pub struct ExpandArgs {
     /// A modular scenario (.xosc) or an archive of one (.mosc)
     pub file: PathBuf,
-    /// Where the plain scenario goes (default: stdout)
+    /// Output file of the plain scenario (default: stdout)
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
 }
@@ -553,7 +555,7 @@ their\nname alone. What is wrong with the archive is said on stderr; it is writt
 end in exit code 1."
 )]
 pub struct PackArgs {
-    /// The main scenario, then what it refers to; in the archive the first is called main.xosc
+    /// The main scenario, then its referenced files; in the archive the first is called main.xosc
     #[arg(required = true)]
     pub files: Vec<PathBuf>,
     /// The archive (.mosc)
@@ -564,11 +566,11 @@ pub struct PackArgs {
 /// `qcbus config …`.
 #[derive(Debug, Subcommand)]
 pub enum ConfigCommand {
-    /// Say what is wrong or odd about a configuration
+    /// Print the errors and oddities of a configuration
     Check {
         /// The configuration
         file: PathBuf,
-        /// Directory of manifests of further bundles and reporters that it may name
+        /// Directory of manifests of additional bundles and reporters that it may name
         #[arg(long, value_name = "DIR")]
         bundles_d: Option<PathBuf>,
     },
@@ -579,12 +581,12 @@ pub enum ConfigCommand {
 pub enum SchemaCommand {
     /// Compile the .xsd files of a directory to tables for --schema-dir
     ///
-    /// All files of the directory are one schema. What tables are for is told by their root element
-    /// and the first number such as 1.7 in the name of the directory or file.
+    /// All files of the directory are one schema. Its root element and the first number such as 1.7
+    /// in the name of the directory or file select the use of the tables.
     Compile {
         /// Directory of the .xsd files of one schema, or a schema of one file
         path: PathBuf,
-        /// Where to write the tables
+        /// Output file of the tables
         #[arg(short, long, value_name = "FILE")]
         output: PathBuf,
     },
@@ -593,18 +595,18 @@ pub enum SchemaCommand {
 /// `qcbus doctor`.
 #[derive(Debug, ClapArgs)]
 pub struct DoctorArgs {
-    /// Which broker.
+    /// Selection of the broker.
     #[command(flatten)]
     pub instance: InstanceArgs,
-    /// Directory of results to look into (default: that of the running broker, else qcbus-out)
+    /// Directory of results to examine (default: that of the running broker, else qcbus-out)
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// State directory to look into (default: that of the running broker, else OUT/.qcbus)
+    /// State directory to examine (default: that of the running broker, else OUT/.qcbus)
     #[arg(long, value_name = "DIR")]
     pub state: Option<PathBuf>,
 }
 
-/// Takes a standard reporter by its short name.
+/// Returns a parser of the short names of standard reporters.
 fn reporter() -> impl TypedValueParser<Value = &'static Registration> {
     let row = |it: &&'static Registration| PossibleValue::new(it.alias).help(it.about);
     let find = |alias: String| REPORTERS.into_iter().find(|it| it.alias == alias);
@@ -612,7 +614,7 @@ fn reporter() -> impl TypedValueParser<Value = &'static Registration> {
         .try_map(move |alias| find(alias).ok_or("there is no such reporter"))
 }
 
-/// Reads `NAME=VALUE`.
+/// Parses `NAME=VALUE`.
 fn name_value(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((name, value)) if !name.is_empty() => Ok((name.to_owned(), value.to_owned())),
@@ -620,14 +622,14 @@ fn name_value(text: &str) -> Result<(String, String), String> {
     }
 }
 
-/// A number of threads.
+/// Parses a number of threads.
 fn threads(text: &str) -> Result<usize, String> {
     let number = text.parse().ok();
     let number = number.filter(|it| (1..=Permits::MOST).contains(it));
     number.ok_or_else(|| format!("`{text}` is no number from 1 to {}", Permits::MOST))
 }
 
-/// Reads `250ms`, `30s`, `5m`, `2h`, `90d`; a number alone is seconds.
+/// Parses `250ms`, `30s`, `5m`, `2h`, `90d`; a number without a unit is seconds.
 pub fn duration(text: &str) -> Result<Duration, String> {
     let split = text
         .find(|c: char| !(c.is_ascii_digit() || c == '.'))
@@ -646,7 +648,7 @@ pub fn duration(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(seconds).map_err(|_| wrong())
 }
 
-/// The time that files must rest.
+/// Parses the time that files must stay unchanged.
 fn rest(text: &str) -> Result<Duration, String> {
     let time = duration(text)?;
     let allowed = Duration::from_millis(10)..=Duration::from_secs(3600);

@@ -1,4 +1,4 @@
-//! `qcbus`: the one program. It ties broker, standard bundles and reporters together and holds no
+//! `qcbus`: the main program. It connects broker, standard bundles and reporters and contains no
 //! logic of its own.
 
 mod args;
@@ -28,7 +28,7 @@ fn main() -> ExitCode {
         Ok(args) => args,
         Err(error) => {
             let asked_for_it = !error.use_stderr();
-            // A closed pipe is no reason to complain.
+            // A closed pipe is not an error.
             let _ = error.print();
             let exit = if asked_for_it {
                 qcbus_messages::Exit::Accepted
@@ -41,12 +41,13 @@ fn main() -> ExitCode {
     talk::exit(commands::run(args)).into()
 }
 
-/// A broker starts its own program as `/proc/self/exe`, and `ps` and `top` would list it as `exe`.
+/// Sets the name of the process. A broker starts its own program as `/proc/self/exe`, so `ps` and
+/// `top` would list it as `exe`.
 fn name_as_called() {
     let called = std::env::args_os().next().unwrap_or_default();
     let name = Path::new(&called).file_name().unwrap_or_default();
     if let Ok(name) = CString::new(name.as_encoded_bytes()) {
-        // Under another name it works as well.
+        // The process works under another name as well.
         let _ = rustix::thread::set_name(&name);
     }
 }

@@ -1,4 +1,4 @@
-//! The bundles and reporters that come with the program: a table of each.
+//! Tables of the bundles and reporters that come with the program.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -19,7 +19,7 @@ pub static BUNDLES: [&Bundle; 3] = [
     &qcbus_modular::BUNDLE,
 ];
 
-/// The standard bundle of this name or alias.
+/// Returns the standard bundle of this name or alias.
 pub fn bundle(name: &str) -> Option<&'static Bundle> {
     BUNDLES
         .iter()
@@ -27,11 +27,11 @@ pub fn bundle(name: &str) -> Option<&'static Bundle> {
         .find(|bundle| qcbus_formats::config::same_bundle(name, bundle.name, bundle.alias))
 }
 
-/// How to start the standard bundles that take any of these kinds of files, with the user's
-/// schemas, and with how many threads if somebody says so.
+/// Returns how to start the standard bundles that take any of these kinds of files. The commands
+/// include the user's schemas and an optional number of threads.
 ///
 /// # Errors
-/// When the schemas are of no use: said here, before a bundle is started that would end at once.
+/// Returns an error if the schemas cannot be used. Otherwise the started bundle would end at once.
 pub fn bundle_specs(
     program: &Path,
     kinds: &BTreeSet<FileKind>,
@@ -63,8 +63,8 @@ pub fn bundle_specs(
     specs.collect()
 }
 
-/// The reporters that come with the program. One more is one more crate, which `Cargo.toml` names, and
-/// one more row: everything else follows from its registration (`docs/writing-a-reporter.md`).
+/// The reporters that come with the program. A new one needs a crate, an entry in `Cargo.toml` and
+/// a row here. Everything else follows from its registration (`docs/writing-a-reporter.md`).
 pub static REPORTERS: [&Registration; 8] = [
     &qcbus_report_text::REPORTER,
     &qcbus_report_text::CONCISE,
@@ -76,13 +76,13 @@ pub static REPORTERS: [&Registration; 8] = [
     &qcbus_report_html::REPORTER,
 ];
 
-/// The checkers of all standard bundles, each with its bundle.
+/// Returns the checkers of all standard bundles, each with its bundle.
 pub fn checkers() -> impl Iterator<Item = (&'static Bundle, Checker)> {
     let bundles = BUNDLES.into_iter();
     bundles.flat_map(|bundle| bundle.checkers().into_iter().map(move |it| (bundle, it)))
 }
 
-/// Whether a name of `--select` and `--ignore` fits a checker.
+/// Checks whether a name of `--select` and `--ignore` matches a checker.
 pub fn fits(bundle: &Bundle, checker: &Checker, pattern: &str) -> bool {
     let uids = checker.facts.uids.iter();
     let uids: Vec<Text> = uids.map(|uid| Text::from(*uid)).collect();
@@ -95,12 +95,12 @@ pub fn fits(bundle: &Bundle, checker: &Checker, pattern: &str) -> bool {
     names.match_pattern(pattern)
 }
 
-/// Whether a name of `--select` and `--ignore` fits any checker.
+/// Checks whether a name of `--select` and `--ignore` matches any checker.
 pub fn is_named(pattern: &str) -> bool {
     checkers().any(|(bundle, checker)| fits(bundle, &checker, pattern))
 }
 
-/// The name of a checker or rule that a mistyped one is nearest to.
+/// Returns the name of a checker or rule that is closest to a mistyped one.
 fn suggest(word: &str) -> Option<String> {
     let mut names: Vec<String> = Vec::new();
     for (_, checker) in checkers() {
@@ -113,7 +113,7 @@ fn suggest(word: &str) -> Option<String> {
     near.map(str::to_owned)
 }
 
-/// What to try instead of a name that fits nothing.
+/// Returns a suggestion for a name that matches nothing.
 pub fn hint(name: &str) -> String {
     match suggest(name) {
         Some(near) => format!("did you mean `{near}`?"),
@@ -124,7 +124,7 @@ pub fn hint(name: &str) -> String {
     }
 }
 
-/// Names of rules that have a word of this name, the first few.
+/// Returns the first few names of rules that have a word in common with this name.
 fn with_word(name: &str) -> Vec<String> {
     const MOST: usize = 5;
     let words = |text: &str| -> BTreeSet<String> {
@@ -147,20 +147,20 @@ fn with_word(name: &str) -> Vec<String> {
     near.into_iter().take(MOST).map(|(_, rule)| rule).collect()
 }
 
-/// How to start a standard reporter.
+/// Returns how to start a standard reporter.
 pub fn reporter_spec(program: &Path, reporter: &Registration) -> ChildSpec {
     let (alias, name) = (reporter.alias, reporter.name);
     spec(program, "reporter", alias, name, Role::Reporter)
 }
 
-/// How to start the standard reporters.
+/// Returns how to start the standard reporters.
 pub fn reporter_specs(program: &Path) -> Vec<ChildSpec> {
     let reporters = REPORTERS.iter();
     reporters.map(|it| reporter_spec(program, it)).collect()
 }
 
-/// What a standard bundle has to say about a rule: the page of the checker of this id, else of the first
-/// one that answers for the UID.
+/// Returns the page of a rule of a standard bundle: that of the checker with this id, else of the
+/// first one with the UID.
 pub fn page(uid: &str, checker: &str) -> Option<RulePage> {
     let all = || BUNDLES.iter().flat_map(|bundle| bundle.checkers());
     let by_id = || all().find(|it| it.id == checker);
@@ -176,7 +176,7 @@ pub fn page(uid: &str, checker: &str) -> Option<RulePage> {
     })
 }
 
-/// Where the standard states a rule: what it is cited as, and an address.
+/// Returns the citation and the address of the section in which the standard states a rule.
 pub fn section(uid: &str) -> Option<(String, String)> {
     let name = uid.rsplit(':').next()?;
     if uid.starts_with("asam.net:xodr:") {
@@ -189,7 +189,7 @@ pub fn section(uid: &str) -> Option<(String, String)> {
     }
 }
 
-/// The pages of ASAM OpenSCENARIO XML.
+/// Address of ASAM OpenSCENARIO XML.
 const OPENSCENARIO: &str = "https://publications.pages.asam.net/standards/ASAM_OpenSCENARIO/ASAM_OpenSCENARIO_XML/latest/index.html";
 
 fn spec(program: &Path, command: &str, alias: &str, name: &str, role: Role) -> ChildSpec {
@@ -197,7 +197,7 @@ fn spec(program: &Path, command: &str, alias: &str, name: &str, role: Role) -> C
     ChildSpec {
         name: name.to_owned(),
         role,
-        // A process of another build that is still about is replaced.
+        // A running process of another build is replaced.
         version: Some(env!("CARGO_PKG_VERSION").to_owned()),
         command: vec![
             program,
@@ -213,8 +213,8 @@ fn spec(program: &Path, command: &str, alias: &str, name: &str, role: Role) -> C
     }
 }
 
-/// Who has one-shot modules of ASAM's framework take part as bundles. `are_there`: the standard bundles keep their
-/// names.
+/// Returns the adapter that runs modules of ASAM's framework as bundles. With `are_there`, the
+/// names of the standard bundles are reserved.
 pub fn adapter(program: &Path, are_there: bool) -> Adapter {
     let bundles = BUNDLES.iter().filter(|_| are_there);
     Adapter {
@@ -227,13 +227,13 @@ pub fn adapter(program: &Path, are_there: bool) -> Adapter {
     }
 }
 
-/// The command that hosts a module.
+/// Command that hosts a checker module.
 pub const ASAM_ADAPTER: &str = "asam-adapter";
-/// The command that hosts a report module.
+/// Command that hosts a report module.
 pub const ASAM_REPORTER: &str = "asam-reporter";
 
-/// What a configuration can name: the standard bundles with their checkers and parameters, and the
-/// standard reporters.
+/// Returns the names that a configuration may use: the standard bundles with their checkers and
+/// parameters, and the standard reporters.
 pub fn known() -> Known {
     let bundle = |bundle: &&Bundle| {
         let checker = |checker: Checker| KnownChecker {

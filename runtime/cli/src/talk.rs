@@ -1,4 +1,4 @@
-//! What people see: results on stdout, everything else on stderr.
+//! Output for people: results on stdout, everything else on stderr.
 
 use std::io::{self, IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
@@ -7,11 +7,11 @@ use qcbus_messages::{Exit, shown};
 
 use crate::args::ColorArg;
 
-/// Whether something that was to be printed did not get out.
+/// Whether output to stdout was lost.
 static LOST: AtomicBool = AtomicBool::new(false);
 
-/// Prints to stdout, as it is: names and reasons of others have been escaped before. A reader that has
-/// left (a closed pipe) is no error of ours; a disk that is full is, see [`exit`].
+/// Prints to stdout without changes; names and reasons from others must already be escaped. A
+/// closed pipe is not an error, but a full disk is, see [`exit`].
 pub fn print(text: &str) {
     let mut out = io::stdout().lock();
     let Err(error) = out.write_all(text.as_bytes()).and_then(|()| out.flush()) else {
@@ -22,7 +22,7 @@ pub fn print(text: &str) {
     }
 }
 
-/// The exit code: what was to be printed and is lost is no success, whatever the verdict.
+/// Returns the exit code. Lost output is an error, whatever the verdict.
 pub fn exit(exit: Exit) -> Exit {
     if LOST.load(Ordering::Relaxed) {
         Exit::Internal
@@ -31,30 +31,30 @@ pub fn exit(exit: Exit) -> Exit {
     }
 }
 
-/// Says one line on stderr, whatever is in the text.
+/// Prints one line on stderr, whatever the text contains.
 pub fn say(text: &str) {
     let _ = writeln!(io::stderr().lock(), "{}", shown::line(text));
 }
 
-/// Says several lines on stderr. What others have named must be on one line already.
+/// Prints several lines on stderr. Names from others must already be on one line.
 pub fn say_lines(text: &str) {
     let _ = writeln!(io::stderr().lock(), "{}", shown::lines(text));
 }
 
-/// Says what failed on stderr, in one line.
+/// Prints an error on stderr, in one line.
 pub fn fail(text: &str) {
     say(&format!("error: {text}"));
 }
 
-/// What somebody wants of colours: nothing, all, none.
+/// Requested use of colours: automatic, always or never.
 static COLOR: AtomicU8 = AtomicU8::new(ColorArg::Auto as u8);
 
-/// Takes what somebody wants of colours.
+/// Sets the requested use of colours.
 pub fn set_color(wanted: ColorArg) {
     COLOR.store(wanted as u8, Ordering::Relaxed);
 }
 
-/// Whether stdout may be coloured.
+/// Checks whether stdout may be coloured.
 pub fn color() -> bool {
     let wanted = COLOR.load(Ordering::Relaxed);
     let plain = || std::env::var_os("NO_COLOR").is_some_and(|it| !it.is_empty());
@@ -65,7 +65,7 @@ pub fn color() -> bool {
     }
 }
 
-/// Columns of the terminal, or the reporters' default.
+/// Returns the columns of the terminal, or the default of the reporters.
 pub fn width() -> usize {
     let columns = rustix::termios::tcgetwinsize(io::stdout()).map(|size| usize::from(size.ws_col));
     columns
@@ -74,7 +74,7 @@ pub fn width() -> usize {
         .unwrap_or(qcbus_report_text::DEFAULT_WIDTH)
 }
 
-/// A line on stderr that is written over and over while something goes on, on terminals only.
+/// Progress line on stderr that is overwritten repeatedly. It appears on terminals only.
 #[derive(Debug)]
 pub struct Progress {
     shown: bool,
@@ -82,7 +82,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Shows nothing unless stderr is a terminal.
+    /// Creates a progress line. It is shown only if stderr is a terminal.
     pub fn new(enabled: bool) -> Progress {
         Progress {
             shown: false,
@@ -90,7 +90,7 @@ impl Progress {
         }
     }
 
-    /// Shows how far things are.
+    /// Shows the current progress.
     pub fn show(&mut self, text: &str) {
         if self.enabled {
             let _ = write!(io::stderr().lock(), "\r\x1b[2K{text}");
@@ -98,7 +98,7 @@ impl Progress {
         }
     }
 
-    /// Removes the line, so that something else can be said.
+    /// Removes the line, so that other output can follow.
     pub fn clear(&mut self) {
         if self.shown {
             let _ = write!(io::stderr().lock(), "\r\x1b[2K");
@@ -107,11 +107,11 @@ impl Progress {
     }
 }
 
-/// Stderr for events: each is one line, whatever names and reasons of others are in it.
+/// Writer of log events to stderr. Each event is one line, whatever names and reasons it contains.
 struct LogLines;
 
 impl Write for LogLines {
-    /// Takes one event as the formatter has written it, with its line end.
+    /// Writes one event as the formatter has formatted it, with its line end.
     fn write(&mut self, event: &[u8]) -> io::Result<usize> {
         let text = String::from_utf8_lossy(event);
         let text = text.trim_end_matches('\n');
@@ -129,7 +129,8 @@ impl Write for LogLines {
     }
 }
 
-/// The text on one line, with its colours: the formatter's own, for it lets none of an event through.
+/// Returns the text on one line and keeps the colours of the formatter. The formatter itself
+/// escapes those in an event.
 fn coloured_line(text: &str) -> String {
     let mut line = String::with_capacity(text.len());
     for (number, part) in text.split('\u{1b}').enumerate() {
@@ -146,18 +147,18 @@ fn coloured_line(text: &str) -> String {
     line
 }
 
-/// Sends log events to stderr. `QCBUS_LOG` sets what is logged (`info`, `qcbus_bus=debug`, …) and
-/// `QCBUS_LOG_FORMAT=json` how.
+/// Sends log events to stderr. `QCBUS_LOG` sets the filter (`info`, `qcbus_bus=debug`, …) and
+/// `QCBUS_LOG_FORMAT=json` the format.
 pub fn log(default: &str) {
     use tracing_subscriber::EnvFilter;
     let filter = EnvFilter::try_from_env("QCBUS_LOG").unwrap_or_else(|_| EnvFilter::new(default));
     let builder = tracing_subscriber::fmt()
         .with_env_filter(filter)
-        // Where nobody reads the log any more, there is nobody to tell, and no reason to end.
+        // A failed write to stderr cannot be reported and is no reason to end.
         .log_internal_errors(false)
         .with_writer(|| LogLines);
     let json = std::env::var("QCBUS_LOG_FORMAT").is_ok_and(|it| it == "json");
-    // A second subscriber cannot be set; the first stays then.
+    // A second subscriber cannot be set; the first one remains.
     let _ = if json {
         tracing::subscriber::set_global_default(builder.json().finish())
     } else {

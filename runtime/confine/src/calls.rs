@@ -1,4 +1,4 @@
-//! System calls that are taken away, for what Landlock does not know.
+//! Filters of system calls, for actions that Landlock does not cover.
 
 use std::collections::BTreeMap;
 
@@ -10,12 +10,12 @@ use seccompiler::{
 
 use crate::SandboxError;
 
-/// On x86-64 the same calls are there a second time from here on, for programs with short pointers. No library
-/// makes them, and most kernels do not have them.
+/// First number of the second set of system calls on x86-64, for programs with short pointers. No
+/// library uses them, and most kernels do not have them.
 const SHORT_POINTERS: u32 = 0x4000_0000;
 
-/// Changes to files that need no open one: names, rights, owners, times, attributes. Landlock leaves some of
-/// them to the owner, and all segments have the same.
+/// Changes to files without an open descriptor: names, rights, owners, times, attributes. Landlock
+/// leaves some of them to the owner, and all segments have the same owner.
 const FILES: &[i64] = &[
     libc::SYS_fchmod,
     libc::SYS_fchmodat,
@@ -29,7 +29,7 @@ const FILES: &[i64] = &[
     libc::SYS_removexattr,
     libc::SYS_lremovexattr,
     libc::SYS_fremovexattr,
-    // A lock on a file that is only read is one, too.
+    // A lock on a file opened read-only also affects others.
     libc::SYS_flock,
     #[cfg(target_arch = "x86_64")]
     libc::SYS_chmod,
@@ -45,7 +45,7 @@ const FILES: &[i64] = &[
     libc::SYS_futimesat,
 ];
 
-/// Other processes, other ways past a filter, and the kernel's tools for its administrators.
+/// Calls that affect other processes or bypass a filter, and those for administrators.
 const OTHERS: &[i64] = &[
     libc::SYS_ptrace,
     libc::SYS_process_vm_readv,
@@ -102,7 +102,8 @@ const OTHERS: &[i64] = &[
     libc::SYS_msgctl,
 ];
 
-/// Sockets of every family: Landlock knows two kinds. Those that are there are connected and stay so.
+/// Sockets of every family, because Landlock covers two kinds only. Existing sockets are connected
+/// and stay so.
 const SOCKETS: &[i64] = &[
     libc::SYS_socket,
     libc::SYS_connect,
@@ -110,12 +111,12 @@ const SOCKETS: &[i64] = &[
     libc::SYS_listen,
     libc::SYS_accept,
     libc::SYS_accept4,
-    // They name the receiver in memory, where no filter can look.
+    // These calls name the receiver in memory, which a filter cannot read.
     libc::SYS_sendmsg,
     libc::SYS_sendmmsg,
 ];
 
-/// Programs. Threads are made by the same calls as processes, see [`fresh_processes`].
+/// Calls that start programs. Threads use the same calls as processes, see [`fresh_processes`].
 const PROGRAMS: &[i64] = &[
     libc::SYS_execve,
     libc::SYS_execveat,
@@ -125,13 +126,13 @@ const PROGRAMS: &[i64] = &[
     libc::SYS_vfork,
 ];
 
-/// Not in every version of the C library's headers.
+/// Number of a call that some versions of the C library's headers lack.
 const SYS_FCHMODAT2: i64 = 452;
 
 type Calls = BTreeMap<i64, Vec<SeccompRule>>;
 
-/// What is taken away before a program begins. It is to join yet, so it keeps more than [`forbid`] leaves: what it
-/// does with its own files, and sockets of this host.
+/// Returns the filters for a program before it starts. Because it must still join, it may do more
+/// than [`forbid`] allows: change its own files, and use sockets of this host.
 pub(crate) fn beforehand(may: &May) -> Result<[BpfProgram; 2], SandboxError> {
     let refused = refused_beforehand(may).map_err(|why| SandboxError::kernel("seccomp", why))?;
     Ok([second_calls(), program(refused, libc::EPERM)?])
@@ -140,13 +141,14 @@ pub(crate) fn beforehand(may: &May) -> Result<[BpfProgram; 2], SandboxError> {
 fn refused_beforehand(may: &May) -> Result<Calls, seccompiler::BackendError> {
     let mut calls = Calls::new();
     let others = |argument| when(vec![is(argument, SeccompCmpOp::Ne, 0)?]);
-    // Landlock knows neither limits nor turns; the process's own number is not known yet, and 0 stands for it.
+    // Landlock covers neither limits nor scheduling. The process id is not known yet, and 0 stands
+    // for it.
     add(&mut calls, libc::SYS_prlimit64, vec![others(0)?]);
     add(&mut calls, libc::SYS_sched_setaffinity, vec![others(0)?]);
     add(&mut calls, libc::SYS_setpriority, vec![others(1)?]);
     terminals(&mut calls)?;
     if may.write.is_empty() {
-        // It may change the mode of what it has open: that is how segments are made.
+        // It may change the mode of its open files, because segments are created this way.
         let named = FILES
             .iter()
             .filter(|it| **it != libc::SYS_fchmod && **it != libc::SYS_flock);
@@ -161,7 +163,7 @@ fn refused_beforehand(may: &May) -> Result<Calls, seccompiler::BackendError> {
     Ok(calls)
 }
 
-/// Takes them from the calling thread and everything that it starts.
+/// Forbids these calls to the calling thread and everything that it starts.
 pub(crate) fn forbid(may: &May) -> Result<(), SandboxError> {
     let filters = filters(may)?;
     for filter in filters.iter().filter(|filter| !filter.is_empty()) {
@@ -170,12 +172,12 @@ pub(crate) fn forbid(may: &May) -> Result<(), SandboxError> {
     Ok(())
 }
 
-/// Two for calls that are to look as if there were none, one for calls that are refused.
+/// Returns two filters for calls that must look unsupported and one for calls that are refused.
 fn filters(may: &May) -> Result<[BpfProgram; 3], SandboxError> {
     let mut unknown = BpfProgram::new();
     if !may.programs {
-        // What it is to do lies in memory, where no filter can look. "There is no such call" makes the C library
-        // take the older one.
+        // The arguments of this call lie in memory, which a filter cannot read. "There is no such
+        // call" makes the C library use the older call.
         let mut newer = Calls::new();
         add(&mut newer, libc::SYS_clone3, Vec::new());
         unknown = program(newer, libc::ENOSYS)?;
@@ -184,8 +186,8 @@ fn filters(may: &May) -> Result<[BpfProgram; 3], SandboxError> {
     Ok([second_calls(), unknown, program(refused, libc::EPERM)?])
 }
 
-/// Written out, because every call would stand in the other filters twice: the kernel goes through a filter once for
-/// each call there is, when it takes it.
+/// Returns the hand-written filter for the second set of calls, which would double the other
+/// filters. When the kernel loads a filter, it runs it once for each call.
 fn second_calls() -> BpfProgram {
     if !cfg!(target_arch = "x86_64") {
         return BpfProgram::new();
@@ -252,7 +254,7 @@ fn add(calls: &mut Calls, call: i64, rules: Vec<SeccompRule>) {
 
 type Made = Result<(), seccompiler::BackendError>;
 
-/// A rule holds when all its conditions do; one call may have several.
+/// Creates a rule. It applies if all its conditions hold, and one call may have several rules.
 fn when(conditions: Vec<SeccompCondition>) -> Result<SeccompRule, seccompiler::BackendError> {
     SeccompRule::new(conditions)
 }
@@ -273,7 +275,8 @@ fn is_long(
     SeccompCondition::new(argument, SeccompCmpArgLen::Qword, operator, value)
 }
 
-/// Signals and limits: for itself only. Landlock scopes signals since Linux 6.12 only, limits never.
+/// Restricts signals and limits to the process itself. Landlock scopes signals since Linux 6.12
+/// only, limits never.
 fn signals(calls: &mut Calls) -> Made {
     let own = u64::from(std::process::id());
     let foreign = |argument| when(vec![is(argument, SeccompCmpOp::Ne, own)?]);
@@ -286,7 +289,7 @@ fn signals(calls: &mut Calls) -> Made {
     for call in to_others {
         add(calls, call, vec![foreign(0)?]);
     }
-    // A thread's number tells nothing of its process, a descriptor nothing at all.
+    // A thread id does not show its process, and a descriptor shows even less.
     add(calls, libc::SYS_tkill, Vec::new());
     add(calls, libc::SYS_pidfd_send_signal, Vec::new());
     let others = when(vec![
@@ -295,7 +298,7 @@ fn signals(calls: &mut Calls) -> Made {
     ])?;
     add(calls, libc::SYS_prlimit64, vec![others.clone()]);
     add(calls, libc::SYS_sched_setaffinity, vec![others]);
-    // Whom a descriptor's owner is, the kernel tells by a signal.
+    // The kernel sends signals to the owner of a descriptor, so the owner must not be changed.
     let owner = |command: i32| when(vec![is(1, SeccompCmpOp::Eq, command as u64)?]);
     let owners = vec![owner(libc::F_SETOWN)?, owner(F_SETOWN_EX)?];
     add(calls, libc::SYS_fcntl, owners);
@@ -304,7 +307,7 @@ fn signals(calls: &mut Calls) -> Made {
 
 const F_SETOWN_EX: i32 = 15;
 
-/// Typing into somebody's terminal.
+/// Forbids typing into a terminal.
 fn terminals(calls: &mut Calls) -> Made {
     const TIOCLINUX: u64 = 0x541C;
     let typing = when(vec![is(1, SeccompCmpOp::Eq, libc::TIOCSTI)?])?;
@@ -313,14 +316,14 @@ fn terminals(calls: &mut Calls) -> Made {
     Ok(())
 }
 
-/// Words to somebody else than the one who is connected.
+/// Forbids sending to an address other than the connected one.
 fn addressed(calls: &mut Calls) -> Made {
     let named = when(vec![is_long(4, SeccompCmpOp::Ne, 0)?])?;
     add(calls, libc::SYS_sendto, vec![named]);
     Ok(())
 }
 
-/// Whatever is started and is no thread of this process.
+/// Forbids starting anything except threads of this process.
 fn fresh_processes(calls: &mut Calls) -> Made {
     let thread = libc::CLONE_THREAD as u64;
     let process = when(vec![is(0, SeccompCmpOp::MaskedEq(thread), 0)?])?;

@@ -1,4 +1,4 @@
-//! The ring that a bundle draws around itself once it has joined.
+//! Inner sandbox: a bundle puts it around itself once it has joined.
 
 use std::path::PathBuf;
 
@@ -8,8 +8,8 @@ use crate::SandboxError;
 use crate::calls;
 use crate::rules::{Rules, everything, files, listings, reading, trees};
 
-/// Programs read these by themselves: libraries for a backtrace, the time zone, the language, how many processors
-/// there are. Nothing in them is a secret.
+/// Files that programs read by themselves: libraries for a backtrace, the time zone, the language,
+/// the number of processors. They contain no secrets.
 const HARMLESS: &[&str] = &[
     "/usr/lib",
     "/usr/lib64",
@@ -27,27 +27,27 @@ const HARMLESS: &[&str] = &[
     "/proc/meminfo",
 ];
 
-/// What a bundle needs besides what its manifest declares.
+/// Needs of a bundle in addition to those that its manifest declares.
 #[derive(Debug, Default)]
 pub struct Sandboxed {
-    /// The directory of shared memory of the generation that it has joined. Of others it sees nothing.
+    /// Directory of shared memory of the joined generation. The bundle sees no other generation.
     pub memory: Option<PathBuf>,
     /// Files and directories that it reads.
     pub reads: Vec<PathBuf>,
-    /// Directories below which it may see what lies there, and not read it.
+    /// Directories in which it may list files at any depth, but not read them.
     pub lists: Vec<PathBuf>,
     /// What its manifest declares.
     pub may: May,
 }
 
-/// Puts this process inside: from now on it opens nothing for writing, reads nothing but what is named here,
-/// signals and traces nobody else, connects nowhere and starts no program, unless its manifest declares that.
-/// What it has open stays open. It can never be undone.
+/// Confines this process from now on, except for what its manifest declares. It opens nothing for
+/// writing and reads only what is named here. It cannot signal or trace others, connect or start
+/// programs. Open files stay open. This can never be undone.
 ///
-/// The process must have a single thread: threads that there are already would stay outside.
+/// The process must have a single thread, because existing threads would stay unconfined.
 ///
 /// # Errors
-/// [`SandboxError::Kernel`]: the process is not confined, or not wholly.
+/// Returns [`SandboxError::Kernel`] if the process is not confined, or only partly.
 pub fn confine(sandboxed: &Sandboxed) -> Result<(), SandboxError> {
     if threads() != Some(1) {
         let why = "threads run already that would stay outside";
@@ -55,14 +55,14 @@ pub fn confine(sandboxed: &Sandboxed) -> Result<(), SandboxError> {
     }
     let may = &sandboxed.may;
     let mut rules = Rules::new(may.network)?.allow("/dev/null", everything())?;
-    // Images are published in segments that come later, under names that nobody knows before.
+    // Images are published in later segments with unknown names.
     if let Some(memory) = &sandboxed.memory {
         rules = rules.allow(memory, files())?;
     }
     for path in HARMLESS {
         rules = rules.allow(path, trees())?;
     }
-    // What runs, and not what lies at its path by now.
+    // This allows the running program, not a file that now lies at its path.
     rules = rules.allow("/proc/self/exe", files())?;
     for path in sandboxed.reads.iter().chain(&may.read) {
         rules = rules.allow(path, trees())?;
@@ -76,7 +76,7 @@ pub fn confine(sandboxed: &Sandboxed) -> Result<(), SandboxError> {
     if may.programs {
         rules = rules.allow("/", reading())?;
     }
-    // First: without it nothing else counts for much, and the filter needs what it sets.
+    // This comes first: the rest depends on it, and the filter needs a flag that it sets.
     let landlocked = rules.enforce()?;
     calls::forbid(may)?;
     match landlocked {
@@ -88,7 +88,7 @@ pub fn confine(sandboxed: &Sandboxed) -> Result<(), SandboxError> {
     }
 }
 
-/// How many threads this process has; `None` where it cannot be learned.
+/// Returns the number of threads of this process, or `None` if it cannot be determined.
 pub(crate) fn threads() -> Option<usize> {
     Some(std::fs::read_dir("/proc/self/task").ok()?.count())
 }

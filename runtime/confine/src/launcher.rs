@@ -1,4 +1,5 @@
-//! A small process outside that starts each session of a bundle in a fresh process inside.
+//! Launcher: a small process outside the sandbox that starts each session in a fresh process
+//! inside.
 
 use std::os::unix::process::ExitStatusExt as _;
 use std::process::ExitStatus;
@@ -6,29 +7,30 @@ use std::process::ExitStatus;
 use crate::SandboxError;
 use crate::inner::threads;
 
-/// With this a session's process asks for another one. No bundle ends so by itself (sysexits' `EX_TEMPFAIL`).
+/// Exit code by which a session's process requests another one (sysexits' `EX_TEMPFAIL`). No bundle
+/// ends with it by itself.
 const AGAIN: i32 = 75;
 
-/// What follows a session.
+/// Action after a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum After {
-    /// Another one, in a fresh process.
+    /// Starts another session in a fresh process.
     Again,
-    /// Nothing; the whole ends with this code.
+    /// Ends the launcher with this exit code.
     End(u8),
 }
 
-/// How the last session ended.
+/// End of the last session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LauncherEnd {
-    /// With this exit code.
+    /// The session ended with this exit code.
     Ended(u8),
-    /// By this signal.
+    /// The session was killed by this signal.
     Killed(i32),
 }
 
 impl LauncherEnd {
-    /// Ends this process in the same way, so that whoever started it learns how it was.
+    /// Ends this process in the same way, so that its parent learns how the session ended.
     #[expect(
         unsafe_code,
         reason = "to end by a signal it must have its first meaning again"
@@ -37,8 +39,9 @@ impl LauncherEnd {
         match self {
             LauncherEnd::Ended(code) => std::process::exit(i32::from(code)),
             LauncherEnd::Killed(signal) => {
-                // SAFETY: plain system calls on this process; no handler of ours is involved. The memory of the
-                // session has been dumped where that is wanted, this one would say nothing.
+                // SAFETY: plain system calls on this process; no handler of this program is
+                // involved. The session's memory was dumped where wanted, and a dump of this
+                // process would be useless.
                 unsafe {
                     let none = libc::rlimit {
                         rlim_cur: 0,
@@ -54,13 +57,13 @@ impl LauncherEnd {
     }
 }
 
-/// Runs sessions, each in a process of its own that dies with this one: number 0 first, the next as long as one
-/// asks for it. To be called before any thread is started. With `unsupervised`, signals by which a person stops a
-/// program are handed on to the session.
+/// Runs sessions, each in a process of its own that dies with this one. Number 0 runs first, and
+/// the next one follows if a session requests it. Must be called before any thread is started. With
+/// `unsupervised`, signals by which a person stops a program are forwarded to the session.
 ///
 /// # Errors
-/// [`SandboxError::Kernel`]: there are threads, or no process can be made. Nothing has been run then, unless it was
-/// a later session that could not be started.
+/// Returns [`SandboxError::Kernel`] if there are threads or no process can be created. No session
+/// has run then, unless a later session failed to start.
 pub fn run_sessions(
     unsupervised: bool,
     session: impl Fn(u32) -> After,
@@ -90,7 +93,7 @@ fn sessions(
     }
 }
 
-/// Starts a process that goes on from here. Returns in the parent only.
+/// Forks a process that continues from here. Returns in the parent only.
 #[expect(
     unsafe_code,
     reason = "a session begins as what this process is, so it is forked"
@@ -101,8 +104,8 @@ fn start(
     session: impl FnOnce() -> After,
 ) -> Result<i32, SandboxError> {
     let parent = std::process::id();
-    // SAFETY: this process has a single thread, which was looked at, so no lock is held by another one that would
-    // not be there any more.
+    // SAFETY: this process has a single thread, which was checked. So no lock can be held by
+    // another thread that would be missing in the child.
     let child = unsafe { libc::fork() };
     match child {
         -1 => Err(SandboxError::kernel(
@@ -122,7 +125,8 @@ fn start(
     }
 }
 
-/// Dies with the parent, and not by what a person types at it: the parent hears of that and hands it on.
+/// Makes this process die with its parent and not receive keyboard signals. The parent receives
+/// those and forwards them.
 #[expect(unsafe_code, reason = "prctl and setpgid have no safe form here")]
 fn follow(parent: u32, unsupervised: bool) {
     // SAFETY: plain system calls on this process.
@@ -138,7 +142,7 @@ fn follow(parent: u32, unsupervised: bool) {
     }
 }
 
-/// Signals that this process waits for instead of being struck by them.
+/// Signals that this process blocks and waits for.
 struct Signals {
     set: libc::sigset_t,
     before: libc::sigset_t,
@@ -150,7 +154,8 @@ struct Signals {
 )]
 impl Signals {
     fn take(unsupervised: bool) -> Signals {
-        // SAFETY: the sets are plain memory that sigemptyset and sigprocmask initialise; an all-zero set is valid.
+        // SAFETY: the sets are plain memory that sigemptyset and sigprocmask initialise; an
+        // all-zero set is valid.
         unsafe {
             let mut set: libc::sigset_t = std::mem::zeroed();
             let mut before: libc::sigset_t = std::mem::zeroed();
@@ -180,7 +185,8 @@ impl Signals {
     fn wait(&self, child: i32) -> Result<LauncherEnd, SandboxError> {
         loop {
             let mut raw = 0;
-            // SAFETY: the child is ours and was not yet waited for; `raw` is written by the kernel.
+            // SAFETY: the child is a child of this process and not yet waited for; the kernel
+            // writes `raw`.
             let done = unsafe { libc::waitpid(child, &raw mut raw, libc::WNOHANG) };
             match done {
                 0 => {}
@@ -201,7 +207,7 @@ impl Signals {
                 }
             }
             let mut signal = 0;
-            // SAFETY: the set was made in `take`; `signal` is written by the call.
+            // SAFETY: the set was made in `take`; the call writes `signal`.
             unsafe {
                 if libc::sigwait(&raw const self.set, &raw mut signal) == 0
                     && signal != libc::SIGCHLD

@@ -1,16 +1,17 @@
-//! What a bundle may do to others, taken from it for good.
+//! Sandbox: permanently restricts what a bundle may do to others.
 //!
-//! There are two rings, because a bundle that joins must make and open what afterwards it must not:
+//! There are two sandboxes, because a joining bundle must create and open files that it must not
+//! access afterwards:
 //!
-//! - The *outer* ring ([`Outer`]) is drawn by the broker around every bundle that it starts, before the program
-//!   begins: nothing outside of shared memory is written, no network, no signals to others. A program cannot
-//!   step over it, whatever it is made of.
-//! - The *inner* ring ([`confine`]) is drawn by the bundle itself once it has joined: nothing is opened for
-//!   writing any more, nothing is read but what was declared, no process is started. Everything that it writes
-//!   from then on goes to what it has open: its own streams.
+//! - The broker applies the *outer* sandbox ([`Outer`]) to every bundle that it starts, before the
+//!   program begins. It forbids writing outside of shared memory, network access and signals to
+//!   others. No program can bypass it.
+//! - The bundle applies the *inner* sandbox ([`confine`]) to itself once it has joined. It opens
+//!   nothing for writing, reads only declared files and starts no process. It then writes only to
+//!   its open files: its own streams.
 //!
-//! What lies inside cannot be widened again, so a session that is lost is followed by one in a fresh process:
-//! [`run_sessions`] starts them.
+//! A sandbox cannot be widened again, so [`run_sessions`] starts a fresh process after a lost
+//! session.
 
 mod calls;
 mod inner;
@@ -26,12 +27,12 @@ pub use looks::{Looks, looks, own_filters};
 pub use orders::{Orders, SandboxError};
 pub use outer::Outer;
 
-/// How much of Landlock the running kernel has, as it numbers it; 0: none.
+/// Returns the Landlock version of the running kernel, or 0 if it has none.
 #[expect(unsafe_code, reason = "the crate does not tell what the kernel has")]
 pub fn kernel_level() -> u32 {
     const TELL_THE_LEVEL: libc::c_uint = 1;
     let nothing = std::ptr::null::<libc::c_void>();
-    // SAFETY: without a set of rules the call makes nothing and only answers.
+    // SAFETY: without a set of rules the call creates nothing and only returns a number.
     let level = unsafe {
         libc::syscall(
             libc::SYS_landlock_create_ruleset,

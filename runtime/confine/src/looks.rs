@@ -1,25 +1,26 @@
-//! How far a process is confined, as the kernel has it.
+//! Reads from the kernel how far a process is confined.
 
 use std::path::Path;
 
-/// What the kernel says of a process. It does not tell whether Landlock holds it; that goes along with the filter
-/// in whatever is confined by [`crate::confine`].
+/// State of a process according to the kernel. It does not show whether Landlock applies. A process
+/// confined by [`crate::confine`] has both the filter and Landlock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Looks {
-    /// Every thread has more filters of system calls than it was given, and can gain no rights.
+    /// Every thread has more system call filters than it was given, and cannot gain rights.
     Filtered,
-    /// Threads, or all of it, have none.
+    /// At least one thread has no further filters.
     Open,
-    /// There is no such process, or it cannot be looked at.
+    /// The process does not exist or cannot be inspected.
     Unknown,
 }
 
-/// How many filters this process has, and with it whatever it starts: a container may have given it some.
+/// Returns the number of filters of this process, which its children inherit. A container may have
+/// set some.
 pub fn own_filters() -> usize {
     std::fs::read_to_string("/proc/self/status").map_or(0, |status| filters(&status))
 }
 
-/// Looks at a process that was given so many filters.
+/// Inspects a process that was given this number of filters.
 pub fn looks(pid: u32, given: usize) -> Looks {
     let tasks = Path::new("/proc").join(pid.to_string()).join("task");
     let Ok(threads) = std::fs::read_dir(tasks) else {
@@ -42,7 +43,7 @@ fn is_filtered(status: &str, given: usize) -> bool {
 }
 
 fn filters(status: &str) -> usize {
-    // Kernels before 5.9 do not count them; they have no Landlock either.
+    // Kernels before 5.9 do not count them. They have no Landlock either.
     let counted = value(status, "Seccomp_filters").and_then(|it| it.parse().ok());
     counted.unwrap_or_else(|| usize::from(value(status, "Seccomp") == Some("2")))
 }

@@ -1,25 +1,25 @@
-//! What a broker tells a bundle that it starts about the sandbox.
+//! Orders of a broker to a bundle about the sandbox.
 
 use std::process::Command;
 
 use qcbus_formats::manifest::May;
 
-/// The variable of the environment in which it stands. A child of another program than ours ignores it.
+/// Environment variable with the orders. Other programs ignore it.
 const VARIABLE: &str = "QCBUS_SANDBOX";
 const OFF: &str = "off";
 
-/// Why a bundle cannot be confined, or not as it was told.
+/// Reason why a bundle cannot be confined as ordered.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SandboxError {
-    /// The variable says something else than a broker of this version does.
+    /// The value of the variable is invalid for this version.
     #[error("{VARIABLE} cannot be understood: {0}")]
     Orders(String),
     /// The kernel refuses.
     #[error("{what}: {why}")]
     Kernel {
-        /// What was asked of it.
+        /// The requested action.
         what: &'static str,
-        /// What it says.
+        /// The error of the kernel.
         why: String,
     },
 }
@@ -31,20 +31,21 @@ impl SandboxError {
     }
 }
 
-/// What a bundle is told about the sandbox.
+/// Orders to a bundle about the sandbox.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Orders {
-    /// Confine yourself; your manifest declares this besides.
+    /// The bundle must confine itself. Its manifest declares these additional permissions.
     On(May),
-    /// Do not (`--no-sandbox`).
+    /// The bundle must not confine itself (`--no-sandbox`).
     Off,
 }
 
 impl Orders {
-    /// What the process that started this one says. Without a word a bundle is confined and may do nothing besides.
+    /// Returns the orders of the parent process. Without orders a bundle is confined and has no
+    /// additional permissions.
     ///
     /// # Errors
-    /// [`SandboxError::Orders`].
+    /// Returns [`SandboxError::Orders`] if the variable is invalid.
     pub fn given() -> Result<Orders, SandboxError> {
         let Some(text) = std::env::var_os(VARIABLE) else {
             return Ok(Orders::On(May::default()));
@@ -60,10 +61,10 @@ impl Orders {
         Ok(Orders::On(may))
     }
 
-    /// Tells them to a process that is to be started.
+    /// Passes the orders to a process before its start.
     ///
     /// # Errors
-    /// [`SandboxError::Orders`] when a path is no text.
+    /// Returns [`SandboxError::Orders`] if a path is not valid text.
     pub fn give(&self, command: &mut Command) -> Result<(), SandboxError> {
         let text = match self {
             Orders::Off => OFF.to_owned(),

@@ -1,4 +1,4 @@
-//! The ring that the broker draws around a bundle before its program begins.
+//! Outer sandbox: the broker applies it to a bundle before its program begins.
 
 use std::os::fd::{AsRawFd, OwnedFd};
 use std::os::unix::process::CommandExt as _;
@@ -11,7 +11,8 @@ use crate::SandboxError;
 use crate::calls;
 use crate::rules::{Rules, everything, reading};
 
-/// What a bundle writes to while it joins. Devices that take everything and keep nothing are harmless.
+/// Paths that a bundle writes to while it joins. The devices are harmless because they store
+/// nothing.
 const WRITTEN: &[&str] = &[
     "/dev/shm",
     "/dev/null",
@@ -20,19 +21,19 @@ const WRITTEN: &[&str] = &[
     "/dev/tty",
 ];
 
-/// A ring to be drawn around one process.
+/// An outer sandbox for one process.
 #[derive(Debug)]
 pub struct Outer {
-    /// None: this kernel has no Landlock.
+    /// `None` if this kernel has no Landlock.
     files: Option<OwnedFd>,
     calls: [BpfProgram; 2],
 }
 
 impl Outer {
-    /// The ring for a bundle.
+    /// Creates the outer sandbox of a bundle.
     ///
     /// # Errors
-    /// [`SandboxError::Kernel`].
+    /// Returns [`SandboxError::Kernel`] if the kernel refuses.
     pub fn new(may: &May) -> Result<Outer, SandboxError> {
         let mut rules = Rules::new(may.network)?.allow("/", reading())?;
         for path in WRITTEN {
@@ -47,17 +48,18 @@ impl Outer {
         })
     }
 
-    /// How many filters of system calls a process is given by it.
+    /// Number of system call filters that it adds to a process.
     pub const FILTERS: usize = if cfg!(target_arch = "x86_64") { 2 } else { 1 };
 
-    /// Has a process begin its life inside.
+    /// Makes a process start in the sandbox.
     #[expect(
         unsafe_code,
         reason = "only the new process itself can step into the ring, between fork and exec"
     )]
     pub fn surround(self, command: &mut Command) {
-        // SAFETY: between fork and exec only system calls are made; nothing is allocated and no lock is taken. The
-        // descriptor and the filters belong to the closure, which lives as long as the command.
+        // SAFETY: between fork and exec only system calls are made; nothing is allocated and no
+        // lock is taken. The descriptor and the filters belong to the closure, which lives as long
+        // as the command.
         unsafe {
             command.pre_exec(move || {
                 let set = libc::prctl(libc::PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
@@ -71,7 +73,8 @@ impl Outer {
                     return failed();
                 }
                 for filter in self.calls.iter().filter(|it| !it.is_empty()) {
-                    // Where the kernel takes none, the process looks open, and that is said.
+                    // If the kernel refuses a filter, the process counts as open, which is
+                    // reported.
                     let _ = seccompiler::apply_filter(filter);
                 }
                 Ok(())
@@ -88,7 +91,7 @@ mod tests {
     use super::*;
     use crate::{Looks, looks, own_filters};
 
-    /// Runs a line of a shell inside, before anything has joined anything; gives whether it went well.
+    /// Runs a shell command in the sandbox, before joining, and returns whether it succeeded.
     fn inside(may: &May, line: &str, file: &Path) -> bool {
         let mut command = Command::new("sh");
         command.args(["-c", line]).arg(file);

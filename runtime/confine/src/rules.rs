@@ -1,4 +1,4 @@
-//! What both rings have in common.
+//! Rules shared by both sandboxes.
 
 use std::os::fd::OwnedFd;
 use std::path::Path;
@@ -10,35 +10,35 @@ use landlock::{
 
 use crate::SandboxError;
 
-/// The newest that is known here; a kernel that has less gives what it has.
+/// Newest supported version of Landlock. Older kernels apply the rules that they know.
 const LEVEL: ABI = ABI::V7;
 
-/// To read files below a path, not directories.
+/// Returns the right to read files below a path, but not directories.
 pub(crate) fn files() -> BitFlags<AccessFs> {
     AccessFs::ReadFile.into()
 }
 
-/// To see what lies below a path, not to read it.
+/// Returns the right to list directories below a path, but not to read files.
 pub(crate) fn listings() -> BitFlags<AccessFs> {
     AccessFs::ReadDir.into()
 }
 
-/// To read files and directories below a path.
+/// Returns the right to read files and directories below a path.
 pub(crate) fn trees() -> BitFlags<AccessFs> {
     AccessFs::ReadFile | AccessFs::ReadDir
 }
 
-/// To do anything with what lies below a path.
+/// Returns all rights below a path.
 pub(crate) fn everything() -> BitFlags<AccessFs> {
     AccessFs::from_all(LEVEL)
 }
 
-/// To read and run whatever there is.
+/// Returns the right to read and execute everything.
 pub(crate) fn reading() -> BitFlags<AccessFs> {
     AccessFs::from_read(LEVEL)
 }
 
-/// Rules under which nothing is allowed that is not added to them.
+/// Rules that forbid everything not explicitly added.
 pub(crate) struct Rules(RulesetCreated);
 
 impl Rules {
@@ -57,7 +57,7 @@ impl Rules {
         Ok(Rules(rules))
     }
 
-    /// Allows this below a path. What is not there needs no rule.
+    /// Allows this access below a path. A missing path needs no rule.
     pub(crate) fn allow(
         self,
         path: impl AsRef<Path>,
@@ -66,7 +66,7 @@ impl Rules {
         let Ok(there) = PathFd::new(path.as_ref()) else {
             return Ok(self);
         };
-        // Rights to a directory mean nothing for a file, and the kernel says so.
+        // Directory rights are invalid for a file, and the kernel returns an error.
         let access = match path.as_ref().is_dir() {
             true => access,
             false => access & AccessFs::from_file(LEVEL),
@@ -76,12 +76,13 @@ impl Rules {
         Ok(Rules(rules))
     }
 
-    /// The rules as the kernel holds them; `None` where it has no Landlock.
+    /// Returns the rules as a kernel descriptor, or `None` if the kernel has no Landlock.
     pub(crate) fn into_descriptor(self) -> Option<OwnedFd> {
         self.0.into()
     }
 
-    /// Puts the calling thread, and what it starts from now on, under them. `false`: the kernel has no Landlock.
+    /// Applies the rules to the calling thread and its later children. Returns `false` if the
+    /// kernel has no Landlock.
     pub(crate) fn enforce(self) -> Result<bool, SandboxError> {
         let status = self.0.restrict_self();
         let status = status.map_err(|error| SandboxError::kernel("Landlock", error))?;

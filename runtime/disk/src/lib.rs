@@ -1,8 +1,8 @@
-//! Writing files so that nobody ever sees half of one: results, reports, manifests, and what a bundle
-//! that is run by itself writes. The broker sweeps what writers that were killed have left.
+//! Atomic writing of files: results, reports, manifests, and the output of a bundle that is run by
+//! itself. Readers never see a partial file. The broker removes the remains of killed writers.
 //!
-//! Reading files that others may write, without being held up by them: [`foreign`]. And whether what lies
-//! somewhere may be believed: [`trust`].
+//! [`foreign`] reads files that others may write, without being blocked by them. [`trust`] checks
+//! whether the content of a path can be trusted.
 
 pub mod foreign;
 mod temporary;
@@ -21,17 +21,17 @@ use tempfile::NamedTempFile;
 
 pub use temporary::{Temporary, Unnamed, remove_left};
 
-/// Temporary names begin with this, the id of the process that writes, and when it was started. As long
-/// as it writes, it has a lock on the file: the id says nothing to whoever is in another container.
+/// Prefix of temporary names. The process id and start time of the writer follow. The writer holds
+/// a lock on the file, because the id is meaningless in another container.
 const PREFIX: &str = ".qcbus-";
-/// And end like this.
+/// Suffix of temporary names.
 const SUFFIX: &str = ".tmp";
 
 /// Writes `content` under a temporary name in the same directory and renames it into place. Missing
-/// directories are made. With `durable`, the content is on the disk before the name is.
+/// directories are created. With `durable`, the content is on the disk before the name is.
 ///
 /// # Errors
-/// Whatever the file system says; the temporary file is removed then, later if it cannot be at once
+/// Returns the error of the file system. The temporary file is then removed, at once or later
 /// ([`remove_left`]).
 pub fn write_whole(path: &Path, content: &[u8], durable: bool) -> io::Result<()> {
     write_ahead(path, content, durable)?
@@ -39,8 +39,9 @@ pub fn write_whole(path: &Path, content: &[u8], durable: bool) -> io::Result<()>
         .map_err(|unnamed| unnamed.error)
 }
 
-/// Writes `content` where a person has named a place for it: as [`write_whole`], but what a link leads to
-/// is written and not the link, and into a device or a pipe, which must not be replaced by a file.
+/// Writes `content` to a path that a person has named, like [`write_whole`]. It writes the target
+/// of a link, not the link. It writes into a device or a pipe, which must not be replaced by a
+/// file.
 ///
 /// # Errors
 /// As [`write_whole`].
@@ -58,8 +59,8 @@ pub fn write_named(path: &Path, content: &[u8], durable: bool) -> io::Result<()>
     write_whole(&meant, content, durable)
 }
 
-/// Writes `content` under a temporary name in the directory of `path`, to be renamed there later.
-/// With `durable`, the content is on the disk already.
+/// Writes `content` under a temporary name in the directory of `path`, to be renamed later. With
+/// `durable`, the content is on the disk when this returns.
 ///
 /// # Errors
 /// As [`write_whole`].
@@ -71,13 +72,13 @@ pub fn write_ahead(path: &Path, content: &[u8], durable: bool) -> io::Result<Tem
     Ok(temporary)
 }
 
-/// What tells a file that was written from any other that comes to lie in its place: size, time of
+/// Fingerprint that distinguishes a written file from any later file at its path: size, time of
 /// modification in nanoseconds, inode. A rename changes none of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FileFingerprint {
-    /// In bytes.
+    /// Size in bytes.
     size: u64,
-    /// Since 1970.
+    /// Time of modification in nanoseconds since 1970.
     modified_ns: i128,
     inode: u64,
 }
@@ -99,7 +100,7 @@ impl FileFingerprint {
         }
     }
 
-    /// Reads a fingerprint as [`FileFingerprint`] is displayed; `None` when it is none.
+    /// Parses a displayed [`FileFingerprint`], or returns `None` if the text is invalid.
     pub fn parse(text: &str) -> Option<FileFingerprint> {
         let mut numbers = text.split(' ');
         let fingerprint = FileFingerprint {
@@ -110,7 +111,7 @@ impl FileFingerprint {
         numbers.next().is_none().then_some(fingerprint)
     }
 
-    /// That of the regular file which lies there, if one does.
+    /// Returns the fingerprint of the regular file at this path, if there is one.
     pub fn at(path: &Path) -> Option<FileFingerprint> {
         let data = std::fs::symlink_metadata(path).ok()?;
         data.is_file().then(|| FileFingerprint::of(&data))
@@ -126,9 +127,9 @@ impl std::fmt::Display for FileFingerprint {
 /// A file to be written: its path and its content.
 pub type Content<'a> = (&'a Path, &'a [u8]);
 
-/// Writes two files as [`write_whole`] does; `first` gets its name before `second` does. Both are
-/// synced at the same time, because then the file system's journal is written once for both. Returns
-/// the fingerprints of both.
+/// Writes two files like [`write_whole`]; `first` gets its name before `second` does. Both are
+/// synced at the same time, so the file system's journal is written once for both. Returns the
+/// fingerprints of both.
 ///
 /// # Errors
 /// As [`write_whole`], with the path that could not be written.
@@ -162,12 +163,13 @@ fn sync_both(first: &File, second: &File) -> io::Result<()> {
     second.sync_data()
 }
 
-/// Has the system begin to bring a file to the disk, without waiting: who then syncs several files one after
-/// the other waits for all of them at once. A thread for each costs more than most of them take.
+/// Makes the system start writing a file to the disk, without waiting. A caller that then syncs
+/// several files in sequence waits for all of them at once. A thread for each file usually costs
+/// more.
 fn start_writing(file: &File) {
-    // From the beginning to the end. Whatever it says: what counts is the sync.
+    // This covers the whole file. Its result is ignored, because only the later sync counts.
     #[expect(unsafe_code, reason = "nobody else has this call")]
-    // SAFETY: the descriptor is open as long as the file is borrowed, and no memory is handed over.
+    // SAFETY: the descriptor is open as long as the file is borrowed, and no memory is passed.
     unsafe {
         libc::sync_file_range(file.as_raw_fd(), 0, 0, libc::SYNC_FILE_RANGE_WRITE);
     }
@@ -184,21 +186,21 @@ fn write_aside(path: &Path, content: &[u8]) -> io::Result<(File, Temporary)> {
     let made = make_temporary_in(directory).map_err(without_path)?;
     let (mut file, path) = made.into_parts();
     let temporary = Temporary::new(path);
-    // Some file systems have no locks; there the name has to do.
+    // Some file systems have no locks. There the name must suffice.
     let _ = flock(&file, FlockOperation::NonBlockingLockExclusive);
     file.write_all(content)?;
     Ok((file, temporary))
 }
 
-/// How often a directory is made again that goes as soon as it is there.
+/// Maximum number of attempts to create a directory that is removed immediately.
 const TRIES: usize = 16;
 
-/// Held while a directory has been made for a file that is not in it yet: shared by those who make files, alone by
-/// who removes empty directories.
+/// Held while a created directory does not contain its file yet. Threads that create files hold it
+/// shared, and a thread that removes empty directories holds it exclusively.
 static MAKING: RwLock<()> = RwLock::new(());
 
-/// Makes a temporary file, and its directory if that is missing. Another process may remove the directory
-/// while it is still empty ([`remove_empty_above`]), so that it is made again.
+/// Creates a temporary file, and its directory if missing. Another process may remove the directory
+/// while it is empty ([`remove_empty_above`]). It is then created again.
 fn make_temporary_in(directory: &Path) -> io::Result<NamedTempFile> {
     let _making = MAKING.read().unwrap_or_else(PoisonError::into_inner);
     for _ in 0..TRIES {
@@ -207,7 +209,7 @@ fn make_temporary_in(directory: &Path) -> io::Result<NamedTempFile> {
             made => return made,
         }
         match make_directory(directory) {
-            // A directory above it went while it was made.
+            // A parent directory was removed meanwhile.
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
             _ => {}
         }
@@ -216,7 +218,7 @@ fn make_temporary_in(directory: &Path) -> io::Result<NamedTempFile> {
 }
 
 fn make_temporary(directory: &Path) -> io::Result<NamedTempFile> {
-    // For whoever the umask lets read it, unlike most temporary files.
+    // Unlike most temporary files, this one is readable for every user that the umask allows.
     let readable = std::os::unix::fs::PermissionsExt::from_mode(0o666);
     tempfile::Builder::new()
         .prefix(OWN_PREFIX.as_str())
@@ -225,11 +227,11 @@ fn make_temporary(directory: &Path) -> io::Result<NamedTempFile> {
         .tempfile_in(directory)
 }
 
-/// Makes a directory with those above it, unless it is there.
+/// Creates a directory and its parents, unless it exists.
 fn make_directory(directory: &Path) -> io::Result<()> {
     match std::fs::create_dir_all(directory) {
-        // It is there already, and std could not tell whether it is a directory: what kept it from
-        // looking may pass, so that is the error, and not that something is in the way.
+        // The entry exists, but std could not determine whether it is a directory. The cause of
+        // that may be temporary, so it is the error, rather than the existing entry.
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
             let is_directory = std::fs::metadata(directory)?.is_dir();
             if is_directory { Ok(()) } else { Err(error) }
@@ -247,8 +249,7 @@ static OWN_PREFIX: LazyLock<String> = LazyLock::new(|| {
 /// Directories that this process has swept.
 static SWEPT: Mutex<Option<HashSet<PathBuf>>> = Mutex::new(None);
 
-/// Before a process first writes into a directory, it removes what others have left there that were
-/// killed.
+/// Removes the files of killed processes before this process first writes into a directory.
 fn sweep_once(directory: &Path) {
     let mut swept = SWEPT.lock().unwrap_or_else(PoisonError::into_inner);
     let swept = swept.get_or_insert_default();
@@ -261,17 +262,17 @@ fn sweep_once(directory: &Path) {
     }
 }
 
-/// The error alone: the temporary name in it says nothing to anybody, and differs every time.
+/// Removes the temporary name from an error: it means nothing to users and always differs.
 fn without_path(error: io::Error) -> io::Error {
     let plain = io::Error::from(error.kind());
     let known = error.get_ref().is_some() && plain.to_string() != "uncategorized error";
     if known { plain } else { error }
 }
 
-/// Removes a file if it is there.
+/// Removes a file if it exists.
 ///
 /// # Errors
-/// Whatever the file system says, other than that there is no such file, or can be none.
+/// Returns the error of the file system, unless the file does not exist or cannot exist.
 pub fn remove(path: &Path) -> io::Result<()> {
     match std::fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound && !is_for_good(&error) => Err(error),
@@ -279,8 +280,8 @@ pub fn remove(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Removes the directories above `path` that are empty, up to `top`, which stays. A directory that holds
-/// anything, or cannot be removed, ends it.
+/// Removes the empty directories above `path`, up to `top`, which stays. It stops at a directory
+/// that is not empty or cannot be removed.
 pub fn remove_empty_above(path: &Path, top: &Path) {
     let _alone = MAKING.write().unwrap_or_else(PoisonError::into_inner);
     let above = path.ancestors().skip(1);
@@ -291,8 +292,8 @@ pub fn remove_empty_above(path: &Path, top: &Path) {
     }
 }
 
-/// Whether an error is about the path itself, so that no file of that name can be there and no
-/// waiting helps: the name is too long, or something else is in the way.
+/// Checks whether an error is permanent: no file of that name can exist, and waiting does not help.
+/// The name is too long, or another entry is in the way.
 pub fn is_for_good(error: &io::Error) -> bool {
     use io::ErrorKind::{
         AlreadyExists, InvalidFilename, InvalidInput, IsADirectory, NotADirectory,
@@ -307,19 +308,19 @@ pub fn is_for_good(error: &io::Error) -> bool {
     in_the_way.contains(&error.kind()) || error.raw_os_error() == Some(libc::ELOOP)
 }
 
-/// Removes what processes that were killed left half-written below a directory. To be called
-/// before this process writes: it may have been given the id of a dead one.
+/// Removes the partial files of killed processes below a directory. Must be called before this
+/// process writes, because it may have the id of a dead one.
 pub fn sweep(directory: &Path) {
     sweep_where(directory, &|writer| writer.is_own() || writer.is_dead());
 }
 
-/// As [`sweep`], while this process may be writing.
+/// Works like [`sweep`], while this process may be writing.
 pub fn sweep_dead(directory: &Path) {
     sweep_where(directory, &|writer| !writer.is_own() && writer.is_dead());
 }
 
 fn sweep_where(directory: &Path, is_over: &dyn Fn(Writer) -> bool) {
-    // A directory that is not there yet, or cannot be read, has nothing to sweep.
+    // A directory that is missing or cannot be read has no remains to remove.
     let Ok(entries) = std::fs::read_dir(directory) else {
         return;
     };
@@ -345,11 +346,11 @@ fn sweep_entry(entry: &DirEntry, is_over: &dyn Fn(Writer) -> bool) {
     }
 }
 
-/// Who writes a file, by its temporary name.
+/// The process that writes a file, according to its temporary name.
 #[derive(Debug, Clone, Copy)]
 struct Writer {
     pid: u32,
-    /// When the process was started, in clock ticks since the machine was.
+    /// Start time of the process in clock ticks since boot.
     started: u64,
 }
 
@@ -367,7 +368,7 @@ impl Writer {
         self.pid == std::process::id()
     }
 
-    /// Whether it cannot be writing any more: its id is free, or another's by now.
+    /// Checks whether it can no longer be writing: its id is free or belongs to another process.
     fn is_dead(self) -> bool {
         match start_time(self.pid) {
             Some(started) => started != self.started,
@@ -376,7 +377,7 @@ impl Writer {
     }
 }
 
-/// Whether somebody writes to the file, perhaps in another container.
+/// Checks whether a process writes to the file, possibly in another container.
 fn is_locked(path: &Path) -> bool {
     let mut how = File::options();
     let how = how
@@ -387,8 +388,8 @@ fn is_locked(path: &Path) -> bool {
     })
 }
 
-/// When a process was started (proc(5): the 22nd field; the second is a name in parentheses that may
-/// contain anything).
+/// Returns the start time of a process (proc(5): the 22nd field; the second is a name in
+/// parentheses that may contain anything).
 fn start_time(pid: u32) -> Option<u64> {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
     let (_, rest) = stat.rsplit_once(')')?;
@@ -434,7 +435,7 @@ mod tests {
         let dead = below.join(".qcbus-4194999.1-a1b2c3.tmp");
         let former = below.join(format!(".qcbus-{parent}.1-a1b2c3.tmp"));
         let living = below.join(format!(".qcbus-{parent}.{started}-a1b2c3.tmp"));
-        // As that of a process in another container is.
+        // This file looks like that of a process in another container.
         let locked = below.join(".qcbus-4194999.1-d4e5f6.tmp");
         let result = below.join("a.xodr.xqar");
         for path in [&dead, &former, &living, &locked, &result] {
@@ -494,7 +495,7 @@ mod tests {
             });
             let write = |_| write_whole(&place, b"whole", false).and_then(|()| remove(&place));
             let written = (0..500).try_for_each(write);
-            // Also after a failure, or the other thread would go on for ever.
+            // This also runs after a failure. Otherwise the other thread would never end.
             done.store(true, std::sync::atomic::Ordering::Relaxed);
             written
         });

@@ -1,4 +1,4 @@
-//! Files under temporary names, until they get their own or go.
+//! Files under temporary names, until they get their final name or are removed.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -6,17 +6,17 @@ use std::sync::{Mutex, PoisonError};
 
 use tempfile::TempPath;
 
-/// A file under a temporary name. When it is dropped the file is removed, and tried again later when
-/// the disk refuses.
+/// A file under a temporary name. Dropping it removes the file. If the disk refuses, the removal is
+/// retried later.
 #[derive(Debug)]
 pub struct Temporary(Option<TempPath>);
 
-/// Why a file could not be named, and the file.
+/// Reason why a file could not be renamed, and the file.
 #[derive(Debug)]
 pub struct Unnamed {
-    /// What the file system said.
+    /// Error of the file system.
     pub error: io::Error,
-    /// It still has its temporary name.
+    /// The file, still under its temporary name.
     pub file: Temporary,
 }
 
@@ -25,15 +25,15 @@ impl Temporary {
         Temporary(Some(path))
     }
 
-    /// Where it lies now.
+    /// Returns its current path.
     pub fn path(&self) -> &Path {
         self.0.as_deref().unwrap_or(Path::new(""))
     }
 
-    /// Gives the file its name; what lies there is replaced.
+    /// Gives the file its final name and replaces an existing file.
     ///
     /// # Errors
-    /// Whatever the file system says, with the file, which can be named elsewhere.
+    /// Returns the error of the file system and the file, which can be stored elsewhere.
     pub fn persist(mut self, place: &Path) -> Result<(), Unnamed> {
         let Some(path) = self.0.take() else {
             return Ok(());
@@ -66,7 +66,7 @@ fn is_left(error: &io::Error) -> bool {
     error.kind() != io::ErrorKind::NotFound
 }
 
-/// Tries again to remove the temporary files of this process that the disk refused to remove.
+/// Tries again to remove the temporary files of this process that could not be removed.
 pub fn remove_left() {
     let tried = std::mem::take(&mut *left());
     if tried.is_empty() {
@@ -87,7 +87,7 @@ mod tests {
         (Temporary::new(file.into_temp_path()), path)
     }
 
-    /// A directory in the place of the file stands for a disk that refuses to remove it.
+    /// A directory in place of the file simulates a disk that refuses to remove it.
     #[test]
     fn file_that_cannot_be_removed_is_removed_later() {
         let dir = tempfile::tempdir().unwrap();
@@ -99,7 +99,7 @@ mod tests {
         assert!(path.exists());
         std::fs::remove_dir(&path).unwrap();
         std::fs::write(&path, "left").unwrap();
-        // Another test may be trying the same file at this moment, and remembers it a little later.
+        // Another test may be trying the same file at this moment and record it a little later.
         let is_removed = || {
             remove_left();
             std::thread::yield_now();

@@ -1,9 +1,9 @@
-//! Whether what lies at a path is in our hands alone.
+//! Checks whether only this user and root control the content of a path.
 //!
-//! Who can replace a file decides what is read from it. So everything on the way to it is looked at,
-//! component by component and through descriptors, links never followed but read: each must belong to
-//! this user or to root, and be writable by nobody else. The last descriptor is the one that is read, so
-//! nothing can be exchanged between the look and the use.
+//! A user who can replace a file controls its content. So every component of the path is checked
+//! through descriptors. Links are read but never followed. Each component must belong to this user
+//! or to root, and nobody else may write to it. The last descriptor is the one that is read, so
+//! nothing can be replaced between check and use.
 
 use std::collections::VecDeque;
 use std::ffi::{OsStr, OsString};
@@ -17,51 +17,51 @@ use qcbus_messages::path_text::to_text;
 use rustix::fs::{FileType, Mode, OFlags, Stat};
 use rustix::io::Errno;
 
-/// Links on one way, as many as the kernel follows.
+/// Maximum number of links on one path, the same as in the kernel.
 const MAX_LINKS: usize = 40;
-/// Who owns what nobody here owns: `nobody`, as the kernel shows it.
+/// Owner that the kernel shows for unmapped users: `nobody`.
 const OVERFLOW: u32 = 65_534;
 
-/// Why what lies at a path is not used.
+/// Reason why the content of a path is not used.
 #[derive(Debug, thiserror::Error)]
 pub enum TrustError {
-    /// Somebody else decides what lies there.
+    /// Another user controls the content.
     #[error("{}", explain(asked, at, why))]
     Foreign {
-        /// What was to be used.
+        /// The requested path.
         asked: PathBuf,
-        /// What is wrong on the way to it, or itself.
+        /// The path of the offending component, or the requested path itself.
         at: PathBuf,
-        /// What is wrong with that.
+        /// The problem with it.
         why: Foreign,
     },
-    /// It cannot be had.
+    /// It cannot be opened or read.
     #[error("cannot use {}: {source}", to_text(path))]
     Io {
-        /// What was to be used.
+        /// The requested path.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
 
 impl TrustError {
-    /// Whether nothing lies at the path.
+    /// Checks whether the path does not exist.
     pub fn is_absent(&self) -> bool {
         matches!(self, TrustError::Io { source, .. } if source.kind() == io::ErrorKind::NotFound)
     }
 }
 
-/// How somebody else decides what lies at a path.
+/// How another user controls the content of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Foreign {
-    /// It belongs to this user, who is neither root nor us.
+    /// It belongs to this user, who is neither root nor the current user.
     Owner(u32),
     /// Everybody may write to it; the mode.
     World(u32),
-    /// This group may write to it, which is no private one of ours; the mode.
+    /// This group may write to it and is not a private group of this user; the mode.
     Group(u32, u32),
-    /// It is no regular file.
+    /// It is not a regular file.
     Special,
 }
 
@@ -99,10 +99,10 @@ fn explain(asked: &Path, at: &Path, why: &Foreign) -> String {
     }
 }
 
-/// Reads a file that is in our hands alone.
+/// Reads a file that only this user and root control.
 ///
 /// # Errors
-/// [`TrustError`]; a file of more than `limit` bytes is [`io::ErrorKind::FileTooLarge`].
+/// Returns [`TrustError`]; a file of more than `limit` bytes is [`io::ErrorKind::FileTooLarge`].
 pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, TrustError> {
     let found = walk(path, None)?;
     let file = found.open(path)?;
@@ -115,38 +115,38 @@ pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, TrustError> {
     Ok(bytes)
 }
 
-/// Looks whether a file is in our hands alone: a program, say. It stays what it is, because nobody else
-/// can replace it or anything on the way to it.
+/// Checks whether only this user and root control a file, for example a program. It stays
+/// unchanged, because no other user can replace it or any part of its path.
 ///
 /// # Errors
-/// [`TrustError`].
+/// Returns [`TrustError`].
 pub fn look_at_file(path: &Path) -> Result<(), TrustError> {
     let found = walk(path, None)?;
     found.is_ours_alone(path, found.kind() == FileType::RegularFile)
 }
 
-/// Opens a directory that is in our hands alone.
+/// Opens a directory that only this user and root control.
 ///
 /// # Errors
-/// [`TrustError`].
+/// Returns [`TrustError`].
 pub fn directory(path: &Path) -> Result<OwnedFd, TrustError> {
     open_directory(path, &walk(path, None)?)
 }
 
-/// As [`directory`], and makes it where it is missing, with all that is missing on the way to it.
+/// Works like [`directory`], and creates missing directories of the path.
 ///
 /// # Errors
-/// [`TrustError`].
+/// Returns [`TrustError`].
 pub fn make_directory(path: &Path) -> Result<OwnedFd, TrustError> {
     let mode = Mode::from_raw_mode(0o755);
     open_directory(path, &walk(path, Some(mode))?)
 }
 
-/// A directory that only this user can read, made where it is missing. One of ours that others can look
-/// into is closed to them; one of somebody else's, root among them, is refused as it is.
+/// Opens or creates a directory that only this user can read. The access of others to this user's
+/// directory is removed. A directory of another user, including root, is refused unchanged.
 ///
 /// # Errors
-/// [`TrustError`].
+/// Returns [`TrustError`].
 pub fn make_private_directory(path: &Path) -> Result<OwnedFd, TrustError> {
     let found = walk(path, Some(Mode::RWXU))?;
     let owner = found.stat.st_uid;
@@ -170,12 +170,12 @@ fn open_directory(path: &Path, found: &Found) -> Result<OwnedFd, TrustError> {
     found.reopen(path, OFlags::DIRECTORY)
 }
 
-/// What a way leads to. Everything before it is in our hands alone.
+/// Target of a path. Only this user and root control everything before it.
 struct Found {
-    /// The directory that it lies in, and its name there.
+    /// The directory that contains it, and its name there.
     parent: OwnedFd,
     name: OsString,
-    /// Where that is.
+    /// Its path.
     at: PathBuf,
     stat: Stat,
 }
@@ -197,7 +197,7 @@ impl Found {
         writer.map_or(Ok(()), |why| Err(self.foreign(asked, why)))
     }
 
-    /// Opens it for reading. It still is what it was: nobody else can replace it where it lies.
+    /// Opens it for reading. It is unchanged, because no other user can replace it there.
     fn reopen(&self, asked: &Path, kind: OFlags) -> Result<OwnedFd, TrustError> {
         let flags = OFlags::RDONLY | OFlags::NOFOLLOW | OFlags::NONBLOCK | OFlags::NOCTTY;
         let flags = flags | OFlags::CLOEXEC | kind;
@@ -205,9 +205,9 @@ impl Found {
             .map_err(|error| failed(asked, error.into()))
     }
 
-    /// Opens a regular file that is ours alone: what counts is the descriptor that is read.
+    /// Opens a regular file that only this user and root control; checks the opened descriptor.
     fn open(mut self, asked: &Path) -> Result<File, TrustError> {
-        // Before it is opened: opening a device can do something.
+        // This check precedes opening, because opening a device can have effects.
         self.is_ours_alone(asked, self.kind() == FileType::RegularFile)?;
         let opened = self.reopen(asked, OFlags::empty())?;
         self.stat = rustix::fs::fstat(&opened).map_err(|error| failed(asked, error.into()))?;
@@ -216,7 +216,7 @@ impl Found {
     }
 }
 
-/// Goes to a path from the root, and says what lies there. `make`: missing directories are made.
+/// Walks a path from the root and returns its target. With `make`, missing directories are created.
 fn walk(asked: &Path, make: Option<Mode>) -> Result<Found, TrustError> {
     let io = |error: Errno| failed(asked, error.into());
     let path = std::path::absolute(asked).map_err(|source| failed(asked, source))?;
@@ -225,7 +225,7 @@ fn walk(asked: &Path, make: Option<Mode>) -> Result<Found, TrustError> {
     let mut at = PathBuf::from("/");
     let mut links = 0;
     loop {
-        // The root itself is its own parent.
+        // The root is its own parent.
         let name = ahead.pop_front().unwrap_or_else(|| OsString::from("."));
         let found = open_entry(&parent, &name, make).map_err(io)?;
         let stat = rustix::fs::fstat(&found).map_err(io)?;
@@ -291,7 +291,7 @@ fn open_entry(parent: &OwnedFd, name: &OsStr, make: Option<Mode>) -> Result<Owne
     match (open(), make) {
         (Err(Errno::NOENT), Some(mode)) => {
             match rustix::fs::mkdirat(parent, name, mode) {
-                // Somebody was faster: what lies there is looked at as anything else.
+                // If another process has created it first, the entry is checked like any other.
                 Ok(()) | Err(Errno::EXIST) => open(),
                 Err(error) => Err(error),
             }
@@ -300,8 +300,8 @@ fn open_entry(parent: &OwnedFd, name: &OsStr, make: Option<Mode>) -> Result<Owne
     }
 }
 
-/// Root and this user. On the way also whoever owns the root directory: in a namespace that does not
-/// know root, that is how the system's directories look.
+/// Accepts root and this user as owners. On the way, the owner of the root directory is also
+/// accepted. In a namespace without root, this user owns the system's directories.
 fn is_of_a_friend(stat: &Stat, is_last: bool) -> Result<(), Foreign> {
     let owner = stat.st_uid;
     let system = || rustix::fs::stat("/").is_ok_and(|root| root.st_uid == owner);
@@ -312,7 +312,7 @@ fn is_of_a_friend(stat: &Stat, is_last: bool) -> Result<(), Foreign> {
     }
 }
 
-/// Who besides its owner may write to it, as its mode has it.
+/// Returns who may write to it besides its owner, according to its mode.
 fn other_writer(stat: &Stat, has_access_list: impl Fn() -> bool) -> Option<Foreign> {
     let mode = stat.st_mode & 0o7777;
     if mode & 0o002 != 0 {
@@ -321,14 +321,14 @@ fn other_writer(stat: &Stat, has_access_list: impl Fn() -> bool) -> Option<Forei
     if mode & 0o020 == 0 {
         return None;
     }
-    // With umask 002 everything of a user is writable for a group that has no other member. Group 0 is
-    // root's.
+    // With umask 002 all files of a user are writable for the user's private group, which has no
+    // other member. Group 0 belongs to root.
     let (us, group) = (rustix::process::geteuid().as_raw(), stat.st_gid);
     let is_private = group == 0 || (group == us && rustix::process::getegid().as_raw() == us);
     (!is_private || has_access_list()).then_some(Foreign::Group(mode, group))
 }
 
-/// Where there is an access list the bits of the group say what anybody on it may do at most.
+/// Checks for an access list. With one, the group bits are the maximum rights of any entry on it.
 fn has_access_list(parent: &OwnedFd, name: &OsStr) -> bool {
     let path = PathBuf::from(format!("/proc/self/fd/{}", parent.as_raw_fd())).join(name);
     let list = "system.posix_acl_access";

@@ -1,4 +1,5 @@
-//! `.mosc`: a zip archive around a modular scenario, read in memory and never unpacked to disk.
+//! Reads `.mosc`, a zip archive around a modular scenario. It is read in memory and never unpacked
+//! to disk.
 
 use std::collections::HashSet;
 use std::io::{Cursor, Read};
@@ -12,43 +13,43 @@ use crate::limits::{Exceeded, Limits};
 use crate::text_fault::{Code, TextFault};
 use crate::unpack::inflated_cap;
 
-/// The member that a modular scenario starts from.
+/// Main member of a modular scenario.
 pub(crate) const MAIN_MEMBER: &str = "main.xosc";
 
-/// One member of an archive and what is wrong with the archive as a whole.
+/// One member of an archive, with the faults found while reading it.
 pub(crate) struct Member {
-    /// The bytes, or what could be read of them; empty when the member is absent.
+    /// The bytes. Empty when the member is missing or cannot be read.
     pub bytes: Vec<u8>,
-    /// Whether the archive has the member at all.
+    /// Whether the archive has the member.
     pub present: bool,
     pub faults: Vec<TextFault>,
 }
 
-/// Whether the bytes begin as a zip archive does (a member, or an archive without members).
+/// Checks whether the bytes begin as a zip archive (one with members or one without).
 pub(crate) fn is_zip(bytes: &[u8]) -> bool {
     bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(b"PK\x05\x06")
 }
 
 type Archive = ZipArchive<Cursor<Arc<[u8]>>>;
 
-/// An archive whose directory has been read and looked at once, however many members are asked for.
+/// An archive. Its directory is read and checked once for any number of members.
 pub(crate) struct OpenArchive {
-    /// `None` when nothing may be read from it.
+    /// `None` when the archive must not be read.
     zip: Option<Archive>,
     faults: Vec<TextFault>,
 }
 
-/// What the directory of an archive says of a member.
+/// Directory entry of a member.
 pub(crate) struct Entry {
     pub name: String,
-    /// Unpacked, in bytes.
+    /// Unpacked size in bytes.
     pub size: u64,
     pub crc32: u32,
 }
 
 impl OpenArchive {
-    /// Reads the directory. Names that lead out of the archive are refused whichever member is asked
-    /// for; the caps count over all members, so that no order of reading slips past them.
+    /// Reads the directory. A name that leads out of the archive is refused for every requested
+    /// member. The caps count over all members, so the order of reading cannot bypass them.
     pub fn new(packed: &Arc<[u8]>, limits: &Limits) -> OpenArchive {
         let mut faults = Vec::new();
         let mut zip = match ZipArchive::new(Cursor::new(packed.clone())) {
@@ -70,8 +71,8 @@ impl OpenArchive {
         }
     }
 
-    /// Reads one member. `left` is how many unpacked bytes may still be had, from this archive and
-    /// from those around it and within it.
+    /// Reads one member. `left` is the number of unpacked bytes that may still be read, from this
+    /// archive and from the archives around and within it.
     pub fn member(&mut self, name: &str, limits: &Limits, left: &mut u64) -> Member {
         let mut member = Member {
             bytes: Vec::new(),
@@ -100,17 +101,17 @@ impl OpenArchive {
         member
     }
 
-    /// What is wrong with the archive itself, of which members may be whole.
+    /// Returns the faults of the archive itself. Its members may still be intact.
     pub fn faults(&self) -> &[TextFault] {
         &self.faults
     }
 
-    /// Whether there is nothing to be read in it.
+    /// Checks whether the archive has been refused, so that no member can be read.
     pub fn is_refused(&self) -> bool {
         self.zip.is_none()
     }
 
-    /// The files in it, in the order of its directory, as far as their names can be read.
+    /// Returns the files in the archive in directory order, if their names can be read.
     pub fn entries(&mut self) -> Vec<Entry> {
         let Some(zip) = &mut self.zip else {
             return Vec::new();
@@ -129,8 +130,8 @@ impl OpenArchive {
     }
 }
 
-/// Names, number, declared sizes. What an archive declares is believed only where it accuses the
-/// archive; reading counts again.
+/// Checks names, number and declared sizes. Declared values are trusted only as evidence against
+/// the archive. The reader counts again.
 fn check_directory(
     archive: &mut Archive,
     packed: &[u8],
@@ -189,7 +190,7 @@ fn check_directory(
     Ok(())
 }
 
-/// What is wrong with the name of a member.
+/// Describes the fault in the name of a member.
 fn refused(name: &str) -> String {
     let name_shown = shown::line(name);
     match has_only_backslashes(name) {
@@ -202,10 +203,11 @@ fn refused(name: &str) -> String {
     }
 }
 
-/// Most members that are named for one fault of an archive.
+/// Maximum number of members named for one fault of an archive.
 const MOST_NAMED: usize = 4;
 
-/// Names that the directory has more than once; the library keeps one member of each.
+/// Returns the names that occur more than once in the directory. The library keeps one member of
+/// each.
 fn twice(packed: &[u8], directory: u64) -> Vec<String> {
     const ENTRY: &[u8] = b"PK\x01\x02";
     const HEAD: usize = 46;
@@ -233,7 +235,7 @@ fn twice(packed: &[u8], directory: u64) -> Vec<String> {
     twice
 }
 
-/// Whether a member's name is a plain relative path: no root, drive, backslash, `..` or NUL.
+/// Checks whether a member's name is a plain relative path: no root, drive, backslash, `..` or NUL.
 pub fn stays_inside(name: &str) -> bool {
     !name.is_empty()
         && !name.starts_with('/')
@@ -241,7 +243,7 @@ pub fn stays_inside(name: &str) -> bool {
         && name.split('/').all(|part| part != "..")
 }
 
-/// Whether a name would be a plain relative path but for the backslashes that part it.
+/// Checks whether a name would be a plain relative path if `/` replaced its backslashes.
 pub fn has_only_backslashes(name: &str) -> bool {
     name.contains('\\') && stays_inside(&name.replace('\\', "/"))
 }
@@ -283,7 +285,7 @@ fn read_checked(
         } else {
             "max_archive"
         };
-        // Of the whole cap, where what was read before has used some of it.
+        // The message states the whole cap, because earlier members may have used part of it.
         let used = match limit {
             "max_archive" => limits.max_archive.saturating_sub(cap.allowed),
             _ => 0,
@@ -313,7 +315,7 @@ fn malformed(name: &str, reason: &str) -> TextFault {
 }
 
 fn damaged(packed: &[u8], error: &ZipError) -> TextFault {
-    // A local header without the directory at the end: the archive began well and was cut.
+    // A local header without the directory at the end means that the archive is truncated.
     match is_zip(packed) {
         true => {
             let text = format!("the archive cannot be read: {error}");
@@ -326,7 +328,7 @@ fn damaged(packed: &[u8], error: &ZipError) -> TextFault {
     }
 }
 
-/// A hint for the commonest mistake: the folder was packed instead of its content.
+/// Returns a hint for the most common mistake: the folder was packed instead of its content.
 fn similar(archive: &Archive, name: &str) -> String {
     let base = name.rsplit('/').next().unwrap_or(name);
     let ends = |other: &str| {
@@ -446,7 +448,7 @@ mod tests {
     #[test]
     fn members_of_one_name_are_named() {
         let mut packed = zip(&[("main.xosc", b"<a/>"), ("a.xosc", b"1"), ("b.xosc", b"2")]);
-        // The writer refuses to do so itself.
+        // The zip writer refuses duplicate names, so the test renames the member in the bytes.
         for at in 0..packed.len() - 6 {
             if packed[at..].starts_with(b"b.xosc") {
                 packed[at] = b'a';

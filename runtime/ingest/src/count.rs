@@ -1,16 +1,16 @@
-//! An upper bound of an image from one quick pass over the bytes, long before they are parsed.
+//! Computes an upper bound of an image in one quick pass over the bytes, before they are parsed.
 
 use qcbus_document::Capacities;
 
-/// Heap set aside for each `&` of a text: the value around it and its record.
+/// Heap reserved for each `&` of a text: the value around it and its record.
 const HEAP_PER_REFERENCE: usize = 64;
-/// Heap for whatever else has to be resolved; values with line ends are rare.
+/// Heap for all other values that must be resolved. Values with line ends are rare.
 const SPARE_HEAP: usize = 4096;
-/// Runs of character data that end in white space, which the pass does not see.
+/// Runs of character data that end in white space. The quick pass does not detect them.
 const SPARE_RUNS: usize = 256;
 
-/// What a text can hold at most, unless it resolves uncommonly many or long values: then the
-/// builder runs out of room and the exact count is taken.
+/// Returns the maximum content of a text. If unusually many or long values must be resolved, the
+/// builder runs out of room. The exact count is then taken.
 pub(crate) fn quick(text: &str) -> Capacities {
     let marks = Marks::of(text.as_bytes());
     let elements = marks.openings.saturating_sub(marks.others);
@@ -26,14 +26,14 @@ pub(crate) fn quick(text: &str) -> Capacities {
     }
 }
 
-/// Counts of bytes and pairs of bytes.
+/// Counts of bytes and of pairs of bytes.
 #[derive(Default, Debug, PartialEq, Eq)]
 struct Marks {
     /// `<`
     openings: usize,
     /// `</`, `<!`, `<?`
     others: usize,
-    /// `<` right behind something that is neither white space nor `>`, and `<!`.
+    /// `<` directly after a byte that is neither white space nor `>`, and `<!`.
     runs: usize,
     equals: usize,
     ampersands: usize,
@@ -41,7 +41,7 @@ struct Marks {
 
 impl Marks {
     fn of(bytes: &[u8]) -> Marks {
-        // Lanes of single bytes, summed up before they overflow, become vector code.
+        // Lanes of single bytes, summed before they overflow, compile to vector code.
         const LANES: usize = 32;
         let mut marks = Marks::default();
         let Some(&first) = bytes.first() else {
@@ -82,7 +82,7 @@ impl Marks {
     }
 }
 
-/// What the byte `here` counts for, given the one before it.
+/// Returns the counts for the byte `here` after the byte `before`.
 #[inline]
 fn count(before: u8, here: u8) -> [u8; 5] {
     let opening = here == b'<';

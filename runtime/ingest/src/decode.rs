@@ -1,4 +1,4 @@
-//! From bytes to text: byte-order marks, encoding declarations, and what contradicts them.
+//! Decodes bytes to text: byte-order marks, encoding declarations and contradictions between them.
 
 use std::borrow::Cow;
 
@@ -7,16 +7,16 @@ use encoding_rs::{Encoding, UTF_16BE, UTF_16LE};
 use crate::limits::{Exceeded, Limits};
 use crate::text_fault::{Code, TextFault};
 
-/// A file's text in UTF-8, and what was wrong with its bytes. A UTF-8 byte-order mark stays, so
-/// that offsets are those of the file on disk.
+/// A file's text in UTF-8 and the faults of its bytes. A UTF-8 byte-order mark stays in the text,
+/// so that offsets match the file on disk.
 pub(crate) struct Decoded {
     pub text: String,
     pub faults: Vec<TextFault>,
-    /// The bytes on disk, where the text is not made of the very same ones.
+    /// The bytes on disk, if they differ from the bytes of the text.
     pub source: Option<Vec<u8>>,
 }
 
-/// How the bytes are to be read.
+/// Encoding by which the bytes are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Charset {
     Utf8,
@@ -26,7 +26,7 @@ enum Charset {
     Table(&'static Encoding),
 }
 
-/// Where the encoding was learnt from.
+/// Encoding detected at the start of a file.
 struct Opening {
     charset: Charset,
     /// Length of the byte-order mark.
@@ -34,8 +34,8 @@ struct Opening {
     fault: Option<TextFault>,
 }
 
-/// Decodes a whole file. Bytes that cannot be read become U+FFFD and a fault each (the first few),
-/// so that the rest stays readable.
+/// Decodes a whole file. Each undecodable byte becomes U+FFFD, and the first few also become
+/// faults. The rest stays readable.
 pub(crate) fn decode(bytes: Vec<u8>, limits: &Limits) -> Decoded {
     let opening = open(&bytes);
     let mut faults: Vec<TextFault> = opening.fault.into_iter().collect();
@@ -83,7 +83,8 @@ pub(crate) fn decode(bytes: Vec<u8>, limits: &Limits) -> Decoded {
     }
 }
 
-/// Byte-order mark first, then the pattern of `<?` in 16 bits, then the declaration.
+/// Detects the encoding: first by byte-order mark, then by the pattern of `<?` in 16 bits, then by
+/// the declaration.
 fn open(bytes: &[u8]) -> Opening {
     let found = |charset, mark, fault| Opening {
         charset,
@@ -154,7 +155,7 @@ fn by_declaration(bytes: &[u8]) -> Opening {
     }
 }
 
-/// A declaration that names something else than the UTF-8 byte-order mark before it.
+/// Returns a fault if the declaration contradicts the UTF-8 byte-order mark before it.
 fn contradiction(text: &[u8]) -> Option<TextFault> {
     let (label, offset) = declared(text)?;
     if charset_of(&label) == Some(Charset::Utf8) {
@@ -195,8 +196,8 @@ fn charset_of(label: &str) -> Option<Charset> {
     })
 }
 
-/// The label of `<?xml … encoding="…"?>` and the offset of the label, when the bytes begin with an
-/// XML declaration that has one.
+/// Returns the label of `<?xml … encoding="…"?>` and its offset, if the bytes begin with such an
+/// XML declaration.
 fn declared(bytes: &[u8]) -> Option<(String, usize)> {
     let head = &bytes[..bytes.len().min(1024)];
     let rest = head.strip_prefix(b"<?xml")?;
@@ -229,10 +230,10 @@ fn declared(bytes: &[u8]) -> Option<(String, usize)> {
     Some((String::from_utf8_lossy(label).into_owned(), at + 1))
 }
 
-/// Most places of unreadable bytes that are named one by one.
+/// Maximum number of places with undecodable bytes that are reported one by one.
 const NAMED_PLACES: usize = 8;
 
-/// The text, and the bytes where they are no UTF-8.
+/// Returns the text, and the original bytes if they are not valid UTF-8.
 fn utf8(bytes: Vec<u8>, faults: &mut Vec<TextFault>) -> (String, Option<Vec<u8>>) {
     let bytes = match String::from_utf8(bytes) {
         Ok(text) => return (text, None),
@@ -284,7 +285,8 @@ fn ascii(bytes: Vec<u8>, faults: &mut Vec<TextFault>) -> (String, Option<Vec<u8>
     read
 }
 
-/// Decodes by one of the web's tables; unmappable bytes are found again as U+FFFD in the result.
+/// Decodes by one of the web's tables. Unmappable bytes appear in the result as U+FFFD, and are
+/// located there.
 fn table(encoding: &'static Encoding, bytes: &[u8], faults: &mut Vec<TextFault>) -> String {
     let (text, malformed) = encoding.decode_without_bom_handling(bytes);
     if malformed {

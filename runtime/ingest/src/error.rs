@@ -1,4 +1,4 @@
-//! What goes wrong before there is a document at all.
+//! Errors that occur before a document exists.
 
 use std::path::PathBuf;
 
@@ -6,33 +6,33 @@ use qcbus_messages::Absence;
 
 use crate::limits::Exceeded;
 
-/// What [`IngestError::NotAFile`] calls a directory.
+/// Text of [`IngestError::NotAFile`] for a directory.
 pub(crate) const DIRECTORY: &str = "a directory";
 
-/// Why no bytes could be had from a file. Anything wrong *inside* the bytes is a fault of the
-/// document instead.
+/// Reason why a file could not be read. An error *inside* the bytes is a fault of the document
+/// instead.
 #[derive(Debug, thiserror::Error)]
 pub enum IngestError {
-    /// There is no file of that name (or it vanished before it could be opened).
+    /// The file does not exist (or it vanished before it could be opened).
     #[error("read {}: no such file", path.display())]
     Missing {
-        /// The file looked for.
+        /// The missing file.
         path: PathBuf,
     },
-    /// The path is a directory, a socket, a device: nothing with content to check.
+    /// The path is a directory, a socket or a device, without content to check.
     #[error("read {}: it is {what}, not a file", path.display())]
     NotAFile {
-        /// The path looked at.
+        /// The examined path.
         path: PathBuf,
         /// `a directory`, `a device or socket`.
         what: &'static str,
     },
-    /// The operating system refused: permissions, a broken disk, a lost network share.
+    /// The operating system refused access: permissions, a broken disk or a lost network share.
     #[error("read {}: {source}", path.display())]
     Unreadable {
         /// The file that could not be read.
         path: PathBuf,
-        /// The operating system's reason.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The file is larger on disk than allowed.
@@ -40,10 +40,10 @@ pub enum IngestError {
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// The cap and what was found.
+        /// The cap and the value found.
         exceeded: Exceeded,
     },
-    /// The file changed or vanished while it was read, several times in a row.
+    /// The file changed or vanished during each of several consecutive reads.
     #[error("read {}: it {what} while it was being read; it is read again once it has settled", path.display())]
     Unsettled {
         /// The file.
@@ -54,7 +54,7 @@ pub enum IngestError {
 }
 
 impl IngestError {
-    /// What it means for a file that another one refers to.
+    /// Returns the matching [`Absence`] for a file that another one refers to.
     pub fn to_absence(&self) -> Absence {
         match self {
             IngestError::Missing { .. } => Absence::NotThere,
@@ -72,7 +72,7 @@ impl IngestError {
         }
     }
 
-    /// The file that the error is about.
+    /// Returns the file of the error.
     pub fn path(&self) -> &std::path::Path {
         match self {
             IngestError::Missing { path }

@@ -1,5 +1,5 @@
-//! The set of documents that belong to a file: one walk for everybody who checks files, however the
-//! documents are fetched.
+//! Collects the set of documents that belong to a file. All checks use this one walk, for any way
+//! of fetching documents.
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -14,32 +14,34 @@ use crate::modular::{ExpandedImage, MAX_DEPTH, Piece, SearchPath, expand, librar
 use crate::references::{Parameters, Reference, references};
 use crate::rests_on::{Member, rests_on};
 
-/// Where documents come from and go to.
+/// Source that provides and stores documents.
 pub trait Source {
-    /// A document that was fetched.
+    /// A fetched document.
     type Document;
-    /// Why the whole walk is given up: it is worth another try later.
+    /// Reason for aborting the whole walk. A later attempt may succeed.
     type Halt;
 
-    /// Reads a document; `Ok(Err(…))` when it cannot be had.
+    /// Reads a document. Returns `Ok(Err(…))` when it is not available.
     ///
     /// # Errors
-    /// When no further document can be fetched now.
+    /// If no further document can be fetched now.
     fn fetch(&mut self, path: &Path) -> Result<Result<Self::Document, Absence>, Self::Halt>;
 
-    /// The image of a document.
+    /// Returns the image of a document.
     fn image(document: &Self::Document) -> &[u8];
 
-    /// What lies in an archive of which a member was fetched; see [`DocumentRole::Listing`].
+    /// Returns the listing of an archive of which a member was fetched; see
+    /// [`DocumentRole::Listing`].
     ///
     /// # Errors
     /// As [`Source::fetch`].
     fn listing(&mut self, archive: &Path) -> Result<Option<Self::Document>, Self::Halt>;
 
-    /// Keeps a document. `referred_at` is the offset of the element in the root that leads to it.
+    /// Stores a document. `referred_at` is the offset of the element in the root that leads to it.
     fn keep(&mut self, path: &Path, role: DocumentRole, referred_at: u32, document: Self::Document);
 
-    /// An image of what a modular scenario was expanded to; `Ok(Err(…))` when there can be none.
+    /// Returns an image of the expanded form of a modular scenario, or `Ok(Err(…))` if no image is
+    /// possible.
     ///
     /// # Errors
     /// As [`Source::fetch`].
@@ -48,56 +50,56 @@ pub trait Source {
         expanded: &ExpandedImage<'_, '_>,
     ) -> Result<Result<Self::Document, Absence>, Self::Halt>;
 
-    /// The image of a document that was kept, by how many were kept before it.
+    /// Returns the image of a stored document. `index` is the number of documents stored before it.
     fn kept(&self, index: usize) -> &[u8];
 
-    /// Hears what was looked at besides, for those who watch it.
+    /// Receives the other paths that the walk examined, so that a caller can watch them.
     fn looked(&mut self, look: Look<'_>) {
         let _ = look;
     }
 }
 
-/// Something that the set of documents depends on and that is no document of it.
+/// A path that the set depends on but that is not a document of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Look<'p> {
-    /// A file that was looked for in vain, or is there and was not to be had.
+    /// A file that is missing or could not be read.
     NotHad(&'p Path),
     /// A file that was not read because there are too many.
     NotRead(&'p Path),
-    /// A directory whose files count.
+    /// A directory from which all files count.
     Listed(&'p Path),
 }
 
-/// What bounds a walk, and where it looks.
+/// Limits and search path of a walk.
 #[derive(Debug, Clone)]
 pub struct Walking<'w> {
-    /// Most documents of a set, the root among them.
+    /// Maximum number of documents in a set, including the root.
     pub max_documents: usize,
-    /// Most bytes that are copied into an expanded scenario.
+    /// Maximum number of bytes copied into an expanded scenario.
     pub max_text: u64,
-    /// Most bytes of its image.
+    /// Maximum size of the expanded scenario's image in bytes.
     pub max_image: u64,
-    /// Where scenarios are looked for besides.
+    /// Additional directories in which scenarios are looked for.
     pub search: &'w SearchPath,
 }
 
-/// A document and all that it refers to.
+/// Result of a walk: missing documents, links and dependencies.
 #[derive(Debug)]
 pub struct Found {
-    /// What could not be had or is of no use, in the order of the references.
+    /// Missing or unusable documents, in the order of the references.
     pub missing: Vec<MissingDocument>,
-    /// Of each document, the root first: where its references to maps and scenarios lead.
+    /// Targets of the references to maps and scenarios, for each document. The root is first.
     pub links: Vec<Vec<Link>>,
-    /// Of each document, the root first: whether the root rests on it, so that a fault of it is a fault of
-    /// whatever runs the root.
+    /// Whether the root rests on the document, for each document. The root is first. If so, a fault
+    /// of the document is also a fault of everything that runs the root.
     pub rests_on: Vec<bool>,
 }
 
-/// Follows the references of a root and fetches what they lead to; those of scenarios that a modular
-/// scenario is made of likewise.
+/// Follows the references of a root and fetches their targets. For a modular scenario, it also
+/// follows the references of the scenarios that the root takes groups from.
 ///
 /// # Errors
-/// What the source gives up with.
+/// If the source aborts the walk.
 pub fn gather<S: Source>(
     root: &Document<'_>,
     walking: &Walking<'_>,
@@ -146,31 +148,31 @@ struct Walk<'w, S> {
     root: &'w Document<'w>,
     source: &'w mut S,
     walking: &'w Walking<'w>,
-    /// By path, where it is among the documents.
+    /// Index of each document by path.
     had: HashMap<PathBuf, usize>,
     documents: Vec<Had>,
-    /// Names of the catalogs that were found.
+    /// Names of the catalogs found.
     catalogs: BTreeSet<String>,
-    /// Whether the last document is what a modular scenario was expanded to.
+    /// Whether the last document is the expanded form of a modular scenario.
     is_expanded: bool,
-    /// The archives whose members were listed.
+    /// Archives whose members have been listed.
     listed: BTreeSet<PathBuf>,
-    /// With the kind of catalogs that a missing directory was to have.
+    /// Missing documents. For a missing catalog directory, with the expected kind of catalogs.
     missing: Vec<(MissingDocument, Option<String>)>,
 }
 
-/// What is in the way of an expanded scenario, and the element of the root that leads there.
+/// Reason why a scenario cannot be expanded, and the element of the root that leads to it.
 type Obstacle = (String, u32);
 
-/// A document that was fetched.
+/// A fetched document.
 #[derive(Debug)]
 struct Had {
     role: DocumentRole,
     links: Vec<Link>,
     is_library: bool,
-    /// How many references lead from the root to it, at least.
+    /// Minimum number of references from the root to the document.
     depth: u32,
-    /// The element of the root that leads to it.
+    /// Element of the root that leads to the document.
     referred_at: u32,
 }
 
@@ -187,7 +189,7 @@ impl Had {
 }
 
 impl<S: Source> Walk<'_, S> {
-    /// The references of a library to further ones.
+    /// Returns the references of a library to further libraries.
     fn libraries_of(&self, from: usize) -> Vec<Reference> {
         let image = self.source.kept(from - 1);
         Document::open(image).map_or_else(
@@ -215,8 +217,8 @@ impl<S: Source> Walk<'_, S> {
                 return Ok(());
             };
             if reference.is_library && why != Absence::NotThere {
-                // It is there, and it is the one that is meant: another of its name further along the
-                // search path is not.
+                // An existing library is the intended one, even if it is unusable. A library with
+                // the same name further along the search path is not intended.
                 self.miss(from, reference, path, why, None);
                 return Ok(());
             }
@@ -226,7 +228,7 @@ impl<S: Source> Walk<'_, S> {
                 .as_ref()
                 .is_none_or(|(_, other)| *other == Absence::NotThere && why != Absence::NotThere)
             {
-                // Of several spellings the one that is there is meant, if there is one.
+                // If one of several spellings exists, it is the intended one.
                 first = Some((path, why));
             }
         }
@@ -236,7 +238,7 @@ impl<S: Source> Walk<'_, S> {
         Ok(())
     }
 
-    /// Fetches one referenced file, unless that was done.
+    /// Fetches one referenced file, unless it has already been fetched.
     fn candidate(
         &mut self,
         from: usize,
@@ -264,7 +266,7 @@ impl<S: Source> Walk<'_, S> {
             }
         };
         let to = self.documents.len();
-        // What lies in an archive has a name besides that of the archive.
+        // A member of an archive can be reached by its own name and by the name of the archive.
         let own = Document::open(S::image(&document))
             .map_or_else(|_| path.to_path_buf(), |it| from_text(it.path()));
         if let Some(&to) = self.had.get(&own) {
@@ -298,7 +300,7 @@ impl<S: Source> Walk<'_, S> {
         Ok(Ok(()))
     }
 
-    /// What lies in the archive that a main scenario is from belongs to the set.
+    /// Adds the listing of the archive that a main scenario comes from to the set.
     fn list_archive(&mut self, main: &str) -> Result<(), S::Halt> {
         let Some(archive) = main.strip_suffix(&format!("!{MAIN_MEMBER}")) else {
             return Ok(());
@@ -316,7 +318,8 @@ impl<S: Source> Walk<'_, S> {
         Ok(())
     }
 
-    /// Makes a plain scenario of a modular one; what is in the way of it is missing.
+    /// Makes a plain scenario from a modular one. If this is impossible, the reason is recorded as
+    /// a missing document.
     fn expand(&mut self) -> Result<(), S::Halt> {
         match self.expanded()? {
             Ok(document) => {
@@ -328,7 +331,8 @@ impl<S: Source> Walk<'_, S> {
             Err((why, referred_at)) => {
                 let missing = MissingDocument {
                     role: DocumentRole::Expanded,
-                    // Without its directory: results do not tell where they were made.
+                    // The directory is left out, because results must not depend on the place where
+                    // they were made.
                     reference: name_of(self.root.path()).to_owned(),
                     path: String::new(),
                     why: Absence::NotExpanded { why },
@@ -342,7 +346,7 @@ impl<S: Source> Walk<'_, S> {
         Ok(())
     }
 
-    /// The expanded scenario, or what is in its way.
+    /// Returns the expanded scenario, or the obstacle that prevents it.
     fn expanded(&self) -> Result<Result<S::Document, Obstacle>, S::Halt> {
         let expansion = expand(self.pieces(), self.walking.max_text);
         if let Some(obstacle) = expansion.obstacles().next() {
@@ -367,7 +371,7 @@ impl<S: Source> Walk<'_, S> {
         }
     }
 
-    /// The documents with their roles.
+    /// Returns the documents with their roles.
     fn set(&self) -> Vec<Member<'_>> {
         let image = |index: usize| match index {
             0 => Some(*self.root),
@@ -379,8 +383,8 @@ impl<S: Source> Walk<'_, S> {
             .collect()
     }
 
-    /// The documents with their links. One that cannot be opened was said to be missing: the root stands
-    /// in its place, to which no scenario may refer.
+    /// Returns the documents with their links. A document that cannot be opened is already reported
+    /// as missing. The root replaces it, because no scenario may refer to the root.
     fn pieces(&self) -> Vec<Piece<'_>> {
         let images =
             (1..self.documents.len()).map(|index| Document::open(self.source.kept(index - 1)));
@@ -404,7 +408,7 @@ impl<S: Source> Walk<'_, S> {
         self.documents[from].links.push(link);
     }
 
-    /// What keeps a document that is there from being relied on.
+    /// Returns the reason why an existing document is not usable, or `None`.
     fn examine(&mut self, reference: &Reference, image: &[u8]) -> Option<Absence> {
         let document = match Document::open(image) {
             Ok(document) => document,
@@ -461,7 +465,7 @@ impl<S: Source> Walk<'_, S> {
         self.missing.push((missing, catalogs));
     }
 
-    /// Where a document other than the root refers to something.
+    /// Returns the place of a reference in a document other than the root.
     fn within(&self, from: usize, offset: u32) -> Option<Within> {
         let document = Document::open(self.source.kept(from - 1)).ok()?;
         let position = document.position(offset);
@@ -472,10 +476,11 @@ impl<S: Source> Walk<'_, S> {
         })
     }
 
-    /// A catalog directory that is not there weighs more when the scenario needs a catalog of it,
-    /// which is known only when all other catalogs are.
+    /// Sets the level of missing catalog directories. A missing directory is more severe if the
+    /// scenario needs a catalog of it. This is known only after all other catalogs have been found.
     fn weighed(self) -> Vec<MissingDocument> {
-        // What a modular scenario takes from others may need catalogs that its own file does not.
+        // The groups that a modular scenario takes from other files may need catalogs that its own
+        // file does not need.
         let last = self.documents.len().checked_sub(2);
         let expanded = last.filter(|_| self.is_expanded);
         let expanded = expanded.and_then(|last| Document::open(self.source.kept(last)).ok());
@@ -495,7 +500,7 @@ impl<S: Source> Walk<'_, S> {
     }
 }
 
-/// How much it weighs that a file cannot be had. Catalogs may be listed and never used.
+/// Returns the level for a missing file. Catalogs may be listed without being used.
 fn level(role: DocumentRole, path: &Path, why: &Absence) -> Level {
     let needed = role != DocumentRole::Catalog;
     match why {
@@ -509,19 +514,20 @@ fn level(role: DocumentRole, path: &Path, why: &Absence) -> Level {
         {
             Level::Error
         }
-        // Maps may be of a kind that is no XML.
+        // Maps may have a format other than XML.
         Absence::Broken { .. } if needed && FileKind::of_path(path).is_some() => Level::Error,
         _ => Level::Warning,
     }
 }
 
-/// Whether a scenario needs catalogs of a directory that is not there.
+/// Whether a scenario needs catalogs of a missing directory.
 enum Need {
-    /// It names one that was not found where only a catalog of this kind will do.
+    /// The scenario refers to an unknown catalog in a place where only this kind of catalog is
+    /// allowed.
     Used,
-    /// All that it refers to was found.
+    /// All referenced catalogs were found.
     Unused,
-    /// It may be an entry of another catalog that needs it.
+    /// An entry of another catalog may need it.
     Unknown,
 }
 
@@ -544,7 +550,7 @@ fn need_of(root: &Document<'_>, kind: &str, found: &BTreeSet<String>) -> Need {
         let is_found = name.map(|name| found.contains(&name));
         match is_found {
             Some(false) if users.contains(&parent) => return Need::Used,
-            // Maneuvers of catalogs refer to catalogs of other kinds themselves.
+            // Maneuvers in catalogs may themselves refer to catalogs of other kinds.
             Some(true) if parent != "ManeuverGroup" => {}
             _ => need = Need::Unknown,
         }

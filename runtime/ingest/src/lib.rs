@@ -1,9 +1,10 @@
-//! From bytes on disk to document images: reading, gzip and zip, encodings, the checks of XML that
-//! a fast parser leaves out, OpenDRIVE's includes, and what other files a document refers to.
+//! Converts bytes on disk to document images: reading, gzip and zip, encodings, and the XML checks
+//! that a fast parser omits. It also handles OpenDRIVE includes and the references of a document to
+//! other files.
 //!
-//! [`prepare`] does all input and output; [`Prepared::build_into`] then parses once, straight into
-//! a buffer that the caller owns. A file that cannot be read at all is an [`IngestError`]; a file
-//! that can be read always becomes an image, whose faults say what is wrong with it.
+//! [`prepare`] does all input and output. [`Prepared::build_into`] then parses once, directly into
+//! a buffer that the caller owns. A file that cannot be read at all is an [`IngestError`]. A
+//! readable file always becomes an image, and its faults describe the errors.
 
 mod archive;
 mod count;

@@ -1,31 +1,32 @@
-//! Caps on what one file may cost, and the one text that says a cap was hit.
+//! Caps on the cost of one file, and the common text for an exceeded cap.
 
 use std::fmt;
 
 const MIB: u64 = 1 << 20;
 const GIB: u64 = 1 << 30;
 
-/// Caps on what one root file and everything read for it may cost. All of them are data, so that
-/// a farm with larger maps can raise them; [`Limits::default`] suits files up to a gigabyte.
+/// Caps on the cost of one root file and of everything read for it. All caps are data, so that a
+/// farm with larger maps can raise them. [`Limits::default`] suits files up to a gigabyte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Largest file on disk, in bytes.
+    /// Maximum size of a file on disk, in bytes.
     pub max_file: u64,
-    /// Largest text after inflating a gzip file or decoding another encoding, in bytes.
+    /// Maximum size of the text after inflating a gzip file or decoding another encoding, in bytes.
     pub max_unpacked: u64,
-    /// Largest sum of the inflated members of a `.mosc` archive, in bytes.
+    /// Maximum sum of the inflated members of a `.mosc` archive, in bytes.
     pub max_archive: u64,
-    /// Largest ratio of inflated to packed bytes; counts from the first inflated mebibyte on.
+    /// Maximum ratio of inflated to packed bytes. It applies from the first inflated mebibyte on.
     pub max_ratio: u32,
-    /// Most members of a `.mosc` archive, and most files listed in a catalog directory.
+    /// Maximum number of members of a `.mosc` archive.
     pub max_members: u32,
-    /// Deepest nesting of elements; the root is at depth 1.
+    /// Maximum nesting depth of elements. The root is at depth 1.
     pub max_depth: u16,
-    /// Most `<include>` elements spliced into one document, nested ones counted each time.
+    /// Maximum number of `<include>` elements spliced into one document. Nested ones count each
+    /// time.
     pub max_includes: u32,
-    /// Largest document image, in bytes.
+    /// Maximum size of a document image, in bytes.
     pub max_image: u64,
-    /// Faults recorded in one document; reading stops at the last of them.
+    /// Maximum number of faults recorded in one document. Reading stops at the last of them.
     pub max_faults: u32,
 }
 
@@ -45,16 +46,16 @@ impl Default for Limits {
     }
 }
 
-/// A cap that was exceeded: its name in [`Limits`], what was found and what is allowed.
+/// An exceeded cap: its name in [`Limits`], the value found and the value allowed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Exceeded {
-    /// The field of [`Limits`] to raise.
+    /// Field of [`Limits`] to raise.
     pub limit: &'static str,
-    /// What is counted: `bytes on disk`, `members`, …
+    /// Counted unit: `bytes on disk`, `members`, …
     pub what: &'static str,
-    /// The value found; a lower bound where counting stopped at the cap.
+    /// Value found. It is a lower bound if counting stopped at the cap.
     pub found: u64,
-    /// The value allowed.
+    /// Maximum value allowed.
     pub allowed: u64,
 }
 
@@ -74,7 +75,7 @@ impl fmt::Display for Exceeded {
 }
 
 impl Exceeded {
-    /// `Err` when `found` is above `allowed`.
+    /// Returns `Err` when `found` is above `allowed`.
     pub(crate) fn check(
         limit: &'static str,
         what: &'static str,

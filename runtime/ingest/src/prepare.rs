@@ -1,4 +1,4 @@
-//! From a path to a [`Prepared`] document: reading, unpacking, decoding, following includes.
+//! Turns a path into a [`Prepared`] document: reads, unpacks, decodes and follows includes.
 
 use std::collections::HashMap;
 use std::ffi::OsStr;
@@ -25,34 +25,34 @@ use crate::xml::{Include, Splice, SpliceKey, first_element, includes_of};
 /// `path` may name a member of an archive as `archive.mosc!member`.
 ///
 /// # Errors
-/// When no bytes could be had from the file itself, or an archive has no such member. Whatever is
-/// wrong inside them, or with an included file, is a fault of the image.
+/// If the file itself cannot be read, or an archive does not contain the member. Errors inside the
+/// bytes or in an included file are faults of the image.
 pub fn prepare(path: &Path, boundary: &Path, limits: &Limits) -> Result<Prepared, IngestError> {
     Reader::new(*limits).prepare(path, boundary)
 }
 
-/// Prepares bytes that are in memory already. Nothing is read from disk, so that every include is
-/// a fault.
+/// Prepares bytes that are already in memory. It reads nothing from disk, so every include is a
+/// fault.
 pub fn prepare_bytes(path: &Path, bytes: Vec<u8>, limits: &Limits) -> Prepared {
     Reader::new(*limits).prepare_bytes(path, bytes)
 }
 
-/// From so many bytes on, the digest of a file is taken beside the building of its image: a thread costs
+/// File size from which the digest is computed in parallel with the image. Starting a thread costs
 /// as much as hashing 100 KB.
 const LARGE: usize = 1 << 20;
 
-/// Reads files for one set of documents: an archive is read and looked through once, however many
-/// of its members belong to the set.
+/// Reads files for one set of documents. An archive is read and checked once, for any number of its
+/// members in the set.
 pub struct Reader {
     limits: Limits,
-    /// By path; of an archive within another, `archive!member`.
+    /// Opened archives by path. For an archive within another one the path is `archive!member`.
     archives: HashMap<PathBuf, (FileStamp, OpenArchive)>,
-    /// Unpacked bytes of archives that may still be had.
+    /// Number of unpacked archive bytes that may still be read.
     left: u64,
 }
 
 impl Reader {
-    /// A reader that has read nothing.
+    /// Creates a reader without opened archives.
     pub fn new(limits: Limits) -> Reader {
         Reader {
             limits,
@@ -76,7 +76,7 @@ impl Reader {
             None => self.read(&file, &members)?,
         };
         let asked = members.iter().any(|member| !member.is_empty());
-        // An archive that is there and has no main scenario is there all the same.
+        // An existing archive without a main scenario is not a missing file.
         let is_there = root.path.as_os_str().len() > path.as_os_str().len();
         let is_member_missing = |fault: &TextFault| fault.code == FaultCode::ArchiveMemberMissing;
         if asked && !is_there && root.faults.iter().any(is_member_missing) {
@@ -88,8 +88,8 @@ impl Reader {
         Ok(assemble(stamp, root, hashed, Some(&boundary), &self.limits))
     }
 
-    /// Reads a file and opens it. Of a large one that is its own text, the digest may come later: says
-    /// whether it has been taken.
+    /// Reads a file and opens it. For a large file, whose text is identical to its bytes, the
+    /// digest may be computed later. The flag says whether the digest is already known.
     fn read(
         &mut self,
         file: &Path,
@@ -112,7 +112,7 @@ impl Reader {
         Ok((stamp, root, !later || source.is_some()))
     }
 
-    /// See [`prepare_bytes`]; members of an archive can be prepared after it.
+    /// See [`prepare_bytes`]. Members of an archive can be prepared after it.
     pub fn prepare_bytes(&mut self, path: &Path, bytes: Vec<u8>) -> Prepared {
         let (file, members) = split_members(path);
         let stamp = stamp_of_bytes(&file, &bytes);
@@ -120,8 +120,8 @@ impl Reader {
         assemble(stamp, root, true, None, &self.limits)
     }
 
-    /// What lies in an archive, as a document: see [`qcbus_messages::DocumentRole::Listing`]. `None`
-    /// where nothing can be read in it.
+    /// Returns the listing of an archive as a document: see
+    /// [`qcbus_messages::DocumentRole::Listing`]. Returns `None` if the archive cannot be read.
     ///
     /// # Errors
     /// As [`prepare`].
@@ -161,7 +161,7 @@ impl Reader {
         self.open_archive(path, members)
     }
 
-    /// Opens `main.xosc` of an archive that is open, or the member that the path leads to, through
+    /// Opens `main.xosc` of an opened archive, or the member that the path leads to, also through
     /// archives within archives.
     fn open_archive(&mut self, archive: &Path, members: &[String]) -> NamedText {
         let (name, rest) = match members.split_first() {
@@ -186,7 +186,7 @@ impl Reader {
             return self.open_archive(&path, rest);
         }
         let mut member = open.member(name, &self.limits, &mut self.left);
-        // The main scenario stands for the archive; other members are no worse for what is wrong with it.
+        // The faults of an archive belong to its main scenario. They do not affect other members.
         if members.iter().all(String::is_empty) && !open.is_refused() {
             member.faults.splice(0..0, open.faults().iter().cloned());
         }
@@ -206,7 +206,7 @@ fn empty(path: PathBuf, faults: Vec<TextFault>) -> NamedText {
     }
 }
 
-/// The members of an archive as an XML document.
+/// Returns the members of an archive as an XML document.
 fn listing(entries: &[Entry]) -> String {
     let mut text = String::from("<Archive>\n");
     for entry in entries {
@@ -221,14 +221,14 @@ fn listing(entries: &[Entry]) -> String {
     text
 }
 
-/// Parts `archive.mosc!member!member` into the file on disk and the members.
-/// Returns the file on the disk that a path means: for a member of an archive, the archive.
+/// Returns the file on disk that a path refers to. For a member such as
+/// `archive.mosc!member!member` this is the archive.
 pub fn outer_file(path: &Path) -> PathBuf {
     split_members(path).0
 }
 
 pub(crate) fn split_members(path: &Path) -> (PathBuf, Vec<String>) {
-    // The file's name may be no UTF-8; its members have names in the archive, which is.
+    // The file name may be invalid UTF-8. The names of members in the archive are valid UTF-8.
     let bytes = path.as_os_str().as_bytes();
     let Some((at, members)) = end_of_archive(bytes)
         .and_then(|at| Some((at, std::str::from_utf8(&bytes[at + 1..]).ok()?)))
@@ -239,7 +239,7 @@ pub(crate) fn split_members(path: &Path) -> (PathBuf, Vec<String>) {
     (PathBuf::from(OsStr::from_bytes(&bytes[..at])), members)
 }
 
-/// `archive.mosc!member`.
+/// Returns `archive.mosc!member`.
 fn member_of(archive: &Path, name: &str) -> PathBuf {
     let mut path = archive.as_os_str().to_owned();
     path.push("!");
@@ -268,7 +268,7 @@ fn assemble(
     Prepared::new(limits, digest, reader.files, reader.texts, splices)
 }
 
-/// Unpacks and decodes one file that is no archive of several.
+/// Unpacks and decodes one file that is not a `.mosc` archive.
 fn open(path: &Path, bytes: Vec<u8>, limits: &Limits) -> NamedText {
     let mut faults = Vec::new();
     let packed = is_gzip(&bytes);
@@ -306,7 +306,8 @@ fn decoded(
     }
 }
 
-/// The characters that XML forbids: so many places are told, and a row of equal ones as one.
+/// Returns faults for the characters that XML forbids. At most `MOST` places are reported, and a
+/// run of equal characters is one place.
 fn forbidden_runs(text: &str) -> Vec<TextFault> {
     const MOST: usize = 8;
     let mut runs: Vec<(usize, char, usize)> = Vec::new();
@@ -355,11 +356,11 @@ fn inflate(path: &Path, packed: &[u8], limits: &Limits, faults: &mut Vec<TextFau
     inflated.bytes
 }
 
-/// Reads the files that `<include>` elements name, each of them once.
+/// Reads the files that `<include>` elements name, each file once.
 struct Includes<'l> {
     limits: &'l Limits,
     boundary: Option<&'l Path>,
-    /// Canonical paths of the texts.
+    /// Indices of the texts by canonical path.
     known: HashMap<PathBuf, usize>,
     files: Vec<FileStamp>,
     texts: Vec<NamedText>,
@@ -440,7 +441,7 @@ impl Includes<'_> {
     fn load(&mut self, path: PathBuf, boundary: &Path, written: &str) -> Result<usize, Refusal> {
         let canonical = foreign::canonicalize(&path).unwrap_or_else(|_| path.clone());
         if let Ok(boundary) = foreign::canonicalize(boundary) {
-            // A symbolic link inside may still lead out.
+            // A symbolic link inside the boundary may still lead out of it.
             if is_there(&path) {
                 inside(&canonical, &boundary, written)?;
             }
@@ -488,9 +489,10 @@ fn inside(path: &Path, boundary: &Path, written: &str) -> Result<(), Refusal> {
     Err((FaultCode::IncludeEscapes, text))
 }
 
-/// A path without `.`, and without the `..` that steps out of a directory. One behind a link, a file or
-/// nothing stays, for there the words alone lead elsewhere than the system, and so than a simulator.
-/// `base` is the directory of a file that was read, which may have been moved away meanwhile.
+/// Returns a path without `.`, and without each `..` that follows a directory. A `..` after a link,
+/// a file or a missing path stays. There, removing it would lead to another file than the system
+/// and a simulator use. `base` is the directory of a file that was read. The directory may have
+/// been moved since.
 pub(crate) fn normal(base: &Path, path: &Path) -> PathBuf {
     let is_left = |normal: &Path| match foreign::symlink_metadata(normal) {
         Ok(data) => data.is_dir(),
@@ -507,13 +509,14 @@ pub(crate) fn normal(base: &Path, path: &Path) -> PathBuf {
     normal
 }
 
-/// The [`normal`] path from the root of the file system.
+/// Returns the absolute [`normal`] path.
 pub(crate) fn absolute(base: &Path, path: &Path) -> PathBuf {
     let from_root = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     normal(&from_root(base), &from_root(path))
 }
 
-/// Whether a path says itself that it leads to a directory: for the system, `map.xodr/` is no file.
+/// Checks whether the spelling of a path means a directory. For the system, `map.xodr/` is not a
+/// file.
 pub(crate) fn names_directory(text: &str) -> bool {
     matches!(text.rsplit(['/', '\\']).next(), Some("" | "." | ".."))
 }

@@ -1,4 +1,4 @@
-//! A document on its way: everything read, nothing parsed.
+//! A prepared document: all files are read, but not yet parsed.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -14,41 +14,41 @@ use crate::read::{FileStamp, sha256};
 use crate::text_fault::TextFault;
 use crate::xml::{Counter, Halt, Input, SourceText, Splice, SpliceKey, parse};
 
-/// Heap set aside for the text of each fault; longer texts are cut.
+/// Heap reserved for the text of each fault. Longer texts are truncated.
 const FAULT_TEXT: usize = 512;
 
-/// A file with all that belongs to its image: its text, the texts of its includes, and what was
-/// wrong with their bytes.
+/// A file with everything that belongs to its image: its text, the texts of its includes, and the
+/// faults of their bytes.
 #[derive(Debug)]
 pub struct Prepared {
     limits: Limits,
-    /// Until it is asked for, that of the root's text may be missing.
+    /// Digest of the root. It may be missing until it is requested.
     digest: OnceLock<[u8; 32]>,
-    /// The files as they were read; the root's digest may be missing.
+    /// The files as they were read. The digest of the root may be missing.
     read: Vec<FileStamp>,
     files: OnceLock<Vec<FileStamp>>,
     texts: Vec<NamedText>,
     splices: HashMap<SpliceKey, Splice>,
-    /// In the image's offsets.
+    /// Faults with offsets of the image.
     faults: Vec<TextFault>,
     capacities: Capacities,
-    /// The image would be too large: it holds the fault alone.
+    /// The image would be too large, so it contains only this fault.
     refused: bool,
 }
 
-/// A text and the path that places in it are named by.
+/// A text and the path that positions in it refer to.
 #[derive(Debug)]
 pub(crate) struct NamedText {
     pub path: PathBuf,
     pub text: String,
     pub faults: Vec<TextFault>,
-    /// The bytes on disk, where the text is not made of the very same ones and they are still needed.
+    /// The bytes on disk, if they differ from the bytes of the text and are still needed.
     pub source: Option<Vec<u8>>,
 }
 
 impl Prepared {
-    /// Puts the parts together and counts how large the image may become. Without a digest, the first
-    /// text is made of the very bytes on disk.
+    /// Combines the parts and computes the maximum size of the image. If `digest` is `None`, the
+    /// bytes of the first text are identical to those on disk.
     pub(crate) fn new(
         limits: &Limits,
         digest: Option<[u8; 32]>,
@@ -83,14 +83,14 @@ impl Prepared {
         prepared
     }
 
-    /// SHA-256 of the root file's bytes on disk (packed, if it is packed; for the member of an
-    /// archive, of the archive).
+    /// Returns the SHA-256 of the root file's bytes on disk. For a packed file these are the packed
+    /// bytes; for a member of an archive, those of the archive.
     pub fn digest(&self) -> [u8; 32] {
         *self.digest.get_or_init(|| sha256(self.text().as_bytes()))
     }
 
-    /// Every file that was read or looked for, the root file first. Whoever watches them knows
-    /// when this document is out of date; together with their digests they identify it.
+    /// Returns every file that was read or looked for, the root file first. Watching these files
+    /// shows when this document is out of date. The files and their digests identify the document.
     pub fn files(&self) -> &[FileStamp] {
         self.files.get_or_init(|| {
             let mut files = self.read.clone();
@@ -101,34 +101,36 @@ impl Prepared {
         })
     }
 
-    /// The path by which the document names its root file: `archive!member` for a member.
+    /// Returns the path of the root file in the document: `archive!member` for a member.
     pub fn path(&self) -> &Path {
         self.texts.first().map_or(Path::new(""), |text| &text.path)
     }
 
-    /// The text of the root file, decoded; for a member of an archive, that of the member.
+    /// Returns the decoded text of the root file. For a member of an archive it is the text of the
+    /// member.
     pub fn text(&self) -> &str {
         self.texts.first().map_or("", |root| &root.text)
     }
 
-    /// Bytes that [`Prepared::build_into`] needs. The image itself is shorter.
+    /// Returns the number of bytes that [`Prepared::build_into`] needs. The image itself is
+    /// shorter.
     pub fn upper_bound(&self) -> usize {
         self.capacities.image_len()
     }
 
-    /// Builds the image into the first bytes of `out` and gives its length. However faulty the
-    /// file is, there is an image; its faults say what it lacks.
+    /// Builds the image into the first bytes of `out` and returns its length. A faulty file also
+    /// gives an image, and its faults describe the missing parts.
     ///
     /// # Errors
-    /// [`BuildError::SmallBuffer`] when `out` is too short; the error's `needed` is exact then and
-    /// enough for the next attempt. It may be less than [`Prepared::upper_bound`], and it may be
-    /// more, when a text holds uncommonly many values that have to be resolved.
+    /// [`BuildError::SmallBuffer`] when `out` is too short. The error's `needed` is then exact and
+    /// sufficient for the next attempt. It may be less than [`Prepared::upper_bound`]. It may be
+    /// more if a text has unusually many values that must be resolved.
     pub fn build_into(&self, out: &mut [u8]) -> Result<usize, BuildError> {
         if self.digest.get().is_some() || !has_cores() {
             return self.build_here(out);
         }
         thread::scope(|scope| {
-            // Without a thread to be had, the digest is taken when the image needs it.
+            // If no thread can be started, the digest is computed when the image needs it.
             let digest = thread::Builder::new().name("qcbus-digest".to_owned());
             let _beside = digest.spawn_scoped(scope, || self.digest());
             self.build_here(out)
@@ -145,11 +147,11 @@ impl Prepared {
         }
     }
 
-    /// Builds the image into memory of its own.
+    /// Builds the image into a new buffer.
     ///
     /// # Panics
-    /// Never: an image that cannot be built is an empty one that [`qcbus_document::Document`]
-    /// refuses to open.
+    /// Never. If the image cannot be built, the result is empty and [`qcbus_document::Document`]
+    /// refuses to open it.
     pub fn build(&self) -> Vec<u8> {
         let mut image = vec![0; self.upper_bound()];
         let len = match self.build_into(&mut image) {
@@ -163,8 +165,9 @@ impl Prepared {
         image
     }
 
-    /// Chooses the capacities: the quick bound where it is plausible, the exact one where it is
-    /// not (a flood of tags) or cannot be had (a file included twice is parsed twice).
+    /// Chooses the capacities. The quick bound is used if it is plausible. Otherwise the exact one
+    /// is used: for a flood of tags, or when files are included (a file included twice is parsed
+    /// twice).
     fn measure(&mut self) {
         let known = self.known();
         let cap = self.max_image();
@@ -189,9 +192,9 @@ impl Prepared {
         }
     }
 
-    /// What is known without a look at the texts.
+    /// Returns the capacities that are known without reading the texts.
     fn known(&self) -> Capacities {
-        // The parser's faults, those of its caps, and those of the bytes.
+        // Faults come from the parser, from its caps and from the bytes.
         let faults = self.limits.max_faults as usize + 2 + self.faults.len();
         let paths: usize = self
             .texts
@@ -214,16 +217,16 @@ impl Prepared {
         Ok(counter.counted)
     }
 
-    /// Offsets have 32 bits, whatever the limit says.
+    /// Returns the maximum image size. Offsets have 32 bits, so a higher limit has no effect.
     fn max_image(&self) -> usize {
         usize::try_from(self.limits.max_image)
             .unwrap_or(usize::MAX)
             .min(u32::MAX as usize)
     }
 
-    /// Gives the document up but for one fault.
+    /// Discards the document and keeps a single fault.
     fn refuse(&mut self, found: usize) {
-        // As long as the text is there.
+        // The digest must be computed before the text is dropped.
         self.digest();
         let exceeded = Exceeded {
             limit: "max_image",
@@ -253,7 +256,7 @@ impl Prepared {
         if !self.refused {
             match parse(&input, &mut builder) {
                 Ok(found) => {
-                    // Where nothing could be had of the bytes, the file is not empty.
+                    // If the bytes could not be read, the fault `Empty` would be wrong.
                     let said = faults.iter().any(|fault| fault.code.makes_partial());
                     let found = found.into_iter();
                     faults.extend(found.filter(|it| !said || it.code != FaultCode::Empty));
@@ -274,7 +277,7 @@ impl Prepared {
         builder.finish(self.digest())
     }
 
-    /// The image of a document that turned out too large only when its values were resolved.
+    /// Builds the image of a document that became too large only when its values were resolved.
     fn attempt_refused(&self, out: &mut [u8]) -> Result<usize, BuildError> {
         let mut refused = Prepared {
             limits: self.limits,
@@ -321,7 +324,7 @@ impl Prepared {
     }
 }
 
-/// Whether something can be done beside something else.
+/// Checks whether the machine can run several threads in parallel.
 fn has_cores() -> bool {
     static SEVERAL: OnceLock<bool> = OnceLock::new();
     *SEVERAL.get_or_init(|| thread::available_parallelism().is_ok_and(|cores| cores.get() > 1))

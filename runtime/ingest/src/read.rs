@@ -1,4 +1,4 @@
-//! Bytes from disk, and a stamp that says which bytes they were.
+//! Reads bytes from disk, with a stamp that identifies them.
 
 use std::fs::{File, Metadata};
 use std::io;
@@ -10,13 +10,13 @@ use sha2::{Digest, Sha256};
 use crate::error::IngestError;
 use crate::limits::{Exceeded, Limits};
 
-/// One file that a document was made from, or that was looked for in vain. Whoever watches these
-/// paths knows when the document is out of date.
+/// One file that a document was made from, or that was looked for and not found. Watching these
+/// paths shows when the document is out of date.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileStamp {
     /// Absolute path.
     pub path: PathBuf,
-    /// What was found there; `None` when the file was missing or could not be read.
+    /// Content found there. `None` when the file was missing or could not be read.
     pub content: Option<Content>,
 }
 
@@ -25,26 +25,27 @@ pub struct FileStamp {
 pub struct Content {
     /// Size on disk in bytes.
     pub size: u64,
-    /// What the system says of the file besides; `None` where bytes came from memory.
+    /// Further data of `stat`. `None` if the bytes came from memory.
     pub stat: Option<Stat>,
     /// SHA-256 of the bytes on disk.
     pub digest: [u8; 32],
 }
 
-/// What `stat` says of a file besides its size. It is of the very moment at which the bytes were
-/// read: nothing in it moved between the first byte and the last.
+/// Data of `stat` except for the size. It is valid for the whole read: none of its values changed
+/// between the first byte and the last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stat {
-    /// Number in the file system.
+    /// Inode number.
     pub inode: u64,
-    /// Time of the last modification, in nanoseconds since 1970; negative before.
+    /// Time of the last modification, in nanoseconds since 1970. Earlier times are negative.
     pub modified_ns: i128,
-    /// Time of the last change of anything, which nobody can set at will.
+    /// Time of the last change of data or metadata (ctime). Users cannot set it to an arbitrary
+    /// value.
     pub changed_ns: i128,
 }
 
 impl Stat {
-    /// What the metadata says.
+    /// Takes the values from the metadata.
     pub fn of(metadata: &Metadata) -> Stat {
         use std::os::unix::fs::MetadataExt;
         let nanoseconds =
@@ -57,21 +58,21 @@ impl Stat {
     }
 }
 
-/// What was read from one file.
+/// Bytes and stamp of one file.
 pub(crate) struct RawFile {
     pub bytes: Vec<u8>,
     pub stamp: FileStamp,
 }
 
 impl RawFile {
-    /// Takes the digest of the bytes, which a file that was just read lacks.
+    /// Computes the digest of the bytes. It is missing after [`read_unhashed`].
     pub fn hash(&mut self) {
         self.stamp.hash(&self.bytes);
     }
 }
 
 impl FileStamp {
-    /// Takes the digest of these bytes, which are the file's.
+    /// Computes the digest. `bytes` must be the bytes of the file.
     pub(crate) fn hash(&mut self, bytes: &[u8]) {
         if let Some(content) = &mut self.content {
             content.digest = sha256(bytes);
@@ -79,18 +80,18 @@ impl FileStamp {
     }
 }
 
-/// Attempts at a file that changes under our hands before it is given up.
+/// Maximum number of attempts to read a file that changes during the read.
 const ATTEMPTS: usize = 3;
 
-/// Reads a whole file and proves, by its metadata before and after, that nobody wrote to it
-/// meanwhile.
+/// Reads a whole file. The metadata before and after prove that the file was not written to in
+/// between.
 pub(crate) fn read_file(path: &Path, limits: &Limits) -> Result<RawFile, IngestError> {
     let mut raw = read_unhashed(path, limits)?;
     raw.hash();
     Ok(raw)
 }
 
-/// As [`read_file`]; the digest is still to be taken.
+/// Reads a file as [`read_file`] does, but without computing the digest.
 pub(crate) fn read_unhashed(path: &Path, limits: &Limits) -> Result<RawFile, IngestError> {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let mut outcome = "changed";
@@ -109,7 +110,7 @@ pub(crate) fn read_unhashed(path: &Path, limits: &Limits) -> Result<RawFile, Ing
     })
 }
 
-/// The stamp of bytes that were handed over instead of read.
+/// Returns the stamp of bytes that were passed in memory.
 pub(crate) fn stamp_of_bytes(path: &Path, bytes: &[u8]) -> FileStamp {
     let content = Content {
         size: bytes.len() as u64,
@@ -122,7 +123,7 @@ pub(crate) fn stamp_of_bytes(path: &Path, bytes: &[u8]) -> FileStamp {
     }
 }
 
-/// SHA-256, as `sha256sum` prints it.
+/// Returns the SHA-256 as `sha256sum` computes it.
 pub(crate) fn sha256(bytes: &[u8]) -> [u8; 32] {
     Sha256::digest(bytes).into()
 }
@@ -133,7 +134,8 @@ enum Attempt {
     Removed,
 }
 
-/// One attempt; `fill` does the reading, so that a test can change the file in its midst.
+/// Makes one attempt to read a file. `fill` does the reading, so that a test can change the file
+/// during it.
 fn read_once(
     path: &Path,
     limits: &Limits,
@@ -177,11 +179,12 @@ fn read_once(
     Ok(Attempt::Stable(RawFile { bytes, stamp }))
 }
 
-/// From this size on, glibc maps what is allocated by itself, and unmaps it when it is freed.
+/// Size from which glibc uses a separate mapping for an allocation and unmaps it when it is freed.
 const OWN_MAPPING: usize = 32 << 20;
 
-/// Has the kernel back a large buffer with huge pages: taking it page by page costs three times as much
-/// as reading into it. A smaller one may lie in a heap, which would keep the advice for all that follows.
+/// Asks the kernel for huge pages for a large buffer, because faulting in small pages costs three
+/// times as much as reading into them. A smaller buffer may be in the heap, which would keep the
+/// advice for later allocations.
 fn ask_for_huge_pages(bytes: &mut Vec<u8>) {
     let room = bytes.spare_capacity_mut();
     if room.len() < OWN_MAPPING {
@@ -192,7 +195,7 @@ fn ask_for_huge_pages(bytes: &mut Vec<u8>) {
     let lead = start.addr().next_multiple_of(page) - start.addr();
     let whole = (room.len() - lead) / page * page;
     let first: *mut std::ffi::c_void = start.wrapping_add(lead).cast();
-    // Where there are none, small ones do.
+    // The error is ignored, because small pages are used if huge ones are not available.
     #[expect(unsafe_code, reason = "madvise takes raw pointers")]
     // SAFETY: the pages lie wholly in the buffer. The advice changes no byte of them.
     let _ = unsafe { rustix::mm::madvise(first, whole, rustix::mm::Advice::LinuxHugepage) };

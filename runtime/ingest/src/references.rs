@@ -1,4 +1,5 @@
-//! What other files a scenario refers to: its map, its catalogs, the scenarios it is built from.
+//! Finds the other files that a scenario refers to: its map, its catalogs and the scenarios that it
+//! is built from.
 
 use std::collections::HashMap;
 use std::fs::DirEntry;
@@ -16,39 +17,39 @@ use crate::prepare::{absolute, names_directory, split_members};
 /// A reference from a document to another file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reference {
-    /// What the file is for: `RoadNetwork/LogicFile` names the map, `CatalogLocations/…/Directory` a
-    /// folder whose `.xosc` files are catalogs, `ScenarioReference` and
-    /// `ParameterValueDistribution/ScenarioFile` scenarios.
+    /// Role of the file. `RoadNetwork/LogicFile` names the map, and `CatalogLocations/…/Directory`
+    /// names a folder whose `.xosc` files are catalogs. `ScenarioReference` and
+    /// `ParameterValueDistribution/ScenarioFile` name scenarios.
     pub role: DocumentRole,
-    /// Of a catalog directory: what kind of catalogs, such as `VehicleCatalog`.
+    /// Kind of catalogs in a catalog directory, such as `VehicleCatalog`.
     pub catalogs: Option<String>,
     /// The reference as written.
     pub text: String,
     /// Offset of the referring element in the document's text.
     pub offset: u32,
-    /// Absolute paths. The first that exists is meant; for a catalog directory each of them is
-    /// a catalog. A member of an archive is `archive!member`.
+    /// Absolute paths. The first existing one is the target; for a catalog directory each of them
+    /// is a catalog. A member of an archive is `archive!member`.
     pub candidates: Vec<PathBuf>,
-    /// The catalog directory itself, for whoever watches it.
+    /// The catalog directory itself, so that a caller can watch it.
     pub directory: Option<PathBuf>,
-    /// Why there is no candidate, or not every one.
+    /// Reason why there is no candidate, or why some candidates are missing.
     pub unresolved: Option<Absence>,
-    /// Whether a modular scenario takes maneuver groups from it.
+    /// Whether a modular scenario takes maneuver groups from the file.
     pub is_library: bool,
 }
 
 impl Reference {
-    /// Whether each of the candidates is meant, not the first that is there.
+    /// Checks whether all candidates are targets, instead of only the first existing one.
     pub fn means_all(&self) -> bool {
         self.role == DocumentRole::Catalog
     }
 }
 
-/// Most files of one catalog directory that are taken for catalogs.
+/// Maximum number of files of one catalog directory that are read as catalogs.
 const MAX_CATALOGS: usize = 1000;
 
-/// The references of a document in document order. Of the file system only the entries of catalog
-/// directories are looked at.
+/// Returns the references of a document in document order. In the file system it reads only the
+/// entries of catalog directories.
 pub fn references(document: &Document<'_>, search: &SearchPath) -> Vec<Reference> {
     let parameters = Parameters::of(document);
     let mut found: Vec<Reference> = targets(document)
@@ -60,7 +61,7 @@ pub fn references(document: &Document<'_>, search: &SearchPath) -> Vec<Reference
     found
 }
 
-/// The referring elements with their references as written.
+/// Returns the referring elements with their references as written.
 fn targets<'d>(document: &Document<'d>) -> Vec<(DocumentRole, Node<'d>, &'d str)> {
     let mut found = Vec::new();
     let mut gather = |role, element: &str, attribute: &str, parent: &dyn Fn(Node<'d>) -> bool| {
@@ -77,7 +78,7 @@ fn targets<'d>(document: &Document<'d>) -> Vec<(DocumentRole, Node<'d>, &'d str)
         node.parent()
             .is_some_and(|above| above.is("CatalogLocations"))
     };
-    // Before OpenSCENARIO 1.0 it was `Logics`.
+    // Before OpenSCENARIO 1.0 the element was called `Logics`.
     for element in ["LogicFile", "Logics"] {
         gather(DocumentRole::Map, element, "filepath", &|parent| {
             parent.is("RoadNetwork")
@@ -121,7 +122,7 @@ fn resolve(
     reference
 }
 
-/// Whether the text can name a file at all.
+/// Checks whether the text can name a file.
 fn check(role: DocumentRole, text: &str) -> Result<(), Absence> {
     let text = text.trim();
     if text.is_empty() {
@@ -169,7 +170,7 @@ fn locate(reference: &mut Reference, from: &Path, text: &str) {
                 reference.unresolved = left_out;
                 return;
             }
-            // Where one spelling is there and of no use, that is the one that is meant.
+            // If one spelling exists but is unusable, it is the intended one.
             Err(found) if why == Absence::NotThere => why = found,
             Err(_) => {}
         }
@@ -178,7 +179,8 @@ fn locate(reference: &mut Reference, from: &Path, text: &str) {
     reference.directory = candidates.into_iter().next();
 }
 
-/// As written first; then what the writer may have meant by `%20`, `file://` and backslashes.
+/// Returns the spellings to try: first as written, then with `%20`, `file://` and backslashes
+/// interpreted.
 fn spellings(text: &str) -> Vec<String> {
     let plain = text.strip_prefix("file://").unwrap_or(text);
     let mut spellings = vec![plain.to_string()];
@@ -214,19 +216,21 @@ fn percent_decoded(text: &str) -> String {
     String::from_utf8(bytes).unwrap_or_else(|_| text.to_string())
 }
 
-/// Relative to the referring file. Maps and catalogs of a scenario in an archive lie beside it.
+/// Returns paths relative to the referring file. Maps and catalogs of a scenario in an archive are
+/// beside the archive.
 fn places(from: &Path, text: &str) -> Vec<PathBuf> {
-    // A `!` that follows no archive is an ordinary character of a name.
+    // A `!` that does not follow an archive is an ordinary character of a name.
     let (file, _) = split_members(from);
     let folder = file.parent().unwrap_or(Path::new(""));
     let joined = folder.join(text);
     vec![absolute(folder, &joined)]
 }
 
-/// The `.xosc` files of a folder by name, and what is said of those that are too many.
+/// Returns the `.xosc` files of a folder, sorted by name. If there are too many, it also returns
+/// the reason for the omission.
 fn catalogs(folder: &Path) -> Result<(Vec<PathBuf>, Option<Absence>), Absence> {
     if foreign::metadata(folder).is_ok_and(|data| data.is_file()) {
-        // Some tools write the catalog's own path.
+        // Some tools write the path of the catalog itself.
         return Ok((vec![folder.to_path_buf()], None));
     }
     let entries = foreign::list(folder).map_err(|error| unlisted(folder, &error))?;
@@ -258,13 +262,14 @@ fn unlisted(folder: &Path, error: &io::Error) -> Absence {
     }
 }
 
-/// Values of the scenario's own parameters, as far as they are plain.
+/// Plain values of the scenario's own parameters.
 pub(crate) struct Parameters<'d> {
     defaults: HashMap<&'d str, &'d str>,
 }
 
 impl<'d> Parameters<'d> {
-    /// The scenario's global declarations; those of catalogs and maneuvers hold in no path.
+    /// Reads the global declarations of the scenario. Declarations in catalogs and maneuvers do not
+    /// apply to paths.
     pub(crate) fn of(document: &Document<'d>) -> Parameters<'d> {
         let global = document
             .root()

@@ -1,4 +1,5 @@
-//! What qcbus itself finds in a set of documents: faults and missing references, whoever demanded what.
+//! Reports the findings of qcbus itself about a set of documents: faults and missing references,
+//! independent of the demanded rules.
 
 use qcbus_document::{Attribute, Document, FaultCode, FaultGroup, Node};
 use qcbus_formats::Verdict;
@@ -7,18 +8,18 @@ use qcbus_formats::pool::{BundleOutcome, Remark};
 use qcbus_formats::xqar::{Issue, Level, Location, Locations};
 use qcbus_messages::{Absence, DocumentRole, MissingDocument, Within};
 
-/// Rule: what the file refers to is there and can be read.
+/// Rule: each referenced file exists and can be read.
 const REFERENCES: &str = "qcbus.dev:qcbus:1.0.0:file.references_resolved";
-/// Rule: what the file rests on is accepted itself.
+/// Rule: each file that the file rests on is accepted itself.
 const RESTS_ON: &str = "qcbus.dev:qcbus:1.0.0:file.rests_on_accepted";
-/// Rule: the file is whole and well-formed.
+/// Rule: the file is complete and well-formed.
 const WELL_FORMED: &str = "qcbus.dev:qcbus:1.0.0:file.well_formed";
 
-/// More of them are counted in one remark.
+/// Maximum number of listed findings. Further references are counted in one finding.
 const MOST: usize = 100;
 
-/// Everything that qcbus itself has to say about a document set. The faults of the root are said only
-/// when no bundle reports an error: theirs say the same and more.
+/// Returns all findings of qcbus itself about a document set. Faults of the root are reported only
+/// if no bundle reports an error. Errors of bundles contain the same information and more.
 pub fn remarks(
     root: &Document<'_>,
     missing: &[MissingDocument],
@@ -31,7 +32,8 @@ pub fn remarks(
         true => Vec::new(),
         false => faults_of_root(root),
     };
-    // Why a scenario cannot be expanded is an error of some bundle, or of a reference that is missing.
+    // If a scenario cannot be expanded, a bundle or a missing reference already reports the reason
+    // as an error.
     let references = missing
         .iter()
         .filter(|it| it.role != DocumentRole::Expanded && !is_blamed(root, it, bundles));
@@ -47,8 +49,8 @@ pub fn remarks(
     remarks
 }
 
-/// Whether a bundle reports an error at the very reference to a scenario that is missing: those that
-/// know modular scenarios say more about it.
+/// Checks whether a bundle reports an error at the same missing reference to a scenario. Bundles
+/// that support modular scenarios give more information about it.
 fn is_blamed(root: &Document<'_>, missing: &MissingDocument, bundles: &[BundleOutcome]) -> bool {
     if missing.role != DocumentRole::Scenario || missing.level != Level::Error {
         return false;
@@ -58,7 +60,8 @@ fn is_blamed(root: &Document<'_>, missing: &MissingDocument, bundles: &[BundleOu
     let Some(own) = own else { return false };
     let is_there = |other: &Locations| match (&own.elsewhere, &other.elsewhere) {
         (None, None) => own.places.first() == other.places.first(),
-        // Where the element is known here, the attribute may be there.
+        // qcbus may know only the element where the bundle knows the attribute, so only the rows
+        // are compared.
         (Some(own), Some(other)) => (&own.path, own.row) == (&other.path, other.row),
         _ => false,
     };
@@ -69,8 +72,8 @@ fn is_blamed(root: &Document<'_>, missing: &MissingDocument, bundles: &[BundleOu
     errors.flat_map(|issue| &issue.locations).any(is_there)
 }
 
-/// What the root refers to and could not be had, each at its reference. What is not known to lead
-/// nowhere keeps the verdict open.
+/// Returns findings for the missing files that the root refers to, each at its reference. If it is
+/// unknown whether a reference has a target, the verdict stays open.
 pub fn missing_references(root: &Document<'_>, missing: &[MissingDocument]) -> Vec<Remark> {
     let listed = missing.iter().take(MOST);
     let mut remarks: Vec<Remark> = listed.map(|it| missing_reference(root, it)).collect();
@@ -127,26 +130,28 @@ fn missing_reference(root: &Document<'_>, missing: &MissingDocument) -> Remark {
     reference_remark(text, open, missing.level, vec![place])
 }
 
-/// Checker of the bundle `qcbus` that says what a file rests on and that is not accepted itself.
+/// Checker of the bundle `qcbus` for files that a file rests on and that are not accepted
+/// themselves.
 pub const RESTS_ON_CHECKER: &str = "qcbus_rests_on";
 
-/// A file that the root rests on, and the verdict on it.
+/// A file that the root rests on, and its verdict.
 #[derive(Debug, Clone, Copy)]
 pub struct Resting<'a> {
-    /// What it is to the root.
+    /// Its role for the root.
     pub role: DocumentRole,
     /// Byte offset of the element of the root that refers to it.
     pub referred_at: u32,
     /// Its absolute path.
     pub path: &'a str,
-    /// The verdict on it; `None` while there is none on these bytes.
+    /// Its verdict. `None` while these bytes have no verdict.
     pub verdict: Option<Verdict>,
-    /// Errors found in it, without those of the files that it rests on.
+    /// Number of errors in it, without those of the files that it rests on.
     pub errors: u64,
 }
 
-/// Says that a file which the root rests on is not accepted itself; `None` if it is accepted. With
-/// `binding`, the verdict on the root depends on it; otherwise it is only told.
+/// Reports that a file which the root rests on is not accepted itself. Returns `None` if it is
+/// accepted. With `binding`, the verdict on the root depends on it; otherwise it is only
+/// information.
 pub fn resting(root: &Document<'_>, it: &Resting<'_>, binding: bool) -> Option<Remark> {
     if it.verdict == Some(Verdict::Accepted) {
         return None;
@@ -167,7 +172,8 @@ pub fn resting(root: &Document<'_>, it: &Resting<'_>, binding: bool) -> Option<R
     Some(rests_on_remark(root, it.referred_at, text, level, open))
 }
 
-/// The remark that nobody judges a file on which another one rests, because it is not watched.
+/// Returns the finding that a file on which another one rests is not checked, because it is not
+/// watched.
 pub fn unwatched(root: &Document<'_>, role: DocumentRole, path: &str, referred_at: u32) -> Remark {
     let what = name_of_role(role);
     let text =
@@ -218,7 +224,7 @@ fn standing_of(it: &Resting<'_>) -> String {
     }
 }
 
-/// The attribute that holds a path, else the element that refers.
+/// Returns the place of the attribute that holds a path, or else of the referring element.
 fn referring_place(root: &Document<'_>, referred_at: u32) -> Locations {
     let mut nodes = root.root().into_iter().flat_map(|node| node.descendants());
     let Some(node) = nodes.find(|node| node.offset() == referred_at) else {
@@ -249,7 +255,7 @@ fn reference_remark(text: String, open: String, level: Level, locations: Vec<Loc
     }
 }
 
-/// The attribute that holds the reference, else the element.
+/// Returns the place of the attribute that holds the reference, or else of the element.
 fn place_of(root: &Document<'_>, missing: &MissingDocument) -> Locations {
     let mut nodes = root.root().into_iter().flat_map(|node| node.descendants());
     let Some(node) = nodes.find(|node| node.offset() == missing.referred_at) else {
@@ -277,7 +283,7 @@ fn place_at(
     description: &str,
 ) -> Locations {
     let position = root.position(offset);
-    // Results count bytes on disk; those of a transcoded file are others than the image's.
+    // Results use byte offsets on disk. The image of a transcoded file has different ones.
     let transcoded = root
         .faults()
         .any(|fault| fault.code == FaultCode::EncodingTranscoded);
@@ -299,8 +305,8 @@ fn place_at(
     }
 }
 
-/// The faults of the root itself for which no bundle was asked: a file of which only a part is known
-/// is not accepted because of what was demanded. None when the file is whole.
+/// Returns the faults of the root itself, for which no bundle was called. A partially known file is
+/// not accepted because of the demanded rules. Returns none if the file is complete.
 pub fn faults_of_root(root: &Document<'_>) -> Vec<Remark> {
     let partial = root.faults().filter(|fault| fault.code.makes_partial());
     let remark = |fault: qcbus_document::Fault<'_>| {

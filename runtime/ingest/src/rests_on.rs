@@ -1,7 +1,9 @@
-//! Which documents of a set its root rests on: a fault of theirs is a fault of whatever runs the root.
+//! Decides which documents of a set the root rests on. A fault of these documents is also a fault
+//! of everything that runs the root.
 //!
-//! The map and the scenarios that a root refers to always count. Of the catalogs in a catalog
-//! directory, only those count that the root takes an entry from: the directory may hold anything.
+//! The map and the scenarios that a root refers to always count. In a catalog directory, only the
+//! catalogs count from which the root takes an entry, because the directory may contain unrelated
+//! files.
 
 use std::collections::BTreeSet;
 
@@ -24,8 +26,8 @@ pub(crate) fn rests_on(set: &[Member<'_>]) -> Vec<bool> {
     set.iter().enumerate().map(counts).collect()
 }
 
-/// The catalogs that entries are taken from. A maneuver of one catalog may take its trajectory from
-/// another one, so that each catalog that is used may lead to further ones.
+/// Returns the catalogs from which entries are taken. A maneuver of one catalog may take its
+/// trajectory from another one. Each used catalog may therefore lead to further ones.
 fn used_catalogs(set: &[Member<'_>]) -> BTreeSet<usize> {
     let mut wanted = Wanted::default();
     for (role, document) in set {
@@ -51,11 +53,11 @@ fn used_catalogs(set: &[Member<'_>]) -> BTreeSet<usize> {
     }
 }
 
-/// The names of the catalogs that are referred to.
+/// Names of the referenced catalogs.
 #[derive(Debug, Default)]
 struct Wanted {
     names: BTreeSet<String>,
-    /// A name cannot be told, so it may be any.
+    /// Whether a name cannot be determined, so that it may be any name.
     any: bool,
 }
 

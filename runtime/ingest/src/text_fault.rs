@@ -1,15 +1,15 @@
-//! What is wrong with a file, before it is known where its text will lie in the image.
+//! Faults of a file, before the offset of its text in the image is known.
 
-/// The sort of a fault; becomes the fault code of the image.
+/// Kind of a fault. It becomes the fault code of the image.
 pub(crate) use qcbus_document::FaultCode as Code;
 
-/// Something wrong at a place of one file's text.
+/// A fault at a place of one file's text.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct TextFault {
     pub code: Code,
     /// Offset into the decoded text of the file.
     pub offset: usize,
-    /// What was found and what is allowed, for a person to read.
+    /// Message for people: the value found and the value allowed.
     pub text: String,
 }
 

@@ -1,4 +1,5 @@
-//! Gzip: maps as `.xodrz` and `.xodr.gz`, told by their first bytes rather than by their names.
+//! Reads gzip: maps as `.xodrz` and `.xodr.gz`, recognized by their first bytes instead of their
+//! names.
 
 use std::io::{ErrorKind, Read};
 
@@ -6,15 +7,15 @@ use flate2::bufread::MultiGzDecoder;
 
 use crate::limits::{Exceeded, Limits};
 
-/// What a gzip stream held.
+/// Content of a gzip stream.
 pub(crate) struct Inflated {
-    /// All of it, or what could be read before `trouble`.
+    /// All bytes, or the bytes before the damage. Empty if a cap was exceeded.
     pub bytes: Vec<u8>,
-    /// Why the stream could not be read to its end.
+    /// Reason why the stream could not be read to its end.
     pub trouble: Option<InflateError>,
 }
 
-/// Why a packed file could not be read to its end.
+/// Reason why a packed file could not be read to its end.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum InflateError {
     #[error("the gzip stream ends early; {read} bytes could be inflated")]
@@ -25,14 +26,14 @@ pub(crate) enum InflateError {
     Exceeded(Exceeded),
 }
 
-/// Whether the bytes begin as a gzip stream does.
+/// Checks whether the bytes begin as a gzip stream.
 pub(crate) fn is_gzip(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0x1f, 0x8b])
 }
 
-/// Inflates every member of a gzip stream, within the caps on size and ratio. Beyond a cap nothing
-/// is kept: a bomb's zeros are of no use to anybody. Of a damaged stream everything before the
-/// damage is kept.
+/// Inflates every member of a gzip stream, within the caps on size and ratio. If a cap is exceeded,
+/// all bytes are discarded, because the content of a zip bomb is useless. For a damaged stream,
+/// everything before the damage is kept.
 pub(crate) fn gunzip(packed: &[u8], limits: &Limits) -> Inflated {
     let cap = inflated_cap(packed.len() as u64, limits.max_unpacked, limits.max_ratio);
     let mut bytes = Vec::new();
@@ -62,10 +63,10 @@ pub(crate) fn gunzip(packed: &[u8], limits: &Limits) -> Inflated {
     Inflated { bytes, trouble }
 }
 
-/// The smaller of the caps on size and on ratio for a stream of `packed` bytes, as an
-/// [`Exceeded`] that only lacks what was found.
+/// Returns the smaller of the caps on size and on ratio for a stream of `packed` bytes. In the
+/// [`Exceeded`], only the value found is missing.
 pub(crate) fn inflated_cap(packed: u64, max_bytes: u64, max_ratio: u32) -> Exceeded {
-    // Below a mebibyte a high ratio harms nobody and is normal for much whitespace.
+    // Below a mebibyte a high ratio is harmless, and it is normal for much white space.
     let by_ratio = packed.saturating_mul(u64::from(max_ratio)).max(1 << 20);
     let (limit, what, allowed) = if by_ratio < max_bytes {
         (

@@ -1,39 +1,39 @@
-//! The arguments, read by hand.
+//! Parsing of the arguments, without a library.
 
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// How the zoo is called.
+/// Usage text of the zoo.
 pub const USAGE: &str = "\
 usage: zoo ANIMAL [--name NAME] [--version TEXT] [--millis N]
            [--instance NAME | --instance-dir DIR] [--launch N] [--die-with-parent]";
 
-/// What a keeper must know.
+/// Arguments of the zoo.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Args {
-    /// Which animal.
+    /// Name of the animal.
     pub animal: String,
-    /// The name that it goes by on the bus, if not its own.
+    /// Name on the bus, if it differs from the animal's own.
     pub name: Option<String>,
-    /// The version that it claims to have.
+    /// Version that it claims.
     pub version: String,
-    /// How long it takes for a job.
+    /// Time that it takes for a job.
     pub takes: Option<Duration>,
     /// Instance by name.
     pub instance: String,
     /// Instance by directory.
     pub instance_dir: Option<PathBuf>,
-    /// Given by the broker that started it.
+    /// Number of the launch, from the broker that started it.
     pub launch: Option<u64>,
     /// Whether it dies with its parent.
     pub die_with_parent: bool,
 }
 
 impl Args {
-    /// Reads the arguments behind the program's name.
+    /// Parses the arguments after the program's name.
     ///
     /// # Errors
-    /// What does not fit, for a person.
+    /// Returns a readable message about the argument that does not fit.
     pub fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Args, String> {
         let mut args = Args {
             animal: String::new(),

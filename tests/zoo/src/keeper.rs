@@ -1,4 +1,5 @@
-//! What all animals have in common: joining the bus, hearing, and how a job is properly answered.
+//! Common code of all animals: joining the bus, receiving messages, and the correct answer to a
+//! job.
 
 use std::collections::VecDeque;
 use std::path::Path;
@@ -18,48 +19,48 @@ use qcbus_messages::{
 
 use crate::{Args, complain};
 
-/// An animal: data and its manners.
+/// An animal: its data and its behaviour.
 #[derive(Debug, Clone, Copy)]
 pub struct Animal {
-    /// What it does, and its name on the bus.
+    /// Its behaviour in words, which is also its name on the bus.
     pub name: &'static str,
     /// Bundle or reporter.
     pub role: Role,
-    /// What it claims: the version of the messages that it speaks, who it is.
+    /// Its claims: the version of the messages and its identity.
     pub claims: Claims,
-    /// How it behaves.
+    /// Its behaviour.
     pub manners: Manners,
 }
 
-/// How an animal behaves. Everything that is not said here is done properly.
+/// Behaviour of an animal. Everything else is done correctly.
 #[derive(Debug, Clone, Copy)]
 pub struct Manners {
-    /// After the welcome.
+    /// Called after the welcome.
     pub welcomed: fn(&mut Peer) -> Mood,
-    /// A job is to be checked; its documents are at hand.
+    /// Called when a job must be checked. Its documents are available.
     pub job: fn(&mut Peer, &Job) -> Mood,
-    /// A result is to be reported.
+    /// Called when a result must be reported.
     pub result: fn(&mut Peer, JobId) -> Mood,
 }
 
-/// What comes next.
+/// Next step after an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mood {
-    /// The loop goes on.
+    /// The loop continues.
     GoOn,
-    /// The process stays and does nothing any more, not even read.
+    /// The process stays but does nothing any more. It does not even read.
     Freeze,
-    /// The process ends as crashed ones do.
+    /// The process ends like a crashed one.
     Die,
 }
 
-/// What is true.
+/// True claims.
 pub const HONEST: Claims = Claims {
     protocol: PROTOCOL_VERSION,
     proves: true,
 };
 
-/// An animal with good manners, to begin with.
+/// An animal with correct behaviour, as a base for the others.
 pub const GOOD: Animal = Animal {
     name: "",
     role: Role::Bundle,
@@ -71,13 +72,13 @@ pub const GOOD: Animal = Animal {
     },
 };
 
-/// Says what it checks: two checkers for every kind of file.
+/// Sends its catalogue: two checkers for every kind of file.
 pub fn introduce(peer: &mut Peer) -> Mood {
     peer.send(&FromPeer::Catalogue(Box::new(catalogue())));
     Mood::GoOn
 }
 
-/// Finds nothing and says so.
+/// Reports that it found no issues.
 pub fn check(peer: &mut Peer, job: &Job) -> Mood {
     answer(peer, job.job);
     Mood::GoOn
@@ -90,7 +91,7 @@ pub fn acknowledge(peer: &mut Peer, job: JobId) -> Mood {
     Mood::GoOn
 }
 
-/// The whole answer to a job without findings.
+/// Sends the whole answer to a job without findings.
 pub fn answer(peer: &mut Peer, job: JobId) {
     for checker in 0..CHECKERS {
         checker_done(peer, job, checker);
@@ -98,7 +99,7 @@ pub fn answer(peer: &mut Peer, job: JobId) {
     peer.send(&FromPeer::JobDone { job, micros: 1 });
 }
 
-/// One checker has ended without findings.
+/// Reports that one checker has ended without findings.
 pub fn checker_done(peer: &mut Peer, job: JobId, checker: u32) {
     peer.send(&FromPeer::CheckersDone {
         job,
@@ -111,10 +112,10 @@ pub fn checker_done(peer: &mut Peer, job: JobId, checker: u32) {
     });
 }
 
-/// Checkers of every animal.
+/// Number of checkers of every animal.
 pub const CHECKERS: u32 = 2;
 
-/// What it checks.
+/// Returns the catalogue of every animal.
 pub fn catalogue() -> Catalogue {
     let checker = |number: u32| CheckerInfo {
         id: format!("check_zoo_{number}").into(),
@@ -136,10 +137,10 @@ pub fn catalogue() -> Catalogue {
     }
 }
 
-/// How often a sign of life is given, and missing documents are asked for again.
+/// Interval of heartbeats, and of repeated requests for missing documents.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
-/// Keeps an animal until the broker lets it go or its manners end it.
+/// Runs an animal until the broker releases it or its behaviour ends it.
 pub fn keep(animal: &'static Animal, args: &Args) -> ExitCode {
     if args.die_with_parent {
         use rustix::process::{Signal, set_parent_process_death_signal};
@@ -179,7 +180,7 @@ pub fn keep(animal: &'static Animal, args: &Args) -> ExitCode {
     }
 }
 
-/// As bundles run that are not to be confined.
+/// Runs a session outside the sandbox, as for bundles that must not be confined.
 fn outside(animal: &'static Animal, args: &Args, instance: &Instance) -> ExitCode {
     let stand = Stand {
         instance,
@@ -192,10 +193,10 @@ fn outside(animal: &'static Animal, args: &Args, instance: &Instance) -> ExitCod
     }
 }
 
-/// Where a session takes place.
+/// Context of a session.
 struct Stand<'a> {
     instance: &'a Instance,
-    /// What its manifest declares; `None`: it is not confined.
+    /// Permissions that the manifest declares. With `None` the session is not confined.
     may: Option<&'a May>,
     number: u32,
 }
@@ -352,7 +353,7 @@ impl Cage {
         }
     }
 
-    /// How long until the job at hand is done; `None`: there is nothing to do.
+    /// Returns the time until the current job is done, or `None` if there is nothing to do.
     fn pause(&mut self) -> Option<Duration> {
         let documents = &self.jobs.front()?.documents;
         let there = |document: &JobDocument| self.peer.document(document.doc).is_some();

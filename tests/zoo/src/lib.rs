@@ -1,8 +1,8 @@
-//! The zoo: small programs that behave on the bus as no bundle or reporter should, each under an
-//! honest name, and one that behaves. Tests of the broker let them loose.
+//! The zoo: small programs ("animals") that misbehave on the bus as bundles or reporters, each
+//! under an honest name. One of them behaves correctly. Tests of the broker run them.
 //!
-//! One animal is one file in `animals/`; [`animals::ANIMALS`] is the list. What they have in common
-//! is in `keeper`: joining, the loop, and how a job is answered when it is answered.
+//! Each animal is one file in `animals/`; [`animals::ANIMALS`] is the list. Their common code is in
+//! `keeper`: joining the bus, the loop, and the answer to a job if there is one.
 
 pub mod animals;
 mod args;

@@ -1,4 +1,5 @@
-//! `zoo ANIMAL [--name NAME] [--version TEXT] [--millis N]` and how to join the bus.
+//! Program `zoo ANIMAL [--name NAME] [--version TEXT] [--millis N]`, with options for joining the
+//! bus.
 
 use std::process::ExitCode;
 

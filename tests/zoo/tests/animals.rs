@@ -1,5 +1,5 @@
-//! The zoo's program. That it is tested also means that it is built with the tests of the workspace,
-//! in which all others find it.
+//! Test of the zoo's program. Because of this test the program is built with the tests of the
+//! workspace, where all other tests find it.
 
 use std::process::Command;
 

@@ -1,23 +1,23 @@
-//! The words of a shell command, as far as they need no shell.
+//! Splits a shell command into words, if no shell is needed for it.
 
 use std::ffi::{OsStr, OsString};
 use std::os::unix::ffi::{OsStrExt, OsStringExt};
 
 use super::WhyCold;
 
-/// A word of a command, with the variables that are filled in for each job.
+/// A word of a command with variables that are filled in for each job.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Word(Vec<Piece>);
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Piece {
-    /// As it stands. An empty one keeps an empty word in quotes.
+    /// Literal text. An empty text represents empty quotes, which still make a word.
     Text(String),
-    /// The value of a variable. Out of quotes a shell splits it and looks for files that it matches.
+    /// Value of a variable. Outside quotes a shell splits it and matches it against file names.
     Variable { name: String, quoted: bool },
 }
 
-/// What a shell knows itself, or sets: their values are no matter of the environment.
+/// Variables that a shell sets or interprets itself. The environment does not determine them.
 const SHELLS_OWN: &[&str] = &[
     "IFS",
     "PWD",
@@ -56,7 +56,7 @@ const SHELLS_OWN: &[&str] = &[
     "_",
 ];
 
-/// Words that a shell acts on itself, whatever programs there are.
+/// Words that a shell executes itself, even if a program of that name exists.
 const BUILTINS: &[&str] = &[
     ".",
     ":",
@@ -138,7 +138,7 @@ const BUILTINS: &[&str] = &[
     "while",
 ];
 
-/// The words of `command`, or why a shell is needed for it.
+/// Returns the words of `command`, or the reason why it needs a shell.
 pub(super) fn words(command: &str) -> Result<Vec<Word>, WhyCold> {
     let mut reader = Reader {
         rest: command.chars().peekable(),
@@ -153,7 +153,7 @@ pub(super) fn words(command: &str) -> Result<Vec<Word>, WhyCold> {
 }
 
 impl Word {
-    /// The word, when it is the same for each job.
+    /// Returns the word, if it is the same for each job.
     pub(super) fn fixed(&self) -> Option<String> {
         let text = |piece: &Piece| match piece {
             Piece::Text(text) => Some(text.clone()),
@@ -162,19 +162,19 @@ impl Word {
         self.0.iter().map(text).collect()
     }
 
-    /// Whether a shell would do something of its own at this word, if it is the first.
+    /// Checks whether a shell would handle this word itself as the first word of a command.
     pub(super) fn is_builtin(&self) -> bool {
         self.fixed()
             .is_none_or(|it| BUILTINS.contains(&it.as_str()) || it.contains('='))
     }
 
-    /// What becomes of it in `environment`: none, one or several arguments.
+    /// Appends the arguments that this word yields in `environment`: none, one or several.
     pub(super) fn fill(
         &self,
         environment: &[(OsString, OsString)],
         arguments: &mut Vec<OsString>,
     ) -> Result<(), WhyCold> {
-        // `None`: nothing of the argument is there yet, and if nothing comes there is none.
+        // `None` means that the argument is still empty. An argument that stays empty is left out.
         let mut open: Option<Vec<u8>> = None;
         for piece in &self.0 {
             match piece {
@@ -198,7 +198,7 @@ fn value<'e>(environment: &'e [(OsString, OsString)], name: &str) -> &'e OsStr {
     found.map_or(OsStr::new(""), |(_, value)| value)
 }
 
-/// Splits the value of a variable out of quotes where a shell does: at white space.
+/// Splits the value of an unquoted variable at white space, as a shell does.
 fn split(
     name: &str,
     value: &OsStr,
@@ -265,7 +265,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Quotes make a word, even an empty one.
+    /// Begins a quoted part. Quotes make a word, even an empty one.
     fn quoted(&mut self) {
         self.word
             .get_or_insert_default()
@@ -344,7 +344,7 @@ mod tests {
         Ok(arguments.into_iter().map(text).collect())
     }
 
-    /// What `sh` makes of the same command.
+    /// Returns the words that `sh` reads from the same command.
     fn by_shell(command: &str) -> Vec<String> {
         let script = format!("set -- {command}\nfor it in \"$@\"; do printf '%s\\0' \"$it\"; done");
         let output = std::process::Command::new("sh")

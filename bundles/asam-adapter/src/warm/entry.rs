@@ -1,4 +1,4 @@
-//! Which Python program a shell would run for a command.
+//! Finds the Python program that a shell would run for a command.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
@@ -11,23 +11,24 @@ use rustix::fs::{Access, access};
 use super::WhyCold;
 use super::command::{Word, words};
 
-/// A Python program that a server can hold, and the arguments that each job gives to it.
+/// A Python program for a fork server, with the arguments of each job.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Entry {
-    /// The interpreter, by its whole path.
+    /// Absolute path of the interpreter.
     pub(super) interpreter: PathBuf,
-    /// Its own options, such as `-sE`.
+    /// Options of the interpreter, such as `-sE`.
     pub(super) options: Vec<String>,
     pub(super) program: Program,
     pub(super) arguments: Vec<Word>,
-    /// What was recognised, where programs were looked for, and from where.
+    /// The recognised command. `path` and `cwd` are the search path and directory used for it.
     command: String,
     pub(super) path: OsString,
     cwd: PathBuf,
 }
 
 impl Entry {
-    /// Whether the command still means the same: another program may have come before this one on the PATH.
+    /// Checks whether the command still runs the same program. A new program may come first on the
+    /// PATH.
     pub(super) fn is_current(&self) -> bool {
         recognise(&self.command, &self.path, &self.cwd).as_ref() == Ok(self)
     }
@@ -35,24 +36,24 @@ impl Entry {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Program {
-    /// A file, by the path that it sees as its own.
+    /// A script with the path that it sees as its own.
     Script(PathBuf),
-    /// `python -m`.
+    /// A module started with `python -m`.
     Module(String),
 }
 
-/// An interpreter, its options, what it runs, and the arguments of that.
+/// An interpreter, its options, the program and the arguments of the program.
 type Parts = (PathBuf, Vec<String>, Program, Vec<Word>);
 
-/// How much of a script is read for its first lines.
+/// Number of bytes of a script that are read for its first lines.
 const HEAD: u64 = 4096;
 
 /// Reads a command as a shell would in `cwd`, with programs in the directories of `path`.
 ///
 /// # Errors
 ///
-/// Why the command is to be run plainly: it needs a shell, its program is not Python, or what it runs depends on the
-/// directory of each job.
+/// The reason why the command must be run plainly: it needs a shell, its program is not Python, or
+/// the program depends on the directory of each job.
 pub fn recognise(command: &str, path: &OsStr, cwd: &Path) -> Result<Entry, WhyCold> {
     let mut words = words(command)?;
     let arguments = words.split_off(1);
@@ -82,7 +83,7 @@ pub fn recognise(command: &str, path: &OsStr, cwd: &Path) -> Result<Entry, WhyCo
     })
 }
 
-/// The file that a shell runs for a name.
+/// Finds the file that a shell runs for a name.
 fn find(name: &str, path: &OsStr, cwd: &Path) -> Result<PathBuf, WhyCold> {
     if name.contains('/') {
         let program = PathBuf::from(name);
@@ -121,7 +122,7 @@ fn head(program: &Path) -> Result<Vec<u8>, WhyCold> {
     Ok(head)
 }
 
-/// `python [options] -m module …` and `python [options] /script.py …`.
+/// Reads `python [options] -m module …` and `python [options] /script.py …`.
 fn by_interpreter(interpreter: PathBuf, arguments: Vec<Word>) -> Result<Parts, WhyCold> {
     let interpreter = checked(interpreter)?;
     let mut arguments = arguments.into_iter();
@@ -172,7 +173,7 @@ fn script(word: &str) -> Result<Program, WhyCold> {
     }
 }
 
-/// An option of the interpreter that changes nothing of what this rests on.
+/// Checks that an option of the interpreter does not affect the assumptions of forked runs.
 fn option(word: String) -> Result<String, WhyCold> {
     let letters = word.strip_prefix('-').unwrap_or_default();
     if !letters.is_empty() && letters.chars().all(|it| "EsIBuPOSbq".contains(it)) {
@@ -184,7 +185,8 @@ fn option(word: String) -> Result<String, WhyCold> {
     }
 }
 
-/// An interpreter that is one: no script in its place that chooses another by the directory, as pyenv's do.
+/// Checks that a file is a real interpreter. A script, such as those of pyenv, may choose another
+/// interpreter by the directory.
 fn checked(interpreter: PathBuf) -> Result<PathBuf, WhyCold> {
     let name = interpreter.file_name().unwrap_or_default().as_bytes();
     let version = name
@@ -208,7 +210,7 @@ fn checked(interpreter: PathBuf) -> Result<PathBuf, WhyCold> {
     }
 }
 
-/// The interpreter of a script by its first line.
+/// Returns the interpreter from the first line of a script.
 fn shebang(program: &Path, head: &[u8], path: &OsStr) -> Result<(PathBuf, Vec<String>), WhyCold> {
     let not_python = || WhyCold::new(format!("`{}` is no Python program", program.display()));
     let head = String::from_utf8_lossy(head);
@@ -219,7 +221,7 @@ fn shebang(program: &Path, head: &[u8], path: &OsStr) -> Result<(PathBuf, Vec<St
         let second = lines.next().and_then(long_shebang);
         return Ok((second.ok_or_else(not_python)?, Vec::new()));
     }
-    // The kernel gives all that follows the interpreter as one argument.
+    // The kernel passes the text after the interpreter as one argument.
     let (interpreter, argument) = match first.split_once([' ', '\t']) {
         Some((interpreter, argument)) => (interpreter, Some(argument.trim())),
         None => (first, None),
@@ -234,8 +236,8 @@ fn shebang(program: &Path, head: &[u8], path: &OsStr) -> Result<(PathBuf, Vec<St
     Ok((PathBuf::from(interpreter), options.into_iter().collect()))
 }
 
-/// pip's second line where the path of the interpreter is too long for the kernel, or has a space:
-/// `'''exec' "/a/long/path/python" "$0" "$@"`.
+/// Reads pip's second line, `'''exec' "/a/long/path/python" "$0" "$@"`. pip writes it if the path
+/// of the interpreter has a space or is too long for the kernel.
 fn long_shebang(line: &str) -> Option<PathBuf> {
     let command = line.strip_prefix("'''exec' ")?;
     let command = command.trim_end().strip_suffix(" \"$0\" \"$@\"")?;

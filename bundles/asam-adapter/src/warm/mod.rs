@@ -1,12 +1,14 @@
-//! Warm runs: one Python interpreter imports a checker module once and forks a process for each job.
+//! Forked runs: one Python interpreter imports a checker module once and forks a process for each
+//! job.
 //!
-//! Importing is most of what a one-shot module costs for a small file. [`recognise`] reads the command of a manifest and
-//! says what Python program a shell would run for it; a [`Server`] is an interpreter that has executed the imports with which
-//! that program begins; [`Server::spawn`] forks it, and the fork executes the program from its first line, as `__main__`,
-//! with arguments, environment, directory and streams of its own. Nothing that a job does is seen by the next.
+//! For a small file most of the time of an ASAM module is spent on imports. [`recognise`] finds the
+//! Python program that a shell would run for the command of a manifest. A [`Server`] is an
+//! interpreter that has executed the first imports of that program. [`Server::spawn`] forks it. The
+//! fork executes the program from its first line as `__main__`, with its own arguments,
+//! environment, directory and streams. A job cannot affect the next one.
 //!
-//! A warm run must be a plain one, only sooner. What cannot be known to be so is not done: [`WhyCold`] says why, and the
-//! caller runs the command plainly.
+//! A forked run must give the same results as a plain run. If this is not certain, [`WhyCold`] says
+//! why, and the caller runs the command plainly.
 
 mod command;
 mod entry;
@@ -17,7 +19,7 @@ mod wire;
 pub use entry::{Entry, recognise};
 pub use server::{Limits, Run, Server, SpawnError};
 
-/// Why a program is run plainly: a sentence for people, after "not kept warm: ".
+/// Reason why a program is run plainly: a sentence for users, after "not kept warm: ".
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct WhyCold(String);

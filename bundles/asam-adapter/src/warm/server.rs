@@ -1,4 +1,4 @@
-//! The interpreter that is forked for each job, seen from outside.
+//! The fork server: the interpreter that is forked for each job, as seen by its parent.
 
 use std::collections::VecDeque;
 use std::ffi::{OsStr, OsString};
@@ -21,40 +21,42 @@ use super::stamps::{self, Stamps};
 use super::wire::{self, Answer};
 use super::{Entry, WhyCold};
 
-/// What the interpreter executes.
+/// Python code that the interpreter executes.
 const SERVER: &str = concat!(include_str!("watch.py"), include_str!("server.py"));
 
-/// How much memory what an import prints may take, in bytes, on each of its two streams. Far less than that is too much to
-/// be kept warm, so that a write that is refused here, and not heard of, loses nothing.
+/// Maximum size of the output of an import in memory, in bytes, for each of its two streams. The
+/// fork server already rejects far less output, so a write that fails silently at this limit loses
+/// nothing.
 const PRINTS: u64 = 16 << 20;
 
-/// How much of it is read, when the interpreter has ended, for a reason.
+/// Number of bytes of this output that are searched for a reason when the interpreter has ended.
 const REASON: usize = 64 << 10;
 
-/// How long a fork is waited for.
+/// Time limit for the answer to a fork request.
 const ANSWER: Duration = Duration::from_secs(30);
 
-/// What a process may use. `None`: as much as the caller.
+/// Resource limits of a process. `None` means the limits of the caller.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Limits {
-    /// Bytes of private memory (`RLIMIT_DATA`).
+    /// Private memory in bytes (`RLIMIT_DATA`).
     pub memory: Option<u64>,
-    /// Seconds of CPU (`RLIMIT_CPU`).
+    /// CPU time in seconds (`RLIMIT_CPU`).
     pub cpu_seconds: Option<u64>,
-    /// Bytes of a file that it writes (`RLIMIT_FSIZE`).
+    /// Size of a written file in bytes (`RLIMIT_FSIZE`).
     pub file_size: Option<u64>,
 }
 
-/// A job: what differs from one to the next.
+/// A job: all values that differ between jobs.
 #[derive(Debug, Clone, Copy)]
 pub struct Run<'r> {
-    /// All variables. Those that are not of a job (`ASAM_QC_FRAMEWORK_…`, `QCBUS_…`) are the server's.
+    /// All environment variables. Except for those of the job (`ASAM_QC_FRAMEWORK_…`, `QCBUS_…`),
+    /// they must equal the server's variables.
     pub environment: &'r [(OsString, OsString)],
-    /// Its working directory, by its whole path.
+    /// Absolute path of the working directory.
     pub cwd: &'r Path,
-    /// What it may use.
+    /// Resource limits of the job.
     pub limits: Limits,
-    /// Its standard streams.
+    /// Standard input. All three streams belong to the job.
     pub stdin: BorrowedFd<'r>,
     /// See [`Run::stdin`].
     pub stdout: BorrowedFd<'r>,
@@ -62,46 +64,47 @@ pub struct Run<'r> {
     pub stderr: BorrowedFd<'r>,
 }
 
-/// Why a job does not run.
+/// Reason why a job does not run.
 #[derive(Debug, thiserror::Error)]
 pub enum SpawnError {
-    /// This job is to be run plainly. The server goes on.
+    /// This job must be run plainly. The server stays usable.
     #[error("{0}")]
     Cold(#[from] WhyCold),
-    /// What the server has loaded is no longer what is installed: end it, start another.
+    /// The loaded program is not the installed one. The caller must start another server.
     #[error("{0} has changed since it was loaded")]
     Outdated(String),
-    /// The server has gone, or does not answer: end it, start another.
+    /// The server has ended or does not answer. The caller must end it and start another.
     #[error("{0}")]
     Gone(#[from] io::Error),
 }
 
-/// An interpreter that has loaded a program: a child of the caller, who gets a process for each job.
+/// An interpreter that has loaded a program. It is a child of the caller and forks a process for
+/// each job.
 ///
-/// It ends when it is dropped, and dies with the thread that has started it. Its jobs do not: they are processes of their
-/// own, which go to the nearest subreaper when it ends before them.
+/// It ends when it is dropped or when the thread that started it ends. Its jobs continue as
+/// processes of their own. The nearest subreaper adopts them if the server ends before them.
 #[derive(Debug)]
 pub struct Server {
     entry: Entry,
     environment: Vec<(OsString, OsString)>,
     socket: UnixStream,
-    /// By descriptor, so that no other process can be meant.
+    /// Process descriptor. Unlike a process id it cannot refer to another process.
     process: OwnedFd,
     pid: u32,
     stamps: Stamps,
     running: Vec<u32>,
-    /// Ends that came while another answer was waited for.
+    /// Ends of jobs that arrived during the wait for another answer.
     ended: VecDeque<(u32, ExitStatus)>,
 }
 
 impl Server {
-    /// Starts an interpreter and waits until it has loaded the program, for at most `patience`. `limits` is what loading may
-    /// use; of it only `memory` counts.
+    /// Starts an interpreter and waits at most `patience` until it has loaded the program. Only
+    /// `memory` of `limits` applies to the loading.
     ///
     /// # Errors
     ///
-    /// Why the program is to be run plainly: it cannot be loaded ahead, or what loading does would be another thing in
-    /// each job.
+    /// The reason why the program must be run plainly: it cannot be loaded in advance, or loading
+    /// has other effects in each job.
     pub fn start(
         entry: &Entry,
         environment: &[(OsString, OsString)],
@@ -138,7 +141,7 @@ impl Server {
         })
     }
 
-    /// Runs the program for a job, as a process that leads its own session.
+    /// Runs the program for a job as a process that leads its own session.
     ///
     /// # Errors
     ///
@@ -165,12 +168,13 @@ impl Server {
         }
     }
 
-    /// A job that has ended, and how. Does not wait; is worth a call when [`Server::as_fd`] is readable, and after a
-    /// [`Server::spawn`].
+    /// Returns a job that has ended and its exit status, without waiting. Call it when
+    /// [`Server::as_fd`] is readable, and after [`Server::spawn`].
     ///
     /// # Errors
     ///
-    /// The server has ended. [`Server::running`] are then processes of the nearest subreaper.
+    /// The server has ended. The [`Server::running`] processes then belong to the nearest
+    /// subreaper.
     pub fn ended(&mut self) -> io::Result<Option<(u32, ExitStatus)>> {
         while self.ended.is_empty() && wire::is_readable(self.socket.as_fd())? {
             match wire::answer(&self.socket).map_err(|error| self.gone(error))? {
@@ -181,13 +185,13 @@ impl Server {
         Ok(self.ended.pop_front())
     }
 
-    /// The jobs that have not ended, as far as it is known.
+    /// Returns the jobs that are not known to have ended.
     #[must_use]
     pub fn running(&self) -> &[u32] {
         &self.running
     }
 
-    /// The process of the interpreter.
+    /// Returns the process id of the interpreter.
     #[must_use]
     pub fn id(&self) -> u32 {
         self.pid
@@ -198,7 +202,7 @@ impl Server {
         self.ended.push_back((pid, ExitStatus::from_raw(status)));
     }
 
-    /// What a shell would give to the program in the environment of this job.
+    /// Returns the arguments that a shell would pass to the program in the environment of this job.
     fn arguments(&self, run: &Run<'_>) -> Result<Vec<OsString>, WhyCold> {
         let theirs = plain(run.environment);
         if let Some(name) = difference(&plain(&self.environment), &theirs) {
@@ -262,9 +266,9 @@ impl Drop for Server {
     }
 }
 
-/// Kills an interpreter and takes its status.
+/// Kills an interpreter and reaps it.
 fn end(process: &OwnedFd) {
-    // Both fail only when it has ended, and whoever waits for all children has taken its status.
+    // Both fail only if the process has ended and another wait for children has reaped it.
     let _ = pidfd_send_signal(process, Signal::KILL);
     let _ = waitid(WaitId::PidFd(process.as_fd()), WaitIdOptions::EXITED);
 }
@@ -274,7 +278,7 @@ struct Starting {
     socket: UnixStream,
     process: OwnedFd,
     pid: u32,
-    /// What is written to its standard error, by itself or by what it loads.
+    /// Standard error of the interpreter and of the code that it loads.
     errors: std::fs::File,
 }
 
@@ -313,7 +317,7 @@ impl Starting {
         })
     }
 
-    /// The files that were loaded.
+    /// Waits for the loading and returns the loaded files.
     fn wait(&mut self, patience: Duration) -> Result<Vec<std::path::PathBuf>, WhyCold> {
         let broken =
             |error: io::Error| WhyCold::new(format!("its interpreter cannot be heard: {error}"));
@@ -321,7 +325,8 @@ impl Starting {
             .set_read_timeout(Some(patience))
             .map_err(broken)?;
         let answer = wire::answer(&self.socket).map_err(|error| self.silence(&error, patience))?;
-        // From now on an answer is a matter of milliseconds. One that is stopped must not stop its caller for good.
+        // From here an answer takes milliseconds. A stopped interpreter must not block its caller
+        // forever.
         self.socket.set_read_timeout(Some(ANSWER)).map_err(broken)?;
         self.socket
             .set_write_timeout(Some(ANSWER))
@@ -357,7 +362,7 @@ impl Starting {
 
 fn process(mut child: Child) -> io::Result<OwnedFd> {
     let pid = Pid::from_child(&child);
-    // Nobody has waited for it yet, so that it is still this process.
+    // The child is not reaped yet, so the id still refers to it.
     pidfd_open(pid, PidfdFlags::empty()).map_err(|error| {
         let _ = child.kill();
         let _ = child.wait();
@@ -365,7 +370,7 @@ fn process(mut child: Child) -> io::Result<OwnedFd> {
     })
 }
 
-/// A file in memory that takes [`PRINTS`] bytes and no more.
+/// Creates a file in memory that takes at most [`PRINTS`] bytes.
 fn bounded_file() -> io::Result<std::fs::File> {
     let flags = MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING;
     let file = memfd_create(c"qcbus-warm", flags)?;
@@ -380,8 +385,8 @@ fn bounded_file() -> io::Result<std::fs::File> {
 )]
 fn die_with_caller(command: &mut Command) {
     let caller = std::process::id();
-    // SAFETY: between fork and exec only prctl and getppid are called, which are async-signal-safe; nothing is allocated
-    // and no lock is taken.
+    // SAFETY: only prctl and getppid are called between fork and exec, and both are
+    // async-signal-safe; nothing is allocated and no lock is taken.
     unsafe {
         command.pre_exec(move || {
             if libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) != 0 {
@@ -396,7 +401,8 @@ fn die_with_caller(command: &mut Command) {
     }
 }
 
-/// Refuses environments in which an interpreter does other things in each directory, or at its end.
+/// Rejects environments in which an interpreter behaves differently in each directory or at its
+/// end.
 fn check_environment(entry: &Entry, environment: &[(OsString, OsString)]) -> Result<(), WhyCold> {
     for (name, value) in environment {
         let set = !value.is_empty();
@@ -417,7 +423,7 @@ fn check_environment(entry: &Entry, environment: &[(OsString, OsString)]) -> Res
     Ok(())
 }
 
-/// The variables that are the same for each job, in order.
+/// Returns the variables that are the same for each job, sorted.
 fn plain(environment: &[(OsString, OsString)]) -> Vec<&(OsString, OsString)> {
     let of_job = |name: &OsStr| {
         let name = name.as_encoded_bytes();
@@ -448,7 +454,7 @@ fn difference<'e>(
     missing(theirs, ours).or_else(|| missing(ours, theirs))
 }
 
-/// `python -m` looks for modules in the working directory first.
+/// Rejects a directory with importable files: `python -m` searches it first.
 fn nothing_to_import(cwd: &Path) -> Result<(), WhyCold> {
     let unreadable = |error: io::Error| {
         WhyCold::new(format!(

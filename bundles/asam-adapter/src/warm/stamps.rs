@@ -1,4 +1,4 @@
-//! Whether files are still those that they were.
+//! Detection of changed files.
 
 use std::ffi::OsString;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
 
-/// Files, and what told them from others when they were looked at.
+/// Files, each with its fingerprint at the time of the check.
 #[derive(Debug)]
 pub(super) struct Stamps(Vec<(PathBuf, Option<Fingerprint>)>);
 
@@ -22,13 +22,14 @@ enum Fingerprint {
         modified: (i64, i64),
         changed: (i64, i64),
     },
-    /// A hash of the names in it that can be imported. Results may be written there.
+    /// Hash of the importable names in it. Other files, such as results, may be written there.
     Directory(u64),
 }
 
-/// A time that every file of before is older than, and no file that is changed from now on.
+/// Returns a time after all earlier changes of files and not after any future change.
 ///
-/// File systems take their times from a clock that goes in steps of some milliseconds: it is the next of those.
+/// File systems take their times from a clock with steps of some milliseconds. The result is the
+/// next step.
 pub(super) fn now() -> (i64, i64) {
     let coarse = || {
         let now = clock_gettime(ClockId::RealtimeCoarse);
@@ -42,8 +43,8 @@ pub(super) fn now() -> (i64, i64) {
 }
 
 impl Stamps {
-    /// Looks at `files`, which somebody has read since `begun`, a time that [`now`] gave. Gives the file that changed meanwhile, if one did: what was
-    /// read may have been either.
+    /// Fingerprints `files`, which were read after `begun`, a time from [`now`]. Returns a file
+    /// that changed meanwhile as error, because it is unknown which version was read.
     pub(super) fn of(files: Vec<PathBuf>, begun: (i64, i64)) -> Result<Stamps, PathBuf> {
         let mut stamps = Vec::new();
         for file in files {
@@ -57,7 +58,7 @@ impl Stamps {
         Ok(Stamps(stamps))
     }
 
-    /// A file that is no longer the same.
+    /// Returns a file that has changed, if there is one.
     pub(super) fn changed(&self) -> Option<&Path> {
         let changed = self.0.iter().find(|(file, stamp)| look(file) != *stamp);
         changed.map(|(file, _)| file.as_path())
@@ -93,7 +94,7 @@ fn importable(directory: &Path) -> Option<u64> {
     Some(hasher.finish())
 }
 
-/// Whether Python would look at an entry of a directory for modules: sources, libraries, and directories.
+/// Checks whether Python may import a directory entry: a source, a library or a directory.
 pub(super) fn is_importable(name: &std::ffi::OsStr, entry: &std::fs::DirEntry) -> bool {
     let name = name.as_bytes();
     let module = [&b".py"[..], b".pyc", b".so", b".pth"];

@@ -1,5 +1,5 @@
-//! What goes between a server and whoever started it: frames of a length and fields between zero bytes, which neither a
-//! path nor an argument nor a variable can have.
+//! Protocol between a fork server and its parent. A frame has a length and fields separated by zero
+//! bytes. Paths, arguments and variables cannot contain zero bytes.
 
 use std::ffi::OsString;
 use std::io::{self, IoSlice, Read, Write};
@@ -13,25 +13,25 @@ use rustix::net::{SendAncillaryBuffer, SendAncillaryMessage, SendFlags, sendmsg}
 
 use super::Run;
 
-/// What a server says.
+/// Answer of a fork server.
 #[derive(Debug)]
 pub(super) enum Answer {
-    /// The program is loaded, out of these files.
+    /// The program is loaded from these files.
     Ready(Vec<PathBuf>),
-    /// It cannot be held.
+    /// The program cannot be loaded in advance.
     Cold(String),
-    /// A job runs as this process.
+    /// The job runs as this process.
     Pid(u32),
-    /// A job could not be begun.
+    /// The job could not be started.
     Failed(String),
-    /// A job has ended, with this status as `waitpid` gives it.
+    /// The job has ended with this `waitpid` status.
     End(u32, i32),
 }
 
-/// No answer is longer: paths of a thousand files are some 100 kB.
+/// Maximum length of an answer. The paths of a thousand files need about 100 kB.
 const LONGEST: usize = 16 << 20;
 
-/// Asks for a job.
+/// Requests a job.
 pub(super) fn ask(socket: &UnixStream, run: &Run<'_>, arguments: &[OsString]) -> io::Result<()> {
     let body = request(run, arguments);
     let length = u32::try_from(body.len())
@@ -61,7 +61,7 @@ fn request(run: &Run<'_>, arguments: &[OsString]) -> Vec<u8> {
     fields.extend([limits.memory, limits.cpu_seconds, limits.file_size].map(number));
     fields.push(arguments.len().to_string().into_bytes());
     fields.extend(arguments.iter().map(|it| it.as_bytes().to_vec()));
-    // As a shell sets it.
+    // A shell sets this variable in the same way.
     fields.push([b"PWD=", run.cwd.as_os_str().as_bytes()].concat());
     for (name, value) in run.environment.iter().filter(|(name, _)| name != "PWD") {
         fields.push([name.as_bytes(), b"=", value.as_bytes()].concat());
@@ -69,7 +69,7 @@ fn request(run: &Run<'_>, arguments: &[OsString]) -> Vec<u8> {
     fields.join(&0)
 }
 
-/// Reads the next answer; waits for it.
+/// Waits for the next answer and reads it.
 pub(super) fn answer(mut socket: &UnixStream) -> io::Result<Answer> {
     let mut length = [0; 4];
     socket.read_exact(&mut length)?;
@@ -98,7 +98,7 @@ fn read(kind: &[u8], fields: &[&[u8]]) -> Option<Answer> {
     }
 }
 
-/// Whether there is something to read, or the end.
+/// Checks whether data or the end of the stream can be read.
 pub(super) fn is_readable(fd: BorrowedFd<'_>) -> io::Result<bool> {
     use rustix::event::{PollFd, PollFlags, Timespec, poll};
     let mut fds = [PollFd::from_borrowed_fd(fd, PollFlags::IN)];

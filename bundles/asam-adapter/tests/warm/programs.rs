@@ -1,6 +1,6 @@
-//! The modules of the programs that are run: each has a `main`.
+//! The modules of the test programs. Each has a `main`.
 
-/// How each ends: its name, its exit code (none: by a signal), what it is.
+/// Programs with their endings: name, exit code (none if a signal ends it), module text.
 pub const ENDS: &[(&str, Option<i32>, &str)] = &[
     (
         "normal",
@@ -302,7 +302,7 @@ def main():
     ),
 ];
 
-/// Those that are not kept warm, and why. Their `main` does nothing.
+/// Programs that must not run in a fork server, with the reason. Their `main` does nothing.
 pub const REFUSED: &[(&str, &str, &str)] = &[
     (
         "threads",

@@ -1,4 +1,4 @@
-//! Where programs are written, and run in both ways.
+//! A workshop that writes test programs and runs them in both ways.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -12,10 +12,10 @@ use std::time::Duration;
 use qcbus_asam_adapter::warm::{Limits, Run, Server, WhyCold, recognise};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-/// Against hanging only.
+/// Timeout against hanging tests.
 pub const WATCHDOG: Duration = Duration::from_secs(120);
 
-/// What a run leaves.
+/// Result of a run.
 #[derive(Debug, PartialEq)]
 pub struct Outcome {
     pub status: ExitStatus,
@@ -24,14 +24,15 @@ pub struct Outcome {
     pub files: BTreeMap<String, String>,
 }
 
-/// A directory with programs (`bin`), modules (`lib`) and a place to run in (`run`).
+/// A directory with programs (`bin`), modules (`lib`) and a working directory for runs (`run`).
 pub struct Workshop {
     root: tempfile::TempDir,
     pub python: PathBuf,
 }
 
 impl Workshop {
-    /// `None`, loudly, where there is no Python that can be forked.
+    /// Creates a workshop. Returns `None` and prints a message if there is no Python that can be
+    /// forked.
     pub fn new() -> Option<Workshop> {
         let asks = "import os, sys; os.pidfd_open; assert sys.version_info >= (3, 9); print(sys.executable)";
         let output = Command::new("python3").args(["-c", asks]).output();
@@ -72,7 +73,8 @@ impl Workshop {
         path
     }
 
-    /// As pip writes it: a module `NAME_main`, and a script that calls its `main`.
+    /// Writes a program in the form that pip generates: a module `NAME_main`, and a script that
+    /// calls its `main`.
     pub fn console(&self, name: &str, module: &str) {
         self.module(&format!("{name}_main.py"), module);
         let python = self.python.display();
@@ -117,7 +119,8 @@ impl Workshop {
     pub fn plain(&self, command: &str, environment: &[(OsString, OsString)]) -> Outcome {
         self.within(|stdin, stdout, stderr| {
             let mut run = Command::new("sh");
-            // Without the shell, which would put its own words on a death by a signal.
+            // `exec` replaces the shell, which would otherwise print its own message when a signal
+            // kills the program.
             run.args(["-c", &format!("exec {command}")])
                 .env_clear()
                 .envs(environment.iter().cloned());
@@ -149,7 +152,7 @@ impl Workshop {
         })
     }
 
-    /// Gives streams to a run, and takes what it has left.
+    /// Passes streams to a run and collects its output.
     pub fn within(&self, run: impl FnOnce(File, File, File) -> ExitStatus) -> Outcome {
         let directory = self.path("run");
         fs::remove_dir_all(&directory).unwrap();
@@ -173,7 +176,8 @@ impl Workshop {
         }
     }
 
-    /// Runs a command plainly, and twice by one server; gives what all three leave.
+    /// Runs a command plainly and twice in one server. Returns the common outcome of all three
+    /// runs.
     pub fn same(&self, command: &str) -> Outcome {
         let environment = self.environment(&[
             ("ASAM_QC_FRAMEWORK_CONFIG_FILE", "/a b/c.xml"),
@@ -190,7 +194,7 @@ impl Workshop {
     }
 }
 
-/// Objects are shown by where they lie, which is by chance.
+/// Removes the random addresses that Python shows for objects.
 pub fn without_addresses(text: &str) -> String {
     let mut parts = text.split(" at 0x");
     let mut all = parts.next().unwrap_or_default().to_owned();

@@ -1,4 +1,4 @@
-//! The groups that end up in the expanded scenario, and where their values are written.
+//! Groups in the expanded scenario that come from other files, and the origins of their values.
 
 use std::collections::HashMap;
 
@@ -11,34 +11,35 @@ use qcbus_sdk::modular::{Copy, Followed, OFFERS, Spot, Use, Value, offered};
 
 use crate::assembly::Assembly;
 
-/// A group of another file in the expanded scenario, and who takes it.
+/// A group of another file in the expanded scenario, with the reference that takes it.
 #[derive(Clone, Copy)]
 pub struct Taken<'a, 'd> {
-    /// The reference of the root that takes it.
+    /// The reference in the root that takes the group.
     pub reference: &'a Followed<'d>,
-    /// Which of the things that the reference takes.
+    /// The use within the reference.
     pub one: &'a Use<'d>,
-    /// The group with what is replaced in it.
+    /// The group with its replaced values.
     pub copy: &'a Copy<'d>,
 }
 
 impl<'d> Taken<'_, 'd> {
-    /// Where the root says that the group is taken.
+    /// Returns the spot at which the root takes the group.
     pub fn at(&self) -> Spot<'d> {
         taken_at(self.reference, self.one)
     }
 
-    /// What the group is called in its own file.
+    /// Returns the name of the group in its own file.
     pub fn own_name(&self) -> &'d str {
         self.copy.group.attr("name").unwrap_or("")
     }
 
-    /// The elements of the group, itself first.
+    /// Returns the elements of the group, with the group itself first.
     pub fn elements(&self) -> impl Iterator<Item = Node<'d>> + use<'d> {
         std::iter::once(self.copy.group).chain(self.copy.group.descendants())
     }
 
-    /// The attributes with the values that they get; what only concerns expansion is left out.
+    /// Returns the attributes with their resulting values, except those that only concern
+    /// expansion.
     pub fn values(&self) -> impl Iterator<Item = (Attribute<'d>, &str)> {
         let attributes = self.elements().flat_map(|node| node.attributes());
         attributes
@@ -46,7 +47,7 @@ impl<'d> Taken<'_, 'd> {
             .map(|attribute| (attribute, self.value(attribute)))
     }
 
-    /// The value that an attribute gets.
+    /// Returns the resulting value of an attribute.
     pub fn value<'s>(&'s self, attribute: Attribute<'d>) -> &'s str {
         match self.copy.edit(attribute) {
             Some(value) => &value.text,
@@ -54,7 +55,7 @@ impl<'d> Taken<'_, 'd> {
         }
     }
 
-    /// The attributes whose values are replaced, but for the group's name.
+    /// Returns the attributes with replaced values, except the name of the group.
     pub fn edited(&self) -> impl Iterator<Item = (Attribute<'d>, &Value)> {
         let is_edited = !self.copy.edits.is_empty();
         let elements = self.elements().filter(move |_| is_edited);
@@ -66,7 +67,7 @@ impl<'d> Taken<'_, 'd> {
     }
 }
 
-/// Where a referring file says what it takes.
+/// Returns the spot at which a referring file names the groups that it takes.
 pub fn taken_at<'d>(reference: &Followed<'d>, one: &Use<'d>) -> Spot<'d> {
     match one.node == reference.node {
         true => Spot::of(reference.node, "scenarioFileName"),
@@ -75,8 +76,7 @@ pub fn taken_at<'d>(reference: &Followed<'d>, one: &Use<'d>) -> Spot<'d> {
 }
 
 impl<'d> Assembly<'d> {
-    /// The groups of other files that are in the expanded scenario, in the order in which they are
-    /// referred to.
+    /// Returns the groups of other files in the expanded scenario, in the order of the references.
     pub fn taken(&self) -> impl Iterator<Item = Taken<'_, 'd>> {
         let of_root = self.expansion.references.iter();
         let of_root = of_root.filter(|reference| reference.piece == 0);
@@ -92,7 +92,7 @@ impl<'d> Assembly<'d> {
         })
     }
 
-    /// The document of a piece.
+    /// Returns the document of a piece.
     pub fn piece(&self, piece: usize) -> Document<'d> {
         let pieces = &self.expansion.pieces;
         pieces
@@ -100,7 +100,7 @@ impl<'d> Assembly<'d> {
             .map_or(self.root(), |piece| piece.document)
     }
 
-    /// The scenario that refers to the others, as it is written, with its catalogs: what it declares.
+    /// Returns the referring scenario as it is written, with its catalogs and declarations.
     pub fn declaring(&self) -> Option<Scenario<'d>> {
         let catalogs = self.subject.with_role(DocumentRole::Catalog);
         Scenario::new(&Inputs {
@@ -121,35 +121,35 @@ impl<'d> Assembly<'d> {
         })
     }
 
-    /// The version that the header of a document names.
+    /// Returns the version that the header of a document names.
     pub fn version_of(&self, document: Document<'d>) -> Option<Version> {
         qcbus_schema::version_of(&document, FileKind::Xosc)
     }
 }
 
-/// What people call a document: its file's name, of a member with that of its archive.
+/// Returns the file name of a document. For an archive member, the archive's name is included.
 pub fn short_name<'d>(document: Document<'d>) -> &'d str {
     name_of(document.path())
 }
 
-/// A value that replaces another, where it is written.
+/// The place at which a replacing value is written.
 #[derive(Clone, Copy)]
 pub enum WrittenAt<'d> {
-    /// The value of a `ParameterReference`: its key, and the attribute.
+    /// The value of a `ParameterReference`: its key and the attribute.
     Key(&'d str, Attribute<'d>),
     /// The actor of a referring group.
     Actor(Attribute<'d>),
 }
 
 impl<'d> WrittenAt<'d> {
-    /// The attribute that has the value.
+    /// Returns the attribute that holds the value.
     pub fn attribute(self) -> Attribute<'d> {
         match self {
             WrittenAt::Key(_, attribute) | WrittenAt::Actor(attribute) => attribute,
         }
     }
 
-    /// What messages call it.
+    /// Returns the name of the value for messages.
     pub fn what(self) -> String {
         match self {
             WrittenAt::Key(key, _) => format!("the key `{key}`"),
@@ -158,11 +158,11 @@ impl<'d> WrittenAt<'d> {
     }
 }
 
-/// Where the values are written that referring files give.
+/// The places at which referring files write their values.
 pub struct WrittenIn<'d>(HashMap<(usize, u32), WrittenAt<'d>>);
 
 impl<'d> WrittenIn<'d> {
-    /// Those of all referring files.
+    /// Collects the places of all referring files.
     pub fn of(assembly: &Assembly<'d>) -> WrittenIn<'d> {
         let mut origins = HashMap::new();
         for reference in &assembly.expansion.references {
@@ -180,23 +180,23 @@ impl<'d> WrittenIn<'d> {
         WrittenIn(origins)
     }
 
-    /// Where a value comes from.
+    /// Returns the place at which a value is written.
     pub fn get(&self, value: &Value) -> Option<WrittenAt<'d>> {
         self.0.get(&(value.piece, value.offset)).copied()
     }
 }
 
-/// The shortest key that tells an attribute's element: `AbsoluteTargetSpeed.value`.
+/// Returns the shortest key with the attribute's element: `AbsoluteTargetSpeed.value`.
 pub fn key_of(attribute: Attribute<'_>) -> String {
     format!("{}.{}", attribute.node().name(), attribute.name())
 }
 
-/// Whether an attribute may be given a value by a key.
+/// Checks whether a key may set the value of an attribute.
 pub fn is_offered(attribute: Attribute<'_>) -> bool {
     offered(attribute.node()).any(|one| one.offset() == attribute.offset())
 }
 
-/// The parameter that a whole value stands for: `$name`.
+/// Returns the name of the parameter if the whole value is `$name`.
 pub fn parameter_of(value: &str) -> Option<&str> {
     let name = value.trim().strip_prefix('$')?;
     qcbus_openscenario::is_identifier(name).then_some(name)

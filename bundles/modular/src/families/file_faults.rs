@@ -1,4 +1,4 @@
-//! Faults of the files that a modular scenario is made of, by the rule that says them.
+//! Faults of the files of a modular scenario, grouped by the rules that report them.
 
 use std::collections::BTreeSet;
 
@@ -7,27 +7,27 @@ use qcbus_document::{Document, Fault, FaultCode};
 use crate::assembly::Assembly;
 use qcbus_sdk::modular::archive_of;
 
-/// What keeps an archive from being read, or from being a modular scenario.
+/// Faults that prevent reading an archive or using it as a modular scenario.
 pub const ARCHIVE: &[FaultCode] = &[
     FaultCode::ArchiveTruncated,
     FaultCode::ArchiveMalformed,
     FaultCode::ArchiveMemberMissing,
 ];
 
-/// Bounds of what is unpacked.
+/// Faults about the limits for unpacked data.
 pub const LIMITS: &[FaultCode] = &[
     FaultCode::ArchiveLimit,
     FaultCode::UnpackedLimit,
     FaultCode::RatioLimit,
 ];
 
-/// Names of members.
+/// Faults about the names of members.
 pub const NAMES: &[FaultCode] = &[FaultCode::ArchiveEscapes, FaultCode::ArchiveDuplicate];
 
-/// Document type declarations.
+/// Faults about document type declarations.
 pub const DOCTYPES: &[FaultCode] = &[FaultCode::Doctype];
 
-/// The faults of some sorts in all the scenarios.
+/// Returns the faults of the given kinds in all scenarios.
 pub fn of<'d>(
     assembly: &Assembly<'d>,
     sorts: &'static [FaultCode],
@@ -40,8 +40,8 @@ pub fn of<'d>(
     })
 }
 
-/// The faults of archives: those of plain or gzipped files bear the same codes. What is wrong with an
-/// archive as a whole is a fault of each of its members, and here only of the first.
+/// Returns the faults of archives, without those of plain or gzipped files with the same codes. A
+/// fault of a whole archive is a fault of each member. It is returned only for the first member.
 pub fn of_archives<'d>(
     assembly: &Assembly<'d>,
     sorts: &'static [FaultCode],
@@ -52,11 +52,11 @@ pub fn of_archives<'d>(
     })
 }
 
-/// Whether a rule of its own says why a document cannot be taken as it is.
+/// Checks whether a separate rule reports why a document cannot be used as it is.
 pub fn has_own_rule(document: Document<'_>) -> bool {
     let in_archive = archive_of(document.path()).is_some();
     let mut faults = document.faults().filter(|fault| {
-        // These do not keep a scenario from being taken.
+        // Faults about names do not prevent the use of a scenario.
         fault.code.makes_partial() && !NAMES.contains(&fault.code)
     });
     faults.next().is_some_and(|fault| {

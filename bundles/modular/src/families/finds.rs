@@ -1,4 +1,4 @@
-//! What comes with groups that are taken often is said once.
+//! Findings about groups that are taken several times. Each finding is reported once.
 
 use std::collections::{HashMap, HashSet};
 
@@ -8,11 +8,11 @@ use qcbus_sdk::{Place, Sink};
 
 use crate::assembly::place;
 
-/// Most further places that a finding lists; what is beyond is counted.
+/// Maximum number of further places that a finding lists. The rest is only counted.
 const MOST: usize = 5;
 
-/// Findings about groups that are taken, each said once: one that is to be mended in a library file
-/// however often the group is taken, one about a value however many attributes get it.
+/// Findings about taken groups, each reported once. A fault in a library file counts once, however
+/// often the group is taken. A fault of a value counts once, however many attributes get it.
 #[derive(Default)]
 pub struct Finds<'d> {
     all: Vec<Find<'d>>,
@@ -21,7 +21,7 @@ pub struct Finds<'d> {
     places: HashSet<(usize, Key)>,
 }
 
-/// The document of a place, by where its path lies in memory, and the offset.
+/// The document of a place, identified by the address of its path in memory, and the offset.
 type Key = (usize, u32);
 
 /// A finding, with all places where it applies.
@@ -32,22 +32,22 @@ pub struct Find<'d> {
     text: String,
     besides: Vec<(Place<'d>, String)>,
     more: Vec<Place<'d>>,
-    /// What each of those is.
+    /// Text for each of the further places.
     too: &'static str,
-    /// Further places that are not listed.
+    /// Number of further places that are not listed.
     left: usize,
 }
 
 impl<'d> Find<'d> {
-    /// Adds a place that is the same wherever the finding applies.
+    /// Adds a place that is the same for all places of the finding.
     pub fn besides(&mut self, at: impl Into<Place<'d>>, there: impl Into<String>) {
         self.besides.push((at.into(), there.into()));
     }
 }
 
 impl<'d> Finds<'d> {
-    /// Something that `target` in a library file brings along; `at` takes its group. Of what was noted
-    /// with the same text before only the place that takes it is new, and nothing is given back.
+    /// Notes a fault of `target` in a library file; `at` takes its group. If the same text is
+    /// already noted for the target, only the taking place is added and `None` is returned.
     pub fn brought(
         &mut self,
         at: Spot<'d>,
@@ -59,7 +59,7 @@ impl<'d> Finds<'d> {
         self.note(place(target), place(at), find)
     }
 
-    /// Something about a file as a whole, to which `at` refers.
+    /// Notes a fault of a whole file that `at` refers to.
     pub fn of_file(
         &mut self,
         at: Spot<'d>,
@@ -74,8 +74,8 @@ impl<'d> Finds<'d> {
         self.note(target, place(at), find)
     }
 
-    /// Something about a value that is written at `at` and put to `target` in a library file. Of what
-    /// was noted with the same text before only the place that gets it is new.
+    /// Notes a fault of a value that is written at `at` and set at `target` in a library file. If
+    /// the same text is already noted for the value, only the target is added.
     pub fn given(
         &mut self,
         at: Spot<'d>,
@@ -114,7 +114,7 @@ impl<'d> Finds<'d> {
         None
     }
 
-    /// Says them.
+    /// Reports all findings.
     pub fn say(self, found: &mut Sink<'_>) {
         for find in self.all {
             let mut finding = found

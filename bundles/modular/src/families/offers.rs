@@ -1,24 +1,24 @@
-//! What groups offer for replacement, and which of it a key means.
+//! Attributes that groups offer for replacement, and the attributes that a key names.
 
 use std::collections::HashMap;
 
 use qcbus_document::{Attribute, Node};
 use qcbus_sdk::modular::{OFFERS, Use, offered};
 
-/// Most attributes of one name that a key is compared with; more than that no group offers.
+/// Maximum number of attributes of one element and name for a key. No group offers more.
 const MOST_ALIKE: usize = 256;
 
 /// The attributes that the groups of a use offer.
 pub struct Offers<'d> {
-    /// In document order, group by group.
+    /// All offered attributes in document order, group by group.
     pub all: Vec<Attribute<'d>>,
-    /// The first of each name.
+    /// The first attribute of each name.
     pub named: HashMap<&'d str, Attribute<'d>>,
     by_element: HashMap<(&'d str, &'d str), Vec<Attribute<'d>>>,
 }
 
 impl<'d> Offers<'d> {
-    /// What the groups that a reference takes offer.
+    /// Collects the attributes that the groups of a use offer.
     pub fn of(one: &Use<'d>) -> Offers<'d> {
         let groups = one.copies.iter().map(|copy| copy.group);
         let all: Vec<_> = groups.flat_map(offered_in).collect();
@@ -39,7 +39,7 @@ impl<'d> Offers<'d> {
         }
     }
 
-    /// The attributes whose element and name the last two parts of a key are.
+    /// Returns the attributes whose element and name match the last two parts of a key.
     pub fn ending(&self, key: &'d str) -> &[Attribute<'d>] {
         let mut parts = key.rsplit('.');
         let (Some(name), Some(element)) = (parts.next(), parts.next()) else {
@@ -50,8 +50,8 @@ impl<'d> Offers<'d> {
             .map_or(&[], Vec::as_slice)
     }
 
-    /// The attributes that the reference tool takes a key for although it is not their path: of the
-    /// elements around an attribute it compares the outermost that the key names, and none in between.
+    /// Returns the attributes that the reference tool accepts for a key that is not their path. Of
+    /// the elements around an attribute, the tool compares only the outermost one of the key.
     pub fn taken_loosely(&self, key: &'d str) -> impl Iterator<Item = Attribute<'d>> {
         let count = key.split('.').count();
         let outermost = key.split('.').next().unwrap_or("");
@@ -65,20 +65,20 @@ impl<'d> Offers<'d> {
     }
 }
 
-/// The attributes that the elements of a group offer and have. What the group itself offers is not
-/// replaced.
+/// Returns the existing attributes that the elements of a group offer. Attributes that the group
+/// itself offers are not replaced and are left out.
 pub fn offered_in<'d>(group: Node<'d>) -> impl Iterator<Item = Attribute<'d>> {
     group.descendants().flat_map(offered)
 }
 
-/// Whether one name may stand where another was meant: of very short ones, like `x` and `y`, none is a
-/// slip of the pen for another.
+/// Checks whether one name may be a misspelling of another. Very short names like `x` and `y` are
+/// never taken for misspellings.
 pub fn may_be_meant(written: &str, other: &str) -> bool {
     const SHORT: usize = 3;
     written.eq_ignore_ascii_case(other) || (written.len() >= SHORT && other.len() >= SHORT)
 }
 
-/// The path of an attribute in as many parts as are asked for: its name, its element, those around.
+/// Returns the path of an attribute in `parts` parts: its name, its element, then those around.
 pub fn path(attribute: Attribute<'_>, parts: usize) -> String {
     let element = attribute.node();
     let around = std::iter::once(element).chain(element.ancestors());
@@ -89,13 +89,13 @@ pub fn path(attribute: Attribute<'_>, parts: usize) -> String {
     names.join(".")
 }
 
-/// Whether an element in any of some groups offers attributes.
+/// Checks whether an element in any of the groups offers attributes.
 pub fn offers_any(groups: &[Node<'_>]) -> bool {
     let mut elements = groups.iter().flat_map(|group| group.descendants());
     elements.any(|element| element.attr(OFFERS).is_some())
 }
 
-/// The attributes in groups that a key would fit if they were offered.
+/// Returns the attributes in the groups that a key would match if they were offered.
 pub fn unoffered<'a, 'd: 'a>(
     key: &'a str,
     groups: &'a [Node<'d>],
@@ -104,7 +104,7 @@ pub fn unoffered<'a, 'd: 'a>(
     elements.filter_map(move |element| named_by(key, element))
 }
 
-/// The attribute of an element that a key names.
+/// Returns the attribute of an element that a key names.
 pub fn named_by<'d>(key: &str, element: Node<'d>) -> Option<Attribute<'d>> {
     let mut parts = key.rsplit('.');
     let attribute = element.attribute(parts.next()?);

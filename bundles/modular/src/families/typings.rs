@@ -1,4 +1,4 @@
-//! The types that the attributes of copied groups have in the scenario that takes them.
+//! Types of the attributes of copied groups, by the version of the scenario that takes them.
 
 use std::collections::HashMap;
 
@@ -7,12 +7,12 @@ use qcbus_schema::Typing;
 
 use crate::assembly::Assembly;
 
-/// The types of documents in the version of the root, each found when it is first asked for.
+/// The types of documents in the version of the root. Each is computed on first use.
 #[derive(Default)]
 pub struct Typings(HashMap<usize, Option<Typing>>);
 
 impl Typings {
-    /// The types of a piece. Where the root names no version, those of the piece's own.
+    /// Returns the types of a piece. If the root names no version, the piece's version applies.
     pub fn of(&mut self, assembly: &Assembly<'_>, piece: usize) -> Option<&Typing> {
         let typing = self.0.entry(piece).or_insert_with(|| {
             let document = assembly.piece(piece);

@@ -26,7 +26,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
             lost(reference, copy.group, found);
             before(reference, reference.group, &mut finds);
         }
-        // What comes from further away is said where it is referred to.
+        // Groups from nested references are reported at the inner reference.
         let mut seen = HashSet::new();
         let near = copies().filter(|copy| Some(copy.piece) == reference.target);
         for copy in near.filter(|copy| seen.insert(copy.group)) {
@@ -57,7 +57,7 @@ fn name<'d>(group: Node<'d>) -> &'d str {
     group.attr("name").unwrap_or("")
 }
 
-/// A group on one side has no actor.
+/// Notes a group without an actor on one side of a reference.
 fn none<'d>(problem: &Problem<'d>, finds: &mut Finds<'d>) {
     let referring = problem.at.node();
     let library = problem.target.map_or(referring, |target| target.node());
@@ -80,7 +80,7 @@ fn none<'d>(problem: &Problem<'d>, finds: &mut Finds<'d>) {
     }
 }
 
-/// Actors of the referring group for whom nothing is left.
+/// Reports actors of the referring group that get no part in the result.
 fn lost(reference: &Followed<'_>, group: Node<'_>, found: &mut Sink<'_>) {
     let all = actors(reference.group);
     let Some((first, others)) = all.split_first() else {
@@ -103,7 +103,7 @@ fn lost(reference: &Followed<'_>, group: Node<'_>, found: &mut Sink<'_>) {
         .at(group, "the group that is referred to");
 }
 
-/// Actors of the other group that stay as they are.
+/// Notes actors of the other group that are not replaced.
 fn kept<'d>(reference: &Followed<'d>, group: Node<'d>, finds: &mut Finds<'d>) {
     let all = actors(group);
     let Some((first, others)) = all.split_first() else {
@@ -127,7 +127,7 @@ fn kept<'d>(reference: &Followed<'d>, group: Node<'d>, finds: &mut Finds<'d>) {
     finds.brought(reference.node.into(), second, "the actor that stays", text);
 }
 
-/// An entity that comes before the actors, and is taken for one by the reference tool.
+/// Notes an entity before the actors. The reference tool takes it for the actor.
 fn before<'d>(reference: &Followed<'d>, group: Node<'d>, finds: &mut Finds<'d>) {
     let (Some(actor), Some(first)) = (actors(group).first().copied(), first_entity(group)) else {
         return;
@@ -147,7 +147,7 @@ fn before<'d>(reference: &Followed<'d>, group: Node<'d>, finds: &mut Finds<'d>) 
     finds.brought(reference.node.into(), first, "the first `EntityRef`", text);
 }
 
-/// Most actors that are listed.
+/// Maximum number of listed actors.
 const MOST: usize = 3;
 
 fn listed(actors: &[Node<'_>]) -> String {

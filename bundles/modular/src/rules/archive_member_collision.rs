@@ -26,7 +26,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
             if members[inner].get(name).filter(is_other).is_none() {
                 continue;
             }
-            // In a cycle each of two archives lies below the other.
+            // In a cycle, each of two archives lies below the other. The pair is reported once.
             if said.insert((outer.min(inner), outer.max(inner), *name)) {
                 say(assembly, found, [archives[outer], archives[inner]], name);
             }
@@ -34,7 +34,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What may collide: what can be referred to. Every archive has a main scenario of its own.
+/// Returns the scenarios that may collide. The main scenario is left out: every archive has one.
 fn members_of<'d>(archive: &Archive<'d>) -> BTreeMap<&'d str, Member<'d>> {
     let is_scenario = |name: &str| name.ends_with(".xosc") || name.ends_with(".mosc");
     let members = archive.members().map(|member| (member.name, member));
@@ -77,8 +77,8 @@ fn document<'d>(assembly: &Assembly<'d>, path: &str) -> Option<Document<'d>> {
     scenarios.find(|document| document.path() == path)
 }
 
-/// Which archives are unpacked while which others are: those that a scenario in them leads to, by
-/// however many references.
+/// Returns the pairs of an outer and an inner archive that are unpacked at the same time. The
+/// scenarios of the outer archive lead to the inner one by any number of references.
 fn below(assembly: &Assembly<'_>, archives: &[Archive<'_>]) -> BTreeSet<(usize, usize)> {
     let index: BTreeMap<&str, usize> = archives.iter().map(|it| it.path).zip(0..).collect();
     let mut next: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); archives.len()];

@@ -40,11 +40,11 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Says which references of a scenario that lies in no archive could not be in one.
+/// Reports references of a scenario outside of archives that would not work in an archive.
 fn say_unpackable(assembly: &Assembly<'_>, document: Document<'_>, found: &mut Sink<'_>) {
     for reference in document.elements("ScenarioReference") {
         let name = reference.attr("scenarioFileName").unwrap_or("");
-        // What lies on another machine is not found at all, which another rule says.
+        // A file on another machine is never found. Another rule reports that.
         if name.trim().is_empty() || name.contains("://") || stays_inside(name) {
             continue;
         }

@@ -29,7 +29,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         let Some(main) = scenarios.find(|document| document.path() == path) else {
             continue;
         };
-        // Members whose names lead out of the archive are said to do so.
+        // Another rule reports members with names that lead out of the archive.
         for member in archive.members().filter(|member| stays_inside(member.name)) {
             if used.contains(format!("{}!{}", archive.path, member.name).as_str()) {
                 continue;
@@ -52,7 +52,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The scenarios and, around them, the archives that they lie in.
+/// Returns the paths of the scenarios and of all archives around them.
 fn used<'d>(assembly: &Assembly<'d>) -> BTreeSet<&'d str> {
     let mut used = BTreeSet::new();
     for document in assembly.scenarios() {
@@ -66,7 +66,7 @@ fn used<'d>(assembly: &Assembly<'d>) -> BTreeSet<&'d str> {
     used
 }
 
-/// Whether all references were read and followed: else nobody knows what is used.
+/// Checks whether all references were read and followed. Otherwise the use is unknown.
 fn is_known(assembly: &Assembly<'_>) -> bool {
     let mut missing = assembly.subject.missing().iter();
     let mut faults = assembly.scenarios().flat_map(|document| document.faults());

@@ -18,7 +18,7 @@ pub static RULE: Rule<Modular> = Rule {
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     let mut seen = HashSet::new();
     for reference in &assembly.expansion.references {
-        // A group with nothing in its place is another problem.
+        // Another rule reports a group that no other group replaces.
         let groups: Vec<Node<'_>> = groups(reference).collect();
         if groups.is_empty() || !seen.insert((reference.piece, reference.group.index())) {
             continue;
@@ -33,7 +33,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The groups that take the place of the referring one.
+/// Returns the groups that replace the referring one.
 fn groups<'a, 'd>(reference: &'a Followed<'d>) -> impl Iterator<Item = Node<'d>> + use<'a, 'd> {
     let copies = reference.uses.iter().flat_map(|one| &one.copies);
     copies.map(|copy| copy.group)

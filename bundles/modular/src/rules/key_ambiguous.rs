@@ -33,7 +33,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Says which keys without an element give their value to different sorts of elements.
+/// Reports keys without an element that set attributes of different kinds of elements.
 fn spread(one: &Use<'_>, piece: usize, found: &mut Sink<'_>) {
     let is_spread = |key: &&Key<'_>| !key.key.contains('.') && key.wins.load(Ordering::Relaxed) > 1;
     let mut keys = one.keys.iter().filter(is_spread).peekable();
@@ -48,7 +48,7 @@ fn spread(one: &Use<'_>, piece: usize, found: &mut Sink<'_>) {
     }
 }
 
-/// The attributes that get a value of a use, one of each sort of element, by where the value is written.
+/// Returns the attributes that a use sets, one per kind of element, by the offset of the value.
 fn winners<'d>(one: &Use<'d>, piece: usize) -> HashMap<u32, Vec<Attribute<'d>>> {
     let mut winners: HashMap<u32, Vec<Attribute<'d>>> = HashMap::new();
     for copy in &one.copies {
@@ -65,7 +65,7 @@ fn winners<'d>(one: &Use<'d>, piece: usize) -> HashMap<u32, Vec<Attribute<'d>>> 
     winners
 }
 
-/// Most sorts of elements that are shown.
+/// Maximum number of shown kinds of elements.
 const MOST_SHOWN: usize = 3;
 
 fn say_spread(key: &Key<'_>, spread: &[Attribute<'_>], found: &mut Sink<'_>) {

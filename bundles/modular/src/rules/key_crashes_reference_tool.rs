@@ -39,8 +39,8 @@ fn bare<'d>(one: &Use<'d>) -> HashSet<&'d str> {
     keys.filter(|key| !key.contains('.')).collect()
 }
 
-/// An attribute whose name a bare key ends with without being it. One whose name is a key as well is
-/// served before the reference tool looks at the ends.
+/// Returns an attribute whose name is a proper suffix of a key without dots. A name that is itself
+/// a key is skipped, because the reference tool handles it before it compares suffixes.
 fn ending<'d>(
     key: &Key<'d>,
     bare: &HashSet<&str>,
@@ -69,7 +69,7 @@ fn ending<'d>(
     Some((attribute, text))
 }
 
-/// An attribute with fewer elements around it than a key of its name has.
+/// Returns an attribute with fewer elements around it than the key names.
 fn too_deep<'d>(key: &Key<'d>, offers: &Offers<'d>) -> Option<(Attribute<'d>, String)> {
     let named = key.key.split('.').count().saturating_sub(1);
     let depth = |attribute: Attribute<'_>| 1 + attribute.node().ancestors().count();

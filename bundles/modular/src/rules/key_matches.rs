@@ -44,21 +44,21 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What is added to what is said of a key.
+/// Text and places that are added to the finding of a key.
 #[derive(Default)]
 struct Hint<'d> {
     text: String,
-    /// The attributes that it names and that are not offered.
+    /// The attributes in the hint that are not offered.
     attributes: Vec<Attribute<'d>>,
 }
 
-/// Most keys for which it is said what may be meant: each takes a walk through the group.
+/// Maximum number of keys that get a hint, because each hint takes a walk through the group.
 const MOST_HINTED: usize = 32;
 
-/// Most attributes that are shown.
+/// Maximum number of shown attributes.
 const MOST_SHOWN: usize = 5;
 
-/// Most paths that a key is compared with, and most that are listed.
+/// Maximum number of paths that a key is compared with, then of listed paths.
 const MOST_COMPARED: usize = 64;
 const MOST_LISTED: usize = 5;
 
@@ -95,7 +95,7 @@ fn say_unoffered(attribute: Attribute<'_>) -> String {
         listed.split(move |c| !is_of_name(c))
     });
     let lists = match listed {
-        // What is wrong with it another rule says.
+        // Another rule reports the fault in the list.
         Some(listed) if words.any(|word| word == name) => {
             return format!(
                 "; `{}` names `{name}` in `{OFFERS}`, but not as its name alone between commas: `{listed}`",
@@ -112,7 +112,7 @@ fn say_unoffered(attribute: Attribute<'_>) -> String {
     )
 }
 
-/// What may have been meant by a key that fits nothing.
+/// Suggests what a key without a match may mean.
 fn meant<'d>(key: &'d str, offers: &Offers<'d>) -> String {
     if let Some(taken) = offers.taken_loosely(key).next() {
         let count = key.split('.').count();

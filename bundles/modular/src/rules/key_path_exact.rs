@@ -36,7 +36,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         }
     }
     finds.say(found);
-    // A library file that is checked on its own.
+    // The checked file may itself be a library file.
     for group in assembly.root().elements("ManeuverGroup") {
         for (list, text) in wrong_offers(group) {
             found.issue(list, text);
@@ -45,7 +45,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
 }
 
 fn loose_keys(one: &Use<'_>, found: &mut Sink<'_>) {
-    // Only a key of four parts has any in the middle.
+    // Only a key with at least four parts has elements in the middle.
     let has_middle = |key: &&Key<'_>| key.key.split('.').count() > 3;
     let mut keys = one.keys.iter().filter(has_middle).peekable();
     if keys.peek().is_none() {
@@ -80,7 +80,7 @@ fn say_loose(key: &Key<'_>, taken: Attribute<'_>, found: &mut Sink<'_>) {
         .at(taken, "what the reference tool replaces");
 }
 
-/// What is wrong with the lists of attributes that the elements of a group offer.
+/// Finds the faults in the lists of offered attributes of a group.
 fn wrong_offers<'d>(group: Node<'d>) -> impl Iterator<Item = (Attribute<'d>, String)> {
     let lists = group
         .descendants()
@@ -116,10 +116,10 @@ fn wrong_offer(list: Attribute<'_>) -> Option<String> {
     (!misspelt.is_empty()).then(|| misspelt.join("; "))
 }
 
-/// Most faults of one list that are named.
+/// Maximum number of named faults per list.
 const MOST_NAMED: usize = 5;
 
-/// What is wrong with how a list names attributes that are there.
+/// Describes a fault in how a list names attributes that exist.
 fn misspelt_offer(element: Node<'_>, name: &str) -> Option<String> {
     let between = |c: char| c.is_whitespace() || matches!(c, ';' | '|' | '/' | ':');
     let parts = || name.split(between).filter(|part| !part.is_empty());
@@ -140,7 +140,7 @@ fn misspelt_offer(element: Node<'_>, name: &str) -> Option<String> {
     })
 }
 
-/// A name that is listed for nothing, with what may have been meant.
+/// Describes a listed name without an attribute, with a suggestion.
 fn absent_offer(element: Node<'_>, name: &str) -> String {
     let others = element.attributes().map(|attribute| attribute.name());
     let others = others.filter(|other| *other != OFFERS && may_be_meant(name, other));

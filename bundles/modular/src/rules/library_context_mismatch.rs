@@ -26,7 +26,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         };
         say_version(assembly, reference, assembly.piece(target), found);
     }
-    // By the piece and its map: what the first group that lies on another map is.
+    // Only the first group from another map is reported for each piece.
     let mut seen = HashSet::new();
     for taken in assembly.taken() {
         let piece = taken.copy.piece;
@@ -41,7 +41,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     finds.say(found);
 }
 
-/// Notes a group whose names are in another namespace than those around the referring group.
+/// Notes a group with another namespace prefix than the referring group.
 fn note_prefix<'d>(taken: &Taken<'_, 'd>, finds: &mut Finds<'d>) {
     let group = taken.copy.group;
     let (theirs, own) = (group.prefix(), taken.reference.group.prefix());
@@ -67,7 +67,7 @@ fn note_prefix<'d>(taken: &Taken<'_, 'd>, finds: &mut Finds<'d>) {
     finds.brought(taken.at(), group.into(), "the group", text);
 }
 
-/// Says that a library file names no version, by which it could be told how its groups are meant.
+/// Reports that a library file names no version, so the version of its groups is unknown.
 fn say_no_version(
     reference: &Followed<'_>,
     library: Document<'_>,
@@ -123,7 +123,7 @@ fn say_version<'d>(
         );
 }
 
-/// Says that a group keeps places of another map; false when there is nothing to say.
+/// Reports that a group keeps places of another map. Returns `false` when there is no finding.
 fn say_map(assembly: &Assembly<'_>, taken: &Taken<'_, '_>, found: &mut Sink<'_>) -> bool {
     let library = taken.copy.group.document();
     let (Some(own), Some(theirs)) = (map_of(assembly.root()), map_of(library)) else {
@@ -131,7 +131,7 @@ fn say_map(assembly: &Assembly<'_>, taken: &Taken<'_, '_>, found: &mut Sink<'_>)
     };
     let path = |map: Node<'_>| map.attr("filepath").unwrap_or("").to_owned();
     let (own_path, their_path) = (path(own), path(theirs));
-    // The directory may well be another one, and a parameter anything.
+    // Only file names are compared: the directory may differ, and a parameter may have any value.
     let differ = !own_path.contains('$')
         && !their_path.contains('$')
         && file_name(&own_path) != file_name(&their_path);
@@ -169,7 +169,7 @@ fn file_name(path: &str) -> &str {
     path.trim().rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
-/// Elements that mean something of the map, and the attributes by which they do.
+/// Elements that depend on the map, with the attributes that refer to it.
 const OF_THE_MAP: &[(&str, &[&str])] = &[
     ("AbsoluteTargetLane", &["value"]),
     (
@@ -183,8 +183,8 @@ const OF_THE_MAP: &[(&str, &[&str])] = &[
     ("WorldPosition", &["x", "y"]),
 ];
 
-/// An element of a group that means something of its own map: none of the attributes that say what is
-/// given by a key. Whoever gives one has thought of the others.
+/// Returns an element of a group that depends on its own map, if keys set none of its map
+/// attributes. If a key sets one, its author is assumed to have checked the others.
 fn bound<'d>(taken: &Taken<'_, 'd>) -> Option<Node<'d>> {
     taken.elements().find(|element| {
         let row = OF_THE_MAP.iter().find(|(name, _)| element.is(name));

@@ -14,15 +14,15 @@ pub static RULE: Rule<Modular> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Most attributes that a finding lists.
+/// Maximum number of attributes that a finding lists.
 const MOST: usize = 8;
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
-    // What is to be mended first may well set what would be listed.
+    // Fixing the other faults first may set some of the attributes that would be listed here.
     if !assembly.expansion.is_complete() {
         return;
     }
-    // What an inner scenario leaves an outer one may still replace.
+    // An outer scenario may still replace values that an inner scenario keeps.
     let of_root = assembly.expansion.references.iter();
     for reference in of_root.filter(|reference| reference.piece == 0) {
         for one in &reference.uses {

@@ -16,7 +16,7 @@ pub static RULE: Rule<Modular> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Most elements that a finding shows.
+/// Maximum number of elements that a finding shows.
 const MOST: usize = 5;
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
@@ -32,7 +32,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     finds.say(found);
 }
 
-/// Of a group that offers nothing, where the keys would fit.
+/// Notes that a group offers no attributes, and where the keys would match.
 fn note<'d>(
     reference: &Followed<'d>,
     one: &Use<'d>,

@@ -1,6 +1,6 @@
 //! The rules, one per file, in the order of the result.
 //!
-//! A new rule takes one line in each of the two lists below.
+//! A new rule needs one line in each of the two lists below.
 
 use qcbus_sdk::AnyRule;
 
@@ -43,7 +43,7 @@ mod value_type;
 mod xml_encoding;
 mod xml_no_doctype;
 
-/// The rules of the bundle: archives, files, references, keys, libraries, and what comes of them.
+/// The rules of the bundle: archives, files, references, keys, libraries and results.
 pub static RULES: &[&dyn AnyRule] = &[
     &archive_limits::RULE,
     &archive_main_present::RULE,

@@ -49,7 +49,7 @@ fn further(attribute: Attribute<'_>, found: &mut Sink<'_>) {
     if matches!(name, "key" | "value") || name.starts_with("xmlns") {
         return;
     }
-    // The reference tool has the attributes in the order of their names.
+    // The reference tool stores attributes in the order of their names.
     let effect = match name < "value" {
         true => {
             ": the reference tool reads the first two in the order of the alphabet as key and value, and loses this value"

@@ -14,7 +14,7 @@ pub static RULE: Rule<Modular> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// How deeply people may be expected to follow references.
+/// Depth up to which references are easy to follow for people.
 const MODEST: usize = 8;
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
@@ -54,8 +54,8 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// For each reference, which one in the file that it leads to leads deepest. References in a file come
-/// before those that lead to it.
+/// For each reference, returns the reference in its target file that leads deepest. References of a
+/// file come before the references that lead to it.
 fn nexts(references: &[Followed<'_>]) -> Vec<Option<usize>> {
     let mut heights: Vec<usize> = Vec::new();
     let mut nexts = Vec::new();

@@ -28,8 +28,8 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     }
     let mut finds = Finds::default();
     for problem in assembly.problems(&[What::Unreadable]) {
-        // What is wrong with the file that is checked, other rules say, those of the bundle for
-        // OpenSCENARIO among them.
+        // Other rules report faults of the checked file, for example those of the bundle for
+        // OpenSCENARIO.
         let target = assembly.target(problem.at.node());
         if let Some(target) = target.filter(|target| !has_own_rule(*target)) {
             let there = "the file that is referred to";
@@ -39,7 +39,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     finds.say(found);
 }
 
-/// Why a file could not be had that is there, or was not looked for.
+/// Returns why a file could not be read although it exists, or why it was not looked for.
 fn other_reason(assembly: &Assembly<'_>, reference: Node<'_>) -> Option<String> {
     let name = reference.attr("scenarioFileName")?;
     if name.trim().is_empty() {

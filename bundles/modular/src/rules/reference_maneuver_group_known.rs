@@ -18,7 +18,8 @@ pub static RULE: Rule<Modular> = Rule {
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     for problem in assembly.problems(&[What::GroupUnknown]) {
-        // It may be missing only for a reference in there that leads nowhere, which has been said.
+        // The group may be missing because an inner reference leads nowhere. That is already
+        // reported.
         let there = problem.target.map(|target| target.node().document());
         if !there.is_some_and(|there| is_incomplete(assembly, there)) {
             say(found, problem, "the file that is referred to");
@@ -42,7 +43,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether a reference in a document takes less than it asks for.
+/// Checks whether a reference in a document takes fewer groups than it names.
 fn is_incomplete(assembly: &Assembly<'_>, document: Document<'_>) -> bool {
     let expansion = &assembly.expansion;
     let of_it = |reference: &&Followed<'_>| {
@@ -56,10 +57,10 @@ fn is_incomplete(assembly: &Assembly<'_>, document: Document<'_>) -> bool {
     expansion.references.iter().filter(of_it).any(is_short)
 }
 
-/// The references that take groups by their names from files with a group that has none, each with the
-/// first of those.
+/// Returns the references that take groups by name from files that have a group without a name.
+/// Each comes with the first such group.
 fn past_nameless<'a, 'd>(assembly: &'a Assembly<'d>) -> Vec<(&'a Followed<'d>, Node<'d>)> {
-    // A file may be referred to ten thousand times, and has as many groups.
+    // The result is cached: a file may have ten thousand references to it and as many groups.
     let mut nameless: HashMap<usize, Option<Node<'d>>> = HashMap::new();
     let all = assembly.expansion.references.iter();
     let named = all.filter(|reference| reference.form == Form::Named);
@@ -75,7 +76,7 @@ fn past_nameless<'a, 'd>(assembly: &'a Assembly<'d>) -> Vec<(&'a Followed<'d>, N
     past.collect()
 }
 
-/// Notes which library files have groups without a name, and where they are referred to.
+/// Notes library files that have groups without a name, with the references to them.
 fn note_nameless<'d>(assembly: &Assembly<'d>, finds: &mut Finds<'d>) {
     let mut texts: HashMap<Node<'d>, String> = HashMap::new();
     let references = past_nameless(assembly);
@@ -98,7 +99,7 @@ fn note_nameless<'d>(assembly: &Assembly<'d>, finds: &mut Finds<'d>) {
     }
 }
 
-/// The first group after one in its file that a reference takes.
+/// Returns the name of the first group after `nameless` in its file that a reference takes.
 fn taken_after<'d>(reference: &Followed<'d>, nameless: Node<'d>) -> Option<&'d str> {
     let path = nameless.document().path();
     let is_after =
@@ -108,7 +109,7 @@ fn taken_after<'d>(reference: &Followed<'d>, nameless: Node<'d>) -> Option<&'d s
     Some(copy.group.attr("name").unwrap_or(""))
 }
 
-/// Says that the group of a reference has no name that could come before those of what it takes.
+/// Reports that the referring group has no name to put before the names of taken groups.
 fn say_unnamed(reference: &Followed<'_>, found: &mut Sink<'_>) {
     let taken = reference.uses.iter().flat_map(|one| &one.copies).next();
     let own = taken.map(|copy| copy.group.attr("name").unwrap_or(""));

@@ -43,7 +43,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What becomes of a reference to `name.xosc` beside one to `name.mosc`.
+/// Describes the problem of a reference to `name.xosc` beside one to `name.mosc`.
 fn trouble(
     target: Document<'_>,
     name: &str,

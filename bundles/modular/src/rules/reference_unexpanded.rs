@@ -52,8 +52,8 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     finds.say(found);
 }
 
-/// The groups of the target that are named as they are written, or whose place the groups take that
-/// are named.
+/// Returns the referring groups of the target that the reference takes. A group counts if its own
+/// name is listed, or the name of a group that replaces it.
 fn taken<'d>(
     assembly: &Assembly<'d>,
     reference: &Followed<'d>,

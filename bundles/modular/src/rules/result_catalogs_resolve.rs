@@ -20,7 +20,7 @@ pub static RULE: Rule<Modular> = Rule {
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     let missing = assembly.subject.missing().iter();
-    // What could not be read may have been the catalog in question.
+    // A catalog that could not be read may be the one that is referred to.
     if missing
         .into_iter()
         .any(|missing| missing.role == DocumentRole::Catalog)
@@ -61,7 +61,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     finds.say(found);
 }
 
-/// The attribute of a reference that leads nowhere, and why it does so.
+/// Returns the attribute of a reference that leads nowhere, with the reason.
 fn wrong<'d>(
     taken: &Taken<'_, 'd>,
     reference: Node<'d>,

@@ -17,7 +17,7 @@ pub static RULE: Rule<Modular> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// The attributes by which the standard refers to entities, whatever their element.
+/// The attributes by which the standard refers to entities, on any element.
 const REFERENCES: [&str; 3] = ["entityRef", "masterEntityRef", "trailerRef"];
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
@@ -57,7 +57,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     finds.say(found);
 }
 
-/// The name that a value stands for; `None` where that is not known.
+/// Returns the name that a value stands for, or `None` if the name is unknown.
 fn resolved<'v, 'd>(
     value: &'v str,
     taken: &Taken<'_, 'd>,
@@ -67,7 +67,7 @@ fn resolved<'v, 'd>(
         return Some(Cow::Borrowed(value));
     }
     let name = parameter_of(value)?;
-    // A maneuver of the group may declare one of the same name.
+    // A maneuver of the group may declare a parameter of the same name.
     let mut own = taken.copy.group.descendants_named("ParameterDeclaration");
     if own.any(|own| own.attr("name") == Some(name)) {
         return None;
@@ -123,7 +123,7 @@ fn given(origin: WrittenAt<'_>, name: &str, scenario: &Scenario<'_>) -> String {
     format!("{who}, but the scenario declares no entity of this name{hint}")
 }
 
-/// Some of the entities that there are.
+/// Lists some of the declared entities.
 fn known(scenario: &Scenario<'_>) -> String {
     match some_of(scenario.entities().names()) {
         None => " (it declares none)".to_owned(),

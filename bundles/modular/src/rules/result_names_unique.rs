@@ -15,7 +15,7 @@ pub static RULE: Rule<Modular> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// A group of the expanded scenario: one that is taken, or one of the root's own.
+/// A group of the expanded scenario: a taken group or one of the root itself.
 struct Bearer<'a, 'd> {
     name: &'a str,
     at: Spot<'d>,
@@ -64,7 +64,7 @@ where
     own.into_iter().chain(taken).filter(named).collect()
 }
 
-/// What one referring group takes twice is a fault of its own.
+/// Checks whether both groups come from the same referring group. Another rule reports those.
 fn is_said_elsewhere(one: &Bearer<'_, '_>, other: &Bearer<'_, '_>) -> bool {
     let group = |bearer: &Bearer<'_, '_>| Some(bearer.taken?.reference.group.index());
     group(one).is_some() && group(one) == group(other)

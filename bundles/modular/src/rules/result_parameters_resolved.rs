@@ -23,7 +23,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     };
     let origins = WrittenIn::of(assembly);
     let mut finds = Finds::default();
-    // A parameter is declared once, however many values need it.
+    // Each parameter is reported once, even if many values need it.
     let mut first: HashMap<(usize, &str), (Spot<'_>, String)> = HashMap::new();
     for taken in assembly.taken() {
         for (attribute, value) in taken.values().filter(|(_, value)| value.contains('$')) {
@@ -43,7 +43,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
                     continue;
                 }
                 let piece = taken.copy.piece;
-                // Names in the document live longer than the copy's.
+                // Names in the document live longer than names in the copy.
                 let own = names(attribute.value())
                     .into_iter()
                     .find(|own| *own == name);
@@ -59,7 +59,8 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     finds.say(found);
 }
 
-/// The parameters that a value needs. One within a longer text is replaced by nobody, and another rule's.
+/// Returns the parameters that a value needs. Another rule reports parameters within longer texts,
+/// which are not replaced.
 fn names(value: &str) -> Vec<&str> {
     match value.trim_start().starts_with("${") {
         true => expr::names(value)
@@ -70,7 +71,7 @@ fn names(value: &str) -> Vec<&str> {
     }
 }
 
-/// Names of what is declared or assigned are names, also where old files write a `$` before them.
+/// Checks whether the attribute is a declared or assigned name, even with the `$` of old files.
 fn is_name(attribute: Attribute<'_>) -> bool {
     let declares = matches!(
         attribute.node().name(),
@@ -79,7 +80,7 @@ fn is_name(attribute: Attribute<'_>) -> bool {
     (attribute.is("name") && declares) || attribute.is("parameterRef")
 }
 
-/// Whether a parameter is declared in the group around the value, or around the group in the scenario.
+/// Checks whether a parameter is declared in the group around the value or around the group.
 fn is_declared<'d>(
     name: &str,
     attribute: Attribute<'d>,
@@ -99,7 +100,7 @@ fn is_declared<'d>(
             .is_some()
 }
 
-/// The declaration of a parameter in an element.
+/// Returns the declaration of a parameter in an element.
 fn declaration<'d>(holder: Node<'d>, name: &str) -> Option<Node<'d>> {
     let block = holder.child("ParameterDeclarations")?;
     let mut all = block.children_named("ParameterDeclaration");

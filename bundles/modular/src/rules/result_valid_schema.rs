@@ -22,7 +22,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     let Some(own) = assembly.version_of(assembly.root()) else {
         return;
     };
-    // Where all are of one version, a group is as valid here as there.
+    // If all files have the same version, a group is equally valid in both files.
     let is_other = |taken: Taken<'_, '_>| {
         let theirs = assembly.version_of(taken.copy.group.document());
         theirs.is_some_and(|theirs| theirs != own)
@@ -56,7 +56,7 @@ fn checked<'d>(document: &Document<'d>) -> Option<Checked<'d>> {
     }
 }
 
-/// The copied groups in the expanded scenario, in document order, and what they are copies of.
+/// Returns the copied groups in the expanded scenario in document order, with their originals.
 fn groups<'a, 'd>(
     assembly: &'a Assembly<'d>,
     expanded: Document<'d>,
@@ -80,7 +80,7 @@ fn groups<'a, 'd>(
                 Some(copy) if copy.attr("name") == Some(taken.copy.name()) => {
                     found.push((copy, taken));
                 }
-                // Groups within groups: nobody knows which is which.
+                // With groups inside groups, copies cannot be matched to their originals.
                 _ => return Vec::new(),
             }
         }
@@ -91,15 +91,15 @@ fn groups<'a, 'd>(
 struct Judge<'a, 'd> {
     own: Version,
     groups: Vec<(Node<'d>, Taken<'a, 'd>)>,
-    /// What the files of pieces violate by themselves.
+    /// Violations in the files of pieces on their own.
     libraries: HashMap<usize, Option<HashSet<(u32, Code)>>>,
-    /// By the piece and what is said of it: where that is first.
+    /// First spot of each text, by piece and text.
     first: HashMap<(usize, String), Spot<'d>>,
     finds: Finds<'d>,
 }
 
 impl<'a, 'd> Judge<'a, 'd> {
-    /// What the version of the library has and that of the scenario has not.
+    /// Notes parts that exist in the version of the library but not in that of the scenario.
     fn later(&mut self, checked: &Checked<'d>) {
         for thing in checked.later.iter().flat_map(|later| &later.things) {
             let name = thing.attribute.map(|attribute| attribute.name());
@@ -128,12 +128,12 @@ impl<'a, 'd> Judge<'a, 'd> {
         }
     }
 
-    /// What the version of the scenario finds fault with and that of the library does not.
+    /// Notes violations of the scenario's version that are valid in the library's version.
     fn violations(&mut self, checked: &Checked<'d>) {
         for violation in &checked.violations {
             let is_new = !matches!(
                 violation.code,
-                // Of names and keys other rules know more.
+                // Other rules check names and keys better.
                 Code::DuplicateKey | Code::MissingKey | Code::DanglingReference
             );
             if checked.severity(violation) != Severity::Error || !is_new {
@@ -162,7 +162,7 @@ impl<'a, 'd> Judge<'a, 'd> {
         }
     }
 
-    /// Notes a fault at the first place of its piece.
+    /// Notes a fault at the first spot of its piece.
     fn note(&mut self, taken: Taken<'_, 'd>, spot: Spot<'d>, text: String) {
         let key = (taken.copy.piece, text.clone());
         let first = *self.first.entry(key).or_insert(spot);
@@ -170,7 +170,7 @@ impl<'a, 'd> Judge<'a, 'd> {
         self.finds.brought(taken.at(), first, there, text);
     }
 
-    /// Where the library has what is in a copied group, unless a key put it there.
+    /// Returns the spot in the library for a part of a copied group, unless a key has set it.
     fn origin(
         &self,
         node: Node<'d>,
@@ -199,7 +199,7 @@ impl<'a, 'd> Judge<'a, 'd> {
         (!is_given).then(|| (*taken, attribute.into()))
     }
 
-    /// Whether the library file has the fault in its own version, too.
+    /// Checks whether the library file has the fault in its own version, too.
     fn is_own_fault(
         &mut self,
         piece: usize,
@@ -209,7 +209,7 @@ impl<'a, 'd> Judge<'a, 'd> {
     ) -> bool {
         let own = self.libraries.entry(piece).or_insert_with(|| {
             let checked = checked(&library)?;
-            // Of faults that are not listed nobody knows where they are.
+            // The places of faults beyond the listed ones are unknown.
             let all = checked
                 .violations
                 .iter()

@@ -24,7 +24,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     let as_a_whole = refers || assembly.subject.kind() == FileKind::Mosc;
     let tops: Vec<Node<'_>> = match as_a_whole {
         true => root.root().into_iter().collect(),
-        // Of a library file only groups are taken.
+        // Only the groups of a library file are taken.
         false => root.elements("ManeuverGroup").collect(),
     };
     for top in tops {
@@ -32,7 +32,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
             found.issue(place(spot), text);
         });
     }
-    // What refers itself is written as a whole, of others a group.
+    // A file with references is written as a whole. From other files only groups are written.
     let whole: HashSet<usize> = references.iter().map(|reference| reference.piece).collect();
     let mut finds = Finds::default();
     let mut looked: HashSet<(usize, u32)> = HashSet::new();
@@ -65,7 +65,7 @@ fn bring<'d>(top: Node<'d>, at: Spot<'d>, finds: &mut Finds<'d>) {
     });
 }
 
-/// Looks for `<` in the values and texts of an element and those within it.
+/// Searches for `<` in the values and texts of an element and its descendants.
 fn look<'d>(top: Node<'d>, say: &mut impl FnMut(Spot<'d>, String)) {
     const AND: &str = "the reference tool writes it as a bare `<`, and the file that it makes is no XML; other words \
                        (`less than`, `below`) do no harm";
@@ -84,7 +84,7 @@ fn look<'d>(top: Node<'d>, say: &mut impl FnMut(Spot<'d>, String)) {
             continue;
         }
         for attribute in node.attributes() {
-            // As it stands in no value unescaped, it was escaped.
+            // An attribute value cannot contain an unescaped `<`, so it was escaped.
             if attribute.value().contains('<') {
                 let (name, element) = (attribute.name(), node.name());
                 say(
@@ -96,7 +96,7 @@ fn look<'d>(top: Node<'d>, say: &mut impl FnMut(Spot<'d>, String)) {
     }
 }
 
-/// Whether a run of characters has a `<` outside of CDATA sections, which are kept as they are.
+/// Checks whether a run of characters has a `<` outside of CDATA sections, which are kept.
 fn escapes(document: Document<'_>, run: Node<'_>) -> bool {
     if !run.character_run().contains('<') {
         return false;

@@ -18,13 +18,13 @@ pub static RULE: Rule<Modular> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Attributes of a type and the numbers that they may be.
+/// Attributes of a type with their allowed numbers.
 struct Range {
     class: &'static str,
     attributes: &'static [&'static str],
     low: f64,
     high: f64,
-    /// Why no others.
+    /// Reason for the limits.
     why: &'static str,
 }
 
@@ -46,7 +46,7 @@ const fn range(
 const POSITIVE: (f64, f64) = (0.0, f64::INFINITY);
 const COUNT: (f64, f64) = (1.0, f64::INFINITY);
 const SHARE: (f64, f64) = (0.0, 1.0);
-/// Two turns: rounded, added up or counted on, an angle in radians may be more than one.
+/// Two turns each way: rounded or summed up, an angle in radians may exceed one turn.
 const ANGLE: (f64, f64) = (-2.0 * TAU, 2.0 * TAU);
 
 const BACKWARDS: &str = "a speed below zero drives backwards, which not every simulator does";
@@ -56,8 +56,8 @@ const MAGNITUDE: &str = "a limit is a magnitude";
 const RADIANS: &str = "angles are in radians";
 const SHARES: &str = "it is a share";
 
-// After the ranges in the class descriptions of the standard; of what groups can have in them, what is
-// commonly replaced. The bundle for OpenSCENARIO has them all.
+// The ranges follow the class descriptions of the standard. Only values that are commonly replaced
+// in groups are listed. The bundle for OpenSCENARIO has all ranges.
 #[rustfmt::skip]
 const RANGES: &[Range] = &[
     range("AbsoluteSpeed", &["value"], POSITIVE, BACKWARDS),
@@ -130,7 +130,7 @@ fn range_of(class: &str, attribute: Attribute<'_>) -> Option<&'static Range> {
 }
 
 impl Range {
-    /// What would do instead of a number that does not.
+    /// Describes the allowed values for a number that is out of range.
     fn instead(&self, number: f64) -> String {
         if (self.low, self.high) == ANGLE {
             let radians = (number.to_radians() * 1e4).round() / 1e4;

@@ -45,7 +45,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     finds.say(found);
 }
 
-/// What is wrong with a value of a type.
+/// Describes the fault of a value of a type, if any.
 fn wrong(value: &str, value_type: ValueType) -> Option<String> {
     const MOST: usize = 12;
     let shown = match value {

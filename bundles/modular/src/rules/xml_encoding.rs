@@ -14,7 +14,7 @@ pub static RULE: Rule<Modular> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// What is read without loss. Bytes that cannot be read are what is wrong with the file as such.
+/// Encoding faults without loss. Bytes that cannot be read are a fault of the file itself.
 const READ_NEVERTHELESS: &[FaultCode] =
     &[FaultCode::EncodingTranscoded, FaultCode::EncodingMismatch];
 

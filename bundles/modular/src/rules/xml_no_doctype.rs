@@ -41,7 +41,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Where a document type declaration begins, among comments and processing instructions before the root.
+/// Returns the offset of a document type declaration among comments and processing instructions.
 fn bare(document: Document<'_>) -> Option<u32> {
     let source = document.sources().next()?;
     let root = document.root()?.offset().checked_sub(source.start)?;

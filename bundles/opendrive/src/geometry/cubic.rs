@@ -1,4 +1,4 @@
-//! Cubic polynomials `a + b·x + c·x² + d·x³`, OpenDRIVE's form of every profile.
+//! Cubic polynomials `a + b·x + c·x² + d·x³`, the form of every profile in OpenDRIVE.
 
 use super::finite;
 
@@ -15,47 +15,48 @@ pub struct Cubic {
     pub d: f64,
 }
 
-/// The lowest value that a polynomial takes in an interval, and where.
+/// The lowest value of a polynomial in an interval, with its place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Minimum {
-    /// Where the lowest value is taken.
+    /// Place of the lowest value.
     pub at: f64,
     /// The lowest value.
     pub value: f64,
 }
 
 impl Cubic {
-    /// The polynomial with these coefficients.
+    /// Creates the polynomial with these coefficients.
     pub fn new(a: f64, b: f64, c: f64, d: f64) -> Cubic {
         Cubic { a, b, c, d }
     }
 
-    /// The polynomial that is `value` everywhere.
+    /// Creates the polynomial that is `value` everywhere.
     pub fn constant(value: f64) -> Cubic {
         Cubic::new(value, 0.0, 0.0, 0.0)
     }
 
-    /// The value at `x`; may be infinite or not a number when the coefficients are extreme.
+    /// Returns the value at `x`. With extreme coefficients, it may be infinite or not a number.
     pub fn value(&self, x: f64) -> f64 {
         self.a + x * (self.b + x * (self.c + x * self.d))
     }
 
-    /// The value at `x` if it is finite.
+    /// Returns the value at `x` if it is finite.
     pub fn eval(&self, x: f64) -> Option<f64> {
         finite(self.value(x))
     }
 
-    /// The slope at `x`.
+    /// Returns the slope at `x`.
     pub fn slope(&self, x: f64) -> f64 {
         self.b + x * (2.0 * self.c + x * 3.0 * self.d)
     }
 
-    /// The second derivative at `x`.
+    /// Returns the second derivative at `x`.
     pub fn second_derivative(&self, x: f64) -> f64 {
         2.0 * self.c + 6.0 * self.d * x
     }
 
-    /// The same curve seen from `offset`: `self.shifted(o).value(x) == self.value(o + x)`.
+    /// Returns the curve with its origin at `offset`:
+    /// `self.shifted(o).value(x) == self.value(o + x)`.
     pub fn shifted(&self, offset: f64) -> Cubic {
         Cubic {
             a: self.value(offset),
@@ -65,7 +66,7 @@ impl Cubic {
         }
     }
 
-    /// The difference `self - other`, coefficient by coefficient.
+    /// Returns the difference `self - other`, coefficient by coefficient.
     pub fn minus(&self, other: &Cubic) -> Cubic {
         Cubic::new(
             self.a - other.a,
@@ -75,7 +76,7 @@ impl Cubic {
         )
     }
 
-    /// The polynomial times `factor`.
+    /// Returns the polynomial times `factor`.
     pub fn scaled(&self, factor: f64) -> Cubic {
         Cubic::new(
             self.a * factor,
@@ -85,8 +86,8 @@ impl Cubic {
         )
     }
 
-    /// The lowest value over `[from, to]`: at an end or where the slope vanishes. `None` when
-    /// the interval is empty or a value is not finite.
+    /// Returns the lowest value over `[from, to]`. It lies at an end or where the slope vanishes.
+    /// Returns `None` if the interval is empty or a value is not finite.
     pub fn minimum(&self, from: f64, to: f64) -> Option<Minimum> {
         let proper = from.is_finite() && to.is_finite() && from <= to;
         if !proper {
@@ -108,7 +109,7 @@ impl Cubic {
         Some(lowest)
     }
 
-    /// The highest value over `[from, to]`; see [`Cubic::minimum`].
+    /// Returns the highest value over `[from, to]`; see [`Cubic::minimum`].
     pub fn maximum(&self, from: f64, to: f64) -> Option<Minimum> {
         let lowest = self.scaled(-1.0).minimum(from, to)?;
         Some(Minimum {
@@ -117,19 +118,19 @@ impl Cubic {
         })
     }
 
-    /// Where the slope vanishes, at most twice, in ascending order.
+    /// Returns the places where the slope vanishes, at most two, in ascending order.
     pub fn stationary(&self) -> [Option<f64>; 2] {
         quadratic_roots(3.0 * self.d, 2.0 * self.c, self.b)
     }
 }
 
-/// The real roots of `p·x² + q·x + r`, without cancellation; none when all coefficients vanish.
+/// Returns the real roots of `p·x² + q·x + r`, without cancellation; none for zero coefficients.
 fn quadratic_roots(p: f64, q: f64, r: f64) -> [Option<f64>; 2] {
     if p == 0.0 {
         let root = if q == 0.0 { None } else { finite(-r / q) };
         return [root, None];
     }
-    // Scaled so that the discriminant neither overflows nor vanishes.
+    // Scaling keeps the discriminant from overflowing or vanishing.
     let scale = p.abs().max(q.abs()).max(r.abs());
     let (p, q, r) = (p / scale, q / scale, r / scale);
     let discriminant = q * q - 4.0 * p * r;

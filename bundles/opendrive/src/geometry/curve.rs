@@ -1,13 +1,13 @@
-//! The shapes of a reference line, in their own coordinates and placed in the plan view.
+//! Shapes of a reference line, in local coordinates and in the plan view.
 
 use super::{ParamPoly3, Point, Poly3, Pose, Spiral, finite};
 
-/// The shape of one `<geometry>`: a curve that is entered at the origin of its local u/v system.
+/// The shape of one `<geometry>`: a curve that starts at the origin of its local u/v system.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Curve {
     /// A straight line (OpenDRIVE 1.9, 9.3).
     Line,
-    /// A circular arc (9.5); a vanishing curvature is evaluated as the straight line it means.
+    /// A circular arc (9.5). An arc with a vanishing curvature is evaluated as a straight line.
     Arc {
         /// The constant curvature in 1/m, positive to the left.
         curvature: f64,
@@ -21,7 +21,7 @@ pub enum Curve {
 }
 
 impl Curve {
-    /// The pose `ds` metres after the start of a curve of `length` metres, in local u and v.
+    /// Returns the pose `ds` metres after the start of a curve of `length` metres, in u and v.
     pub fn pose(&self, ds: f64, length: f64) -> Option<Pose> {
         match self {
             Curve::Line => Pose {
@@ -36,8 +36,8 @@ impl Curve {
         }
     }
 
-    /// The place `ds` metres after the start, in local u and v; defined even where a parametric
-    /// curve has no direction.
+    /// Returns the point `ds` metres after the start, in local u and v. It is defined even where a
+    /// parametric curve has no direction.
     pub fn point(&self, ds: f64, length: f64) -> Option<Point> {
         match self {
             Curve::ParamPoly3(curve) => curve.point(curve.parameter(ds, length)?),
@@ -45,8 +45,8 @@ impl Curve {
         }
     }
 
-    /// How long the curve really is, in metres, when its geometry claims `length`: the integral
-    /// over the whole range of the parameter for `paramPoly3`, `length` itself for the others.
+    /// Returns the true length of the curve in metres, for a stated `length`. For `paramPoly3`, it
+    /// is the integral over the whole parameter range. For other shapes, it is `length`.
     pub fn true_length(&self, length: f64) -> Option<f64> {
         match self {
             Curve::ParamPoly3(curve) => curve.arc_length(0.0, curve.last_parameter(length)),
@@ -55,7 +55,7 @@ impl Curve {
     }
 }
 
-/// The pose on a circle; the half-angle form keeps its digits for every curvature.
+/// Returns the pose on a circle. The half-angle form keeps its precision for every curvature.
 fn arc(curvature: f64, ds: f64) -> Option<Pose> {
     let half = finite(0.5 * curvature * ds)?;
     let (sin, cos) = half.sin_cos();
@@ -69,21 +69,21 @@ fn arc(curvature: f64, ds: f64) -> Option<Pose> {
     .finite()
 }
 
-/// A curve with its place in the plan view: where it starts, its heading there, its length.
+/// A curve in the plan view, with its start, start heading and length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placed {
-    /// Where the local system's origin lies, in metres.
+    /// Origin of the local system, in metres.
     pub origin: Point,
-    /// The heading of the local u axis, in radians.
+    /// Heading of the local u axis, in radians.
     pub hdg: f64,
-    /// The length that the geometry claims, in metres.
+    /// Length that the geometry states, in metres.
     pub length: f64,
     /// The shape.
     pub curve: Curve,
 }
 
 impl Placed {
-    /// The pose `ds` metres after the start.
+    /// Returns the pose `ds` metres after the start.
     pub fn pose(&self, ds: f64) -> Option<Pose> {
         let local = self.curve.pose(ds, self.length)?;
         let point = self.place(local.point())?;
@@ -96,12 +96,12 @@ impl Placed {
         .finite()
     }
 
-    /// The place `ds` metres after the start.
+    /// Returns the point `ds` metres after the start.
     pub fn point(&self, ds: f64) -> Option<Point> {
         self.place(self.curve.point(ds, self.length)?)
     }
 
-    /// Turns and shifts a local point into the plan view.
+    /// Rotates and shifts a local point into the plan view.
     pub fn place(&self, local: Point) -> Option<Point> {
         let (sin, cos) = self.hdg.sin_cos();
         Point::finite(

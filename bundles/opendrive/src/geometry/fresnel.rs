@@ -2,18 +2,18 @@
 
 use std::f64::consts::PI;
 
-/// Below this, the power series loses no more than two digits to cancellation.
+/// Below this argument, the power series loses at most two digits to cancellation.
 const SERIES_LIMIT: f64 = 1.7;
 
-/// Above this, both integrals are 1/2 to the last digit: they swing by `1/(π·x)`.
+/// Above this argument, both integrals are 1/2 to the last digit: they oscillate by `1/(π·x)`.
 const SETTLED: f64 = 1e17;
 
-/// The Fresnel integrals `C(x) = ∫₀ˣ cos(π·t²/2) dt` and `S(x) = ∫₀ˣ sin(π·t²/2) dt`, as
-/// `(C, S)`; both tend to ±1/2. `None` when `x` is not finite.
+/// Computes the Fresnel integrals `C(x) = ∫₀ˣ cos(π·t²/2) dt` and `S(x) = ∫₀ˣ sin(π·t²/2) dt` as
+/// `(C, S)`; both tend to ±1/2. Returns `None` if `x` is not finite.
 ///
-/// Small arguments by the power series, others by the continued fraction of the complementary
-/// error function on the diagonal of the complex plane (Abramowitz and Stegun, 7.3.11, 7.3.13,
-/// 7.3.22 and 7.1.14).
+/// Small arguments use the power series. Others use the complementary error function on the
+/// diagonal of the complex plane. Its continued fraction is from Abramowitz and Stegun, 7.3.11,
+/// 7.3.13, 7.3.22 and 7.1.14.
 pub fn fresnel(x: f64) -> Option<(f64, f64)> {
     if !x.is_finite() {
         return None;
@@ -47,8 +47,8 @@ fn series(x: f64) -> (f64, f64) {
     (c, s)
 }
 
-/// `C + i·S = (1+i)/2 · erf(z)` with `z = √π/2·(1-i)·x`, where `z² = -i·π·x²/2`; the continued
-/// fraction of `erfc(z)` is evaluated from its tail.
+/// Computes `C + i·S = (1+i)/2 · erf(z)` with `z = √π/2·(1-i)·x`, where `z² = -i·π·x²/2`. The
+/// continued fraction of `erfc(z)` is evaluated from its tail.
 fn continued_fraction(x: f64) -> (f64, f64) {
     const TERMS: u32 = 90;
     let double_square = -PI * x * x; // 2·z², purely imaginary
@@ -71,7 +71,7 @@ fn continued_fraction(x: f64) -> (f64, f64) {
     (0.5 * (1.0 - p + q), 0.5 * (1.0 - p - q))
 }
 
-/// Sine and cosine of `π·x²/2`, with the square reduced before it is multiplied.
+/// Returns the sine and cosine of `π·x²/2`. The square is reduced before the multiplication.
 fn quarter_phase(x: f64) -> (f64, f64) {
     let square = x * x;
     let error = x.mul_add(x, -square);
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
     use crate::geometry::quadrature::integrate;
 
-    /// Values to 16 digits, from tables of the integrals.
+    /// Checks values to 16 digits from tables of the integrals.
     #[test]
     fn known_values() {
         let table = [

@@ -1,7 +1,7 @@
-//! Plane curves and polynomials over plain numbers: no document, no allocation.
+//! Plane curves and polynomials over plain numbers, without documents or allocation.
 //!
-//! Whatever cannot be computed in finite double precision is `None`; nothing panics, and every
-//! function does a bounded amount of work whatever its arguments are.
+//! A result that cannot be computed in finite double precision is `None`. No function panics. Every
+//! function does a bounded amount of work for any arguments.
 
 mod cubic;
 mod curve;
@@ -21,7 +21,7 @@ pub use poly3::Poly3;
 pub use quadrature::integrate;
 pub use spiral::Spiral;
 
-/// The value, unless it is infinite or not a number.
+/// Returns the value, unless it is infinite or not a number.
 pub(crate) fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }

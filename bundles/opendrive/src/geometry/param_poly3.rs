@@ -2,7 +2,7 @@
 
 use super::{Cubic, Point, Pose, finite, integrate};
 
-/// What `@pRange` says about the curve's parameter.
+/// The range of the curve's parameter, from `@pRange`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ParamRange {
     /// The parameter runs from 0 to the geometry's `@length`.
@@ -23,7 +23,7 @@ pub struct ParamPoly3 {
 }
 
 impl ParamPoly3 {
-    /// The parameter's value at the end of a geometry of `length` metres.
+    /// Returns the parameter at the end of a geometry of `length` metres.
     pub fn last_parameter(&self, length: f64) -> f64 {
         match self.range {
             ParamRange::ArcLength => length,
@@ -31,9 +31,9 @@ impl ParamPoly3 {
         }
     }
 
-    /// The parameter that belongs to `ds` metres on a geometry of `length` metres. The standard
-    /// ties parameter and arc length together at the ends only (9.6.1); in between they are
-    /// taken as proportional, as simulators do.
+    /// Returns the parameter at `ds` metres on a geometry of `length` metres. The standard relates
+    /// parameter and arc length at the ends only (9.6.1). In between, they are assumed to be
+    /// proportional, as in simulators.
     pub fn parameter(&self, ds: f64, length: f64) -> Option<f64> {
         match self.range {
             ParamRange::ArcLength => finite(ds),
@@ -42,13 +42,13 @@ impl ParamPoly3 {
         }
     }
 
-    /// The place in u and v at parameter `p`.
+    /// Returns the point in u and v at parameter `p`.
     pub fn point(&self, p: f64) -> Option<Point> {
         Point::finite(self.u.value(p), self.v.value(p))
     }
 
-    /// The pose in u and v at parameter `p`; `None` where the tangent vanishes, because the
-    /// curve has no direction there.
+    /// Returns the pose in u and v at parameter `p`. Returns `None` where the tangent vanishes,
+    /// because the curve has no direction there.
     pub fn pose(&self, p: f64) -> Option<Pose> {
         let point = self.point(p)?;
         let (du, dv) = (self.u.slope(p), self.v.slope(p));
@@ -67,7 +67,7 @@ impl ParamPoly3 {
         .finite()
     }
 
-    /// The true length in metres between two parameters, by adaptive quadrature to 1e-10 m.
+    /// Returns the true length in metres between two parameters, by adaptive quadrature to 1e-10 m.
     pub fn arc_length(&self, from: f64, to: f64) -> Option<f64> {
         integrate(from, to, 1e-10, |p| self.u.slope(p).hypot(self.v.slope(p)))
     }

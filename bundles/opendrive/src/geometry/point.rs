@@ -14,12 +14,12 @@ pub struct Point {
 }
 
 impl Point {
-    /// The point with these coordinates, if both are finite.
+    /// Returns the point with these coordinates if both are finite.
     pub fn finite(x: f64, y: f64) -> Option<Point> {
         (x.is_finite() && y.is_finite()).then_some(Point { x, y })
     }
 
-    /// The distance to `other`, in metres.
+    /// Returns the distance to `other`, in metres.
     pub fn distance(self, other: Point) -> f64 {
         (self.x - other.x).hypot(self.y - other.y)
     }
@@ -37,12 +37,12 @@ pub struct Point3 {
 }
 
 impl Point3 {
-    /// The point with these coordinates, if all are finite.
+    /// Returns the point with these coordinates if all are finite.
     pub fn finite(x: f64, y: f64, z: f64) -> Option<Point3> {
         (x.is_finite() && y.is_finite() && z.is_finite()).then_some(Point3 { x, y, z })
     }
 
-    /// The point's place in the plan view.
+    /// Returns the point in the plan view.
     pub fn plan(self) -> Point {
         Point {
             x: self.x,
@@ -65,13 +65,13 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The pose, if all its numbers are finite.
+    /// Returns the pose if all its numbers are finite.
     pub fn finite(self) -> Option<Pose> {
         let all = [self.x, self.y, self.hdg, self.curvature];
         all.iter().all(|value| value.is_finite()).then_some(self)
     }
 
-    /// The pose's place.
+    /// Returns the point of the pose.
     pub fn point(self) -> Point {
         Point {
             x: self.x,
@@ -79,20 +79,20 @@ impl Pose {
         }
     }
 
-    /// The place `t` metres to the left of the pose (negative: to the right).
+    /// Returns the point `t` metres to the left of the pose (negative: to the right).
     pub fn beside(self, t: f64) -> Option<Point> {
         let (sin, cos) = self.hdg.sin_cos();
         Point::finite(self.x - sin * t, self.y + cos * t)
     }
 }
 
-/// The angle brought into (-π, π].
+/// Returns the angle wrapped into (-π, π].
 pub fn wrap_angle(angle: f64) -> Option<f64> {
     let wrapped = finite(angle)?.rem_euclid(TAU);
     Some(if wrapped > PI { wrapped - TAU } else { wrapped })
 }
 
-/// How far the two headings are apart, in radians from 0 to π.
+/// Returns the difference of the two headings, in radians from 0 to π.
 pub fn heading_difference(a: f64, b: f64) -> Option<f64> {
     wrap_angle(finite(a)? - finite(b)?).map(f64::abs)
 }

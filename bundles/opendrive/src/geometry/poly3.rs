@@ -1,8 +1,8 @@
-//! Cubic polynomials as road shape, deprecated since 1.6 (OpenDRIVE 1.9, 9.7).
+//! Cubic polynomials as road shapes, deprecated since 1.6 (OpenDRIVE 1.9, 9.7).
 
 use super::{Cubic, Point, Pose, integrate};
 
-/// How often Newton's method may correct `u`.
+/// Maximum number of Newton steps for `u`.
 const MAX_STEPS: u32 = 30;
 
 /// The curve `v(u)` in the local system of the geometry.
@@ -13,14 +13,13 @@ pub struct Poly3 {
 }
 
 impl Poly3 {
-    /// The true length in metres of the curve from `u = 0` to `u`, by adaptive quadrature to
-    /// 1e-10 m.
+    /// Returns the true length in metres from `u = 0` to `u`, by adaptive quadrature to 1e-10 m.
     pub fn arc_length(&self, u: f64) -> Option<f64> {
         integrate(0.0, u, 1e-10, |at| 1.0_f64.hypot(self.v.slope(at)))
     }
 
-    /// The `u` at which the curve is `ds` metres long: the curve grows by at least one metre per
-    /// metre of `u`, so that Newton's method, kept inside its bracket, always settles.
+    /// Returns the `u` at which the curve is `ds` metres long. The curve grows by at least one
+    /// metre per metre of `u`. Newton's method within its bracket therefore always converges.
     pub fn parameter(&self, ds: f64) -> Option<f64> {
         if !ds.is_finite() || ds == 0.0 {
             return (ds == 0.0).then_some(0.0);
@@ -47,7 +46,7 @@ impl Poly3 {
         None
     }
 
-    /// The pose in u and v at `u`.
+    /// Returns the pose in u and v at `u`.
     pub fn pose(&self, u: f64) -> Option<Pose> {
         let point = Point::finite(u, self.v.value(u))?;
         let slope = self.v.slope(u);

@@ -1,6 +1,6 @@
 //! Numerical integration with a bounded number of function calls.
 
-/// Nodes on (0, 1) of the eight-point Gauss-Legendre rule on [-1, 1]; it is symmetric.
+/// Nodes on (0, 1) of the eight-point Gauss-Legendre rule on [-1, 1]. The rule is symmetric.
 const NODES: [f64; 4] = [
     0.183_434_642_495_649_8,
     0.525_532_409_916_329,
@@ -16,14 +16,14 @@ const WEIGHTS: [f64; 4] = [
     0.101_228_536_290_376_3,
 ];
 
-/// How often an interval may be halved.
+/// Maximum number of times that an interval is halved.
 const MAX_DEPTH: u8 = 40;
 
-/// How many intervals may be looked at in all.
+/// Maximum number of intervals in total.
 const MAX_INTERVALS: u32 = 128;
 
-/// The integral of `f` over `[from, to]` by one eight-point Gauss-Legendre rule: exact for
-/// polynomials up to degree 15.
+/// Computes the integral of `f` over `[from, to]` by one eight-point Gauss-Legendre rule. The rule
+/// is exact for polynomials up to degree 15.
 pub(crate) fn gauss8(from: f64, to: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     let mut sum = 0.0;
@@ -33,11 +33,12 @@ pub(crate) fn gauss8(from: f64, to: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
     sum * half
 }
 
-/// The integral of `f` over `[from, to]`, halving intervals until two halves agree with their
-/// whole within `tolerance` (absolute, in units of the integral) or a relative 1e-13.
+/// Computes the integral of `f` over `[from, to]`. Intervals are halved until both halves agree
+/// with the whole. The limit is `tolerance` (absolute, in units of the integral) or a relative
+/// 1e-13.
 ///
-/// `None` when the ends or a value are not finite, or when the allowed number of intervals is
-/// spent before the result is settled: at most 128 intervals.
+/// Returns `None` if the ends or a value are not finite, or after 128 intervals without
+/// convergence.
 pub fn integrate(from: f64, to: f64, tolerance: f64, f: impl Fn(f64) -> f64) -> Option<f64> {
     if !from.is_finite() || !to.is_finite() {
         return None;

@@ -6,17 +6,17 @@ use super::fresnel::fresnel;
 use super::quadrature::gauss8;
 use super::{Point, Pose, finite};
 
-/// Up to this turning (largest curvature times length, in radians) positions come from
-/// quadrature, which has no cancellation however small the change of curvature is.
+/// Largest turn (largest curvature times length, in radians) for which positions come from
+/// quadrature. Quadrature has no cancellation, however small the change of curvature is.
 const MAX_QUADRATURE_TURN: f64 = 200.0;
 
-/// How far one eight-point rule may turn, in radians: its error stays below 1e-15.
+/// Maximum turn of one eight-point rule, in radians. Its error stays below 1e-15.
 const TURN_PER_RULE: f64 = 2.0;
 
-/// Phases above this leave fewer than six digits of a sine.
+/// Largest accepted phase. Beyond it, a sine has fewer than six correct digits.
 const MAX_PHASE: f64 = 1e9;
 
-/// A clothoid that starts at the origin in direction of the x axis.
+/// A clothoid that starts at the origin in the direction of the x axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spiral {
     /// The curvature at the start, in 1/m.
@@ -26,8 +26,8 @@ pub struct Spiral {
 }
 
 impl Spiral {
-    /// The clothoid whose curvature goes from `start` to `end` over `length` metres; `None`
-    /// without a positive length.
+    /// Returns the clothoid whose curvature goes from `start` to `end` over `length` metres.
+    /// Returns `None` if the length is not positive.
     pub fn between(start: f64, end: f64, length: f64) -> Option<Spiral> {
         if length.is_nan() || length <= 0.0 {
             return None;
@@ -39,18 +39,18 @@ impl Spiral {
         })
     }
 
-    /// The curvature after `ds` metres.
+    /// Returns the curvature after `ds` metres.
     pub fn curvature(&self, ds: f64) -> f64 {
         self.start + self.rate * ds
     }
 
-    /// The heading after `ds` metres: the integral of the curvature.
+    /// Returns the heading after `ds` metres, the integral of the curvature.
     pub fn heading(&self, ds: f64) -> f64 {
         ds * (self.start + 0.5 * self.rate * ds)
     }
 
-    /// The pose after `ds` metres; `None` when it is not finite or when the curve has turned so
-    /// often that double precision holds no direction any more.
+    /// Returns the pose after `ds` metres. Returns `None` if it is not finite. Also returns `None`
+    /// if the curve has turned too often for a direction in double precision.
     pub fn pose(&self, ds: f64) -> Option<Pose> {
         let point = self.point(ds)?;
         Pose {
@@ -62,7 +62,7 @@ impl Spiral {
         .finite()
     }
 
-    /// The place after `ds` metres; see [`Spiral::pose`].
+    /// Returns the point after `ds` metres; see [`Spiral::pose`].
     pub fn point(&self, ds: f64) -> Option<Point> {
         let sharpest = self.start.abs().max(self.curvature(ds).abs());
         let turn = finite(sharpest * ds.abs())?;
@@ -88,8 +88,8 @@ impl Spiral {
         Point::finite(x, y)
     }
 
-    /// With `θ(s) = θ₀ + rate/2·(s - s₀)²` around the point of zero curvature `s₀`, both
-    /// coordinates are differences of Fresnel integrals, turned by `θ₀`.
+    /// Computes both coordinates as differences of Fresnel integrals, rotated by `θ₀`:
+    /// `θ(s) = θ₀ + rate/2·(s - s₀)²` around the point of zero curvature `s₀`.
     fn point_by_fresnel(&self, ds: f64) -> Option<Point> {
         let scale = (self.rate.abs() / PI).sqrt();
         let inflection = -self.start / self.rate;

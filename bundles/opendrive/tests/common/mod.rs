@@ -1,4 +1,4 @@
-//! Documents made of text.
+//! Documents made from text, for tests.
 
 #![expect(clippy::expect_used, reason = "helpers of tests may fail a test")]
 
@@ -8,7 +8,7 @@ use qcbus_document::Document;
 use qcbus_ingest::{Limits, prepare_bytes};
 use qcbus_opendrive::RoadMap;
 
-/// The image of a file with this text.
+/// Returns the image of a file with this text.
 pub fn image(xml: &str) -> Vec<u8> {
     prepare_bytes(
         Path::new("map.xodr"),
@@ -18,7 +18,7 @@ pub fn image(xml: &str) -> Vec<u8> {
     .build()
 }
 
-/// Runs `test` on the map that `roads` make within a complete file.
+/// Runs `test` on the map that `roads` form within a complete file.
 pub fn with_map<T>(roads: &str, test: impl FnOnce(&RoadMap<'_>) -> T) -> T {
     let xml = format!("<OpenDRIVE><header revMajor=\"1\" revMinor=\"9\"/>{roads}</OpenDRIVE>");
     let image = image(&xml);

@@ -1,7 +1,7 @@
-//! What the operators and functions do with numbers.
+//! Arithmetic of the operators and functions.
 //!
-//! Integers are exact or fail; doubles are finite or fail, unless an infinite operand vanishes as
-//! in `min($infinite, 5)`. Errors say what failed without saying where.
+//! Integers are exact or fail. Doubles are finite or fail, unless an infinite operand vanishes as
+//! in `min($infinite, 5)`. Errors state the failure without its location.
 
 use std::fmt;
 
@@ -12,22 +12,22 @@ pub(super) enum Number {
     Double(f64),
 }
 
-/// A number, and what was lost on the way to it.
+/// A number and the precision that was lost in its computation.
 pub(super) struct Computed {
     pub number: Number,
     pub imprecise: Option<String>,
 }
 
-/// A computed number, or why there is none.
+/// A computed number, or the reason why there is none.
 pub(super) type Outcome = Result<Computed, String>;
 
-/// What a function of one argument does.
+/// Implementation of a function of one argument.
 pub(super) type OfOne = fn(Number) -> Outcome;
 
-/// What an operator or a function of two arguments does.
+/// Implementation of an operator or a function of two arguments.
 pub(super) type OfTwo = fn(Number, Number) -> Outcome;
 
-/// The number that `literal` stands for, which agrees with the grammar.
+/// Returns the number that `literal` stands for. The literal must follow the grammar.
 pub(super) fn literal(literal: &str) -> Outcome {
     if literal.bytes().all(|digit| digit.is_ascii_digit()) {
         return match literal.parse() {
@@ -84,7 +84,7 @@ pub(super) fn divide(left: Number, right: Number) -> Outcome {
 pub(super) fn remainder(left: Number, right: Number) -> Outcome {
     match (left, right) {
         _ if right.is_zero() => Err(by_zero("%")),
-        // The only remainder that wraps is that of -1, and it is right: 0.
+        // Only the remainder of a division by -1 wraps. Its result 0 is correct.
         (Number::Integer(l), Number::Integer(r)) => exact(Number::Integer(l.wrapping_rem(r))),
         _ => doubles("%", left, right, |l, r| l % r),
     }
@@ -192,13 +192,13 @@ fn exact(number: Number) -> Outcome {
     })
 }
 
-/// An integer if the operation `by` did not overflow.
+/// Returns an integer if the operation `by` did not overflow.
 fn integer(value: Option<i64>, by: &str) -> Outcome {
     let overflow = || format!("the result of `{by}` is no integer of 64 bits");
     exact(Number::Integer(value.ok_or_else(overflow)?))
 }
 
-/// A function over a double.
+/// Applies a function to a double.
 fn double(by: &str, x: Number, function: fn(f64) -> f64) -> Outcome {
     Ok(Computed {
         number: finite(by, function(x.value()))?,
@@ -206,7 +206,7 @@ fn double(by: &str, x: Number, function: fn(f64) -> f64) -> Outcome {
     })
 }
 
-/// An operation over two doubles.
+/// Applies an operation to two doubles.
 fn doubles(by: &str, x: Number, y: Number, operation: fn(f64, f64) -> f64) -> Outcome {
     Ok(Computed {
         number: finite(by, operation(x.value(), y.value()))?,
@@ -224,7 +224,8 @@ fn finite(by: &str, value: f64) -> Result<Number, String> {
     }
 }
 
-/// `outcome` of `by`, with a remark if it is zero and neither of the finite operands is.
+/// Returns `outcome` of `by`. Adds a remark if the result is zero and both operands are finite and
+/// not zero.
 fn watch_underflow(by: &str, x: Number, y: Number, outcome: Outcome) -> Outcome {
     let usual = |operand: Number| operand.value().is_finite() && !operand.is_zero();
     let mut computed = outcome?;
@@ -235,9 +236,10 @@ fn watch_underflow(by: &str, x: Number, y: Number, outcome: Outcome) -> Outcome 
     Ok(computed)
 }
 
-/// The whole number that `function` makes of `x`: an integer if one is large enough.
+/// Returns the whole number that `function` computes from `x`. The result is an integer if it fits
+/// into one.
 fn whole(by: &str, x: Number, function: fn(f64) -> f64) -> Outcome {
-    /// 2⁶³, the first double beyond the integers.
+    /// 2⁶³, the first double that exceeds the integers.
     const END: f64 = 9_223_372_036_854_775_808.0;
     let Number::Double(value) = x else {
         return exact(x);
@@ -266,7 +268,7 @@ fn by_zero(operator: &str) -> String {
 }
 
 impl Number {
-    /// The number as a double, the nearest one for an integer.
+    /// Returns the number as a double. For an integer this is the nearest double.
     fn value(self) -> f64 {
         match self {
             Number::Integer(value) => value as f64,
@@ -278,12 +280,14 @@ impl Number {
         self.value() == 0.0
     }
 
-    /// What is lost when the number is used as a double, which is nothing up to 2⁵³.
+    /// Returns the precision that is lost when the number is used as a double. Up to 2⁵³ no
+    /// precision is lost.
     fn lost_as_double(self) -> Option<String> {
         let Number::Integer(value) = self else {
             return None;
         };
-        // In 128 bits, because the double nearest to the largest integer is no integer of 64.
+        // 128 bits are needed because the double nearest to the largest integer does not fit into
+        // 64 bits.
         let becomes = self.value() as i128;
         let lost = becomes != i128::from(value);
         lost.then(|| format!("the integer {value} becomes {becomes} as a double"))

@@ -1,7 +1,7 @@
-//! The value of a tree.
+//! Evaluation of an expression tree.
 //!
-//! One pass finds the types, the value and the gravest fault. Whatever goes wrong in a part, its
-//! type is known in most cases, so that the types around it are checked all the same.
+//! One pass finds the types, the value and the gravest fault. The type of a faulty part is known in
+//! most cases. The types around it are therefore still checked.
 
 use std::f64::consts::PI;
 
@@ -10,7 +10,7 @@ use super::tree::{Link, Node, NodeKind};
 use super::words::{Action, PI_SINCE};
 use super::{Evaluated, Fault, FaultKind, Imprecision, Newer, Operand, Value, Version, quoted};
 
-/// The value of `tree`, an expression in a file of this `version`.
+/// Evaluates `tree`, an expression in a file of this `version`.
 pub(super) fn evaluate(
     tree: &Node<'_>,
     version: Version,
@@ -36,7 +36,7 @@ pub(super) fn evaluate(
     })
 }
 
-/// What is known about a part: its type, and its value or the gravest fault in it.
+/// Knowledge about a part: its type, and its value or its gravest fault.
 enum Typed {
     Number(Result<Number, Fault>),
     Boolean(Result<bool, Fault>),
@@ -143,7 +143,7 @@ impl Evaluator<'_> {
         })
     }
 
-    /// The number that was computed at `at`; remembers what was lost first.
+    /// Returns the number that was computed at `at`. Records the first loss of precision.
     fn computed(&mut self, at: usize, outcome: arithmetic::Outcome) -> Result<Number, Fault> {
         let computed = outcome.map_err(|why| Fault::evaluation(at, why))?;
         if self.imprecise.is_none() {
@@ -161,7 +161,7 @@ impl Evaluator<'_> {
 }
 
 impl Typed {
-    /// As an operand, written at `at`, of what takes numbers.
+    /// Returns the value as an operand at `at` of a `taker` of numbers.
     fn number(self, at: usize, taker: &str) -> Result<Number, Fault> {
         match self {
             Typed::Number(number) => number,
@@ -170,7 +170,7 @@ impl Typed {
         }
     }
 
-    /// As an operand, written at `at`, of what takes booleans.
+    /// Returns the value as an operand at `at` of a `taker` of booleans.
     fn boolean(self, at: usize, taker: &str) -> Result<bool, Fault> {
         match self {
             Typed::Boolean(value) => value,
@@ -190,7 +190,7 @@ impl From<Value> for Typed {
     }
 }
 
-/// The type fault of an operand, or the fault within it if that is graver.
+/// Returns the type fault of an operand, or the fault within it if that is graver.
 fn misfit(at: usize, taker: &str, takes: &str, found: &str, inner: Option<Fault>) -> Fault {
     let text = format!("`{taker}` takes {takes}, found {found}");
     let fault = Fault::new(FaultKind::Types, at, text);
@@ -200,7 +200,7 @@ fn misfit(at: usize, taker: &str, takes: &str, found: &str, inner: Option<Fault>
     }
 }
 
-/// Both operands, or the graver fault.
+/// Returns both operands, or the graver fault.
 fn both<L, R>(left: Result<L, Fault>, right: Result<R, Fault>) -> Result<(L, R), Fault> {
     match (left, right) {
         (Ok(left), Ok(right)) => Ok((left, right)),
@@ -209,7 +209,8 @@ fn both<L, R>(left: Result<L, Fault>, right: Result<R, Fault>) -> Result<(L, R),
     }
 }
 
-/// The result of the whole. Only a parameter of its own can be infinite.
+/// Returns the result of the whole expression. It can be infinite only if the whole expression is a
+/// parameter.
 fn finite(number: Number, at: usize) -> Result<Value, Fault> {
     match number {
         Number::Integer(value) => Ok(Value::Integer(value)),

@@ -1,4 +1,4 @@
-//! The text of an expression in lexemes.
+//! Lexer: splits the text of an expression into lexemes.
 
 use super::words::FOREIGN;
 use super::{Fault, FaultKind, OPENING, is_blank, quoted};
@@ -7,7 +7,7 @@ use crate::text::identifier;
 /// The signs of the language.
 const SIGNS: [char; 8] = ['+', '-', '*', '/', '%', '(', ')', ','];
 
-/// A number, name, word or sign, and where it stands.
+/// A number, name, word or sign, and its position.
 #[derive(Clone, Copy)]
 pub(super) struct Lexeme<'t> {
     pub at: usize,
@@ -17,7 +17,7 @@ pub(super) struct Lexeme<'t> {
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Token {
-    /// As the grammar writes it.
+    /// A number in the notation of the grammar.
     Number,
     /// A name with its `$`.
     Parameter,
@@ -31,20 +31,20 @@ pub(super) enum Token {
     End,
 }
 
-/// Reads lexemes from the front of a text. What is no lexeme is a fault when it is reached.
+/// Reads lexemes from the front of a text. Reports a fault when it reaches invalid text.
 #[derive(Clone)]
 pub(super) struct Lexer<'t> {
     at: usize,
     rest: &'t str,
 }
 
-/// The name that `rest` begins with.
+/// Returns the name at the start of `rest`.
 pub(super) fn name(rest: &str) -> Option<&str> {
     Some(identifier(rest)).filter(|name| !name.is_empty())
 }
 
 impl<'t> Lexer<'t> {
-    /// A lexer behind the `${` that `text` begins with.
+    /// Creates a lexer that starts after the `${` at the start of `text`.
     pub fn new(text: &'t str) -> Result<Lexer<'t>, Fault> {
         let mut lexer = Lexer { at: 0, rest: text };
         lexer.skip_blanks();
@@ -57,13 +57,13 @@ impl<'t> Lexer<'t> {
         }
     }
 
-    /// What is left, without the blanks around it, and where it begins.
+    /// Returns the remaining text without surrounding blanks, and its position.
     pub fn left(&mut self) -> (usize, &'t str) {
         self.skip_blanks();
         (self.at, self.rest.trim_end_matches(is_blank))
     }
 
-    /// The next lexeme.
+    /// Returns the next lexeme.
     pub fn read(&mut self) -> Result<Lexeme<'t>, Fault> {
         self.skip_blanks();
         let (at, rest) = (self.at, self.rest);
@@ -93,8 +93,8 @@ impl<'t> Lexer<'t> {
         taken
     }
 
-    /// The length of the number here. Everything is taken for a part of it that could be meant as
-    /// one, so that `5f` is one fault and not two lexemes.
+    /// Returns the length of the number here. All characters that could be meant as part of it are
+    /// included. `5f` is therefore one fault and not two lexemes.
     fn number(&self) -> Result<usize, Fault> {
         let (mut digits_only, mut after_e) = (true, false);
         let end = self.rest.find(|c: char| {
@@ -147,7 +147,7 @@ impl<'t> Lexer<'t> {
     }
 }
 
-/// A character for a message: an invisible one by its number.
+/// Formats a character for a message. An invisible character is shown as its number.
 fn shown(c: char) -> String {
     if c.is_control() || c.is_whitespace() {
         format!("the character U+{:04X}", u32::from(c))
@@ -159,7 +159,7 @@ fn shown(c: char) -> String {
 const FOREIGN_TO_NUMBERS: &str =
     "numbers are written like `2`, `0.5` or `1.5e-3`, without units and separators";
 
-/// What keeps `text` from being a number by the grammar.
+/// Returns the reason why `text` is no number of the grammar.
 fn misspelt(text: &str) -> Option<&'static str> {
     let parts = text.split_once(['e', 'E']);
     let (mantissa, exponent) = parts.map_or((text, None), |(m, e)| (m, Some(e)));

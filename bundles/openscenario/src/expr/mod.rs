@@ -19,18 +19,19 @@
 //!
 //! Words and names are case-sensitive. There are no comparisons, no texts and no powers with `^`.
 //!
-//! * A number without fraction and exponent is an integer of 64 bits, any other a double.
-//! * `+ - * %`, `max`, `min`, `abs` and the unary minus keep integers; with one double they give a
-//!   double. `/`, `sqrt`, `pow` and the trigonometric functions, in radians, always give a double.
-//!   `round` (halves away from zero), `floor`, `ceil` and `sign` give an integer.
-//! * `%` is the remainder with the sign of its left operand, as in C; not a modulo.
-//! * `not`, `and`, `or` take booleans, everything else takes numbers; nothing converts between them.
+//! * A number without fraction and exponent is an integer of 64 bits. Any other number is a double.
+//! * `+ - * %`, `max`, `min`, `abs` and the unary minus keep integers. With one double they return
+//!   a double. `/`, `sqrt`, `pow` and the trigonometric functions (in radians) always return a
+//!   double. `round` (halves away from zero), `floor`, `ceil` and `sign` return an integer.
+//! * `%` is the remainder with the sign of its left operand, as in C. It is not a modulo.
+//! * `not`, `and`, `or` take booleans, everything else takes numbers. There is no conversion
+//!   between them.
 //!
-//! An expression has one [`Fault`] at most, the gravest: what cannot be read, before names that do
-//! not exist, before types that do not fit, before values that cannot be computed.
+//! An expression has at most one [`Fault`], the gravest. The order is: text that cannot be read,
+//! names that do not exist, types that do not fit, values that cannot be computed.
 //!
-//! The way of an expression: `lexer` → `parser` → `tree` → `evaluate`. The operators and functions
-//! are a table, `words`; what they do with numbers is `arithmetic`.
+//! An expression passes through `lexer` → `parser` → `tree` → `evaluate`. The operators and
+//! functions are a table, `words`. Their arithmetic is in `arithmetic`.
 
 mod arithmetic;
 mod evaluate;
@@ -41,13 +42,13 @@ mod words;
 
 use std::fmt;
 
-/// Length in bytes beyond which an expression is not read.
+/// Maximum length of an expression in bytes. A longer one is not read.
 pub const MAX_LENGTH: usize = 16 * 1024;
 
-/// Depth of brackets, calls and signs beyond which an expression is not read.
+/// Maximum depth of brackets, calls and signs. A deeper expression is not read.
 pub const MAX_DEPTH: usize = 64;
 
-/// What every expression begins with.
+/// Opening of every expression.
 const OPENING: &str = "${";
 
 /// A version of OpenSCENARIO, major and minor.
@@ -58,101 +59,102 @@ type Version = (u16, u16);
 pub enum Value {
     /// A whole number: any of the integer types.
     Integer(i64),
-    /// A number with a fraction. As a result it is finite.
+    /// A double. It is finite if it is a result.
     Double(f64),
     /// A truth value.
     Boolean(bool),
 }
 
-/// What a name stands for where the expression is written.
+/// Meaning of a name at the place of the expression.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Operand {
     /// A parameter with this value.
     Value(Value),
-    /// A parameter that cannot be computed with, and its type as messages name it: `string`,
-    /// `dateTime`.
+    /// A parameter that is not usable in computations. The text is its type as messages name it:
+    /// `string`, `dateTime`.
     Text(&'static str),
-    /// A parameter whose declaration is faulty, which is said there.
+    /// A parameter with a faulty declaration. The fault is reported at the declaration.
     Unresolved,
-    /// Nothing has this name.
+    /// No parameter or variable has this name.
     Undeclared,
-    /// No parameter, but a variable has this name.
+    /// A variable, not a parameter, has this name.
     Variable,
 }
 
-/// An expression's value and what is notable about it.
+/// An expression's value and remarks about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluated {
     /// The value.
     pub value: Value,
-    /// Whether it depends on a parameter, so that it may differ where others are given.
+    /// Whether it depends on a parameter. Its value may then differ with other parameters.
     pub uses_parameters: bool,
-    /// Functions and constants that came with a later version than the file's, each where it is
-    /// first used.
+    /// Functions and constants that are newer than the file's version, each at its first use.
     pub newer: Vec<Newer>,
-    /// The first place where a digit that was written or computed is lost.
+    /// First position where precision of a written or computed number is lost.
     pub imprecise: Option<Imprecision>,
 }
 
-/// A function, or `pi`, that is used in a file of an earlier version than the one it came with.
+/// A function, or `pi`, that is newer than the version of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Newer {
     /// Its name.
     pub name: &'static str,
-    /// The version it came with, major and minor.
+    /// Version that introduced it, major and minor.
     pub since: (u16, u16),
-    /// Where it is used: byte offset into the text.
+    /// Position of its use: byte offset into the text.
     pub at: usize,
 }
 
-/// An integer that no double represents is used as one, or numbers other than zero give zero.
+/// Loss of precision. An integer without an exact double is used as a double, or non-zero numbers
+/// give zero.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Imprecision {
-    /// Where: byte offset into the text.
+    /// Position: byte offset into the text.
     pub at: usize,
-    /// What is lost: a part of a sentence.
+    /// Description of the loss: a part of a sentence.
     pub text: String,
 }
 
-/// Why an expression has no value.
+/// Reason why an expression has no value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
-    /// The kind, which decides the rule that reports it.
+    /// Kind of the fault. It decides which rule reports it.
     pub kind: FaultKind,
-    /// Where: byte offset into the text, at most its length.
+    /// Position: byte offset into the text, at most its length.
     pub at: usize,
-    /// What was found and what is allowed: a part of a sentence.
+    /// The found and the allowed text: a part of a sentence.
     pub text: String,
 }
 
 /// The kinds of [`Fault`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FaultKind {
-    /// An operator, function, constant or character that the language does not have, or a number with
-    /// letters in it.
+    /// An operator, function, constant or character that the language does not have, or a number
+    /// with letters in it.
     Operator,
-    /// A function without brackets or with another number of arguments than it takes.
+    /// A function without brackets or with a wrong number of arguments.
     Arguments,
     /// Boolean operators on numbers, or arithmetic on booleans.
     Types,
-    /// Not written by the grammar, a text among the operands, or without a finite value.
+    /// The expression violates the grammar, has a text among its operands, or has no finite value.
     Evaluation,
     /// No parameter has this name.
     Undeclared(String),
-    /// This is the name of a variable, which expressions cannot read.
+    /// A variable has this name. Expressions cannot read variables.
     Variable(String),
-    /// It rests on a parameter whose declaration is faulty, which is said there.
+    /// The value depends on a parameter with a faulty declaration. The fault is reported at the
+    /// declaration.
     Unresolved,
-    /// It is longer than [`MAX_LENGTH`] or nested deeper than [`MAX_DEPTH`].
+    /// The expression is longer than [`MAX_LENGTH`] or nested deeper than [`MAX_DEPTH`].
     Limit,
 }
 
 /// Evaluates an attribute's whole `text`, from `${` to `}`, in a file of this `version` (major and
-/// minor), where `lookup` knows the parameters. Version 1.0 had no expressions and is read as 1.1.
+/// minor). `lookup` resolves the parameters. Version 1.0 had no expressions and is read as 1.1.
 ///
 /// # Errors
 ///
-/// The gravest fault of the expression; among equals the first.
+/// Returns the gravest fault of the expression. Among equal faults it is the first.
 pub fn evaluate(
     text: &str,
     version: (u16, u16),
@@ -163,8 +165,8 @@ pub fn evaluate(
     evaluate::evaluate(&tree, version, lookup)
 }
 
-/// The names behind `$` in an expression, repetitions included, each with the byte offset of its
-/// `$`; of a faulty expression, too. Empty when `text` is no expression.
+/// Returns the names after `$` in an expression, including repetitions and faulty expressions. Each
+/// comes with the byte offset of its `$`. The list is empty if `text` is no expression.
 pub fn names(text: &str) -> Vec<(&str, usize)> {
     if !is_expression(text) {
         return Vec::new();
@@ -174,12 +176,13 @@ pub fn names(text: &str) -> Vec<(&str, usize)> {
     dollars.filter_map(named).collect()
 }
 
-/// Whether `text` is meant as an expression: it begins with `${`, XML blanks aside.
+/// Checks whether `text` is meant as an expression: it begins with `${` after optional XML blanks.
 pub fn is_expression(text: &str) -> bool {
     text.trim_start_matches(is_blank).starts_with(OPENING)
 }
 
-/// Whether the schemas from 1.1 on admit `text` as an expression, by its characters only.
+/// Checks whether the schemas from 1.1 on admit `text` as an expression. They look at its
+/// characters only.
 pub(crate) fn is_of_schema(text: &str) -> bool {
     let inner = text
         .strip_prefix(OPENING)
@@ -193,7 +196,7 @@ fn is_blank(c: char) -> bool {
     matches!(c, ' ' | '\t' | '\r' | '\n')
 }
 
-/// `code` as messages quote it: in backticks, on one line, and not longer than a line.
+/// Quotes `code` for messages: in backticks, on one line, and cut to a maximum length.
 fn quoted(code: &str) -> String {
     const LONGEST: usize = 40;
     let mut shown: String = code.chars().take(LONGEST).collect();
@@ -216,7 +219,7 @@ impl Fault {
         Fault::new(FaultKind::Evaluation, at, text)
     }
 
-    /// The graver of two faults; of equals the first.
+    /// Returns the graver of two faults. If both are equal, returns the first.
     fn or_graver(self, other: Fault) -> Fault {
         if other.kind.rank() < self.kind.rank() {
             other
@@ -227,7 +230,8 @@ impl Fault {
 }
 
 impl FaultKind {
-    /// The gravest is 0: it hides the others, most of which would follow from it.
+    /// Returns the rank. The gravest is 0. It hides the others, because most of them are its
+    /// consequences.
     fn rank(&self) -> u8 {
         match self {
             FaultKind::Limit | FaultKind::Operator | FaultKind::Arguments => 0,

@@ -1,4 +1,4 @@
-//! Lexemes into a tree, one method for each line of the grammar.
+//! Parser: builds a tree from lexemes, with one method for each line of the grammar.
 
 use std::f64::consts::E;
 
@@ -11,7 +11,7 @@ const MISSING_END: &str = "the expression ends without its `}`";
 
 type Parsed<'t> = Result<Node<'t>, Fault>;
 
-/// The tree of the expression that is the whole of `text`.
+/// Parses the whole of `text` as one expression.
 pub(super) fn parse(text: &str) -> Parsed<'_> {
     if text.len() > MAX_LENGTH {
         let length = text.len();
@@ -30,9 +30,9 @@ pub(super) fn parse(text: &str) -> Parsed<'_> {
 
 struct Parser<'t> {
     lexer: Lexer<'t>,
-    /// The lexeme that decides what comes next.
+    /// Lookahead lexeme.
     ahead: Lexeme<'t>,
-    /// How many brackets, calls and signs are open.
+    /// Number of open brackets, calls and signs.
     depth: usize,
 }
 
@@ -91,8 +91,8 @@ impl<'t> Parser<'t> {
             return Ok(Node { at, kind });
         }
         if self.ahead.text == "not" {
-            // Beyond the grammar, as in `1 + not true`: that it is no number says more than that
-            // it is misplaced.
+            // The grammar does not allow this `not`, as in `1 + not true`. The message that it is
+            // no number is more helpful than one about its position.
             return self.not();
         }
         self.primary()
@@ -123,7 +123,7 @@ impl<'t> Parser<'t> {
         if !self.eat(")")? {
             return Err(self.misplaced(Some(opening)));
         }
-        // The whole begins at its bracket.
+        // The node begins at its bracket.
         Ok(Node {
             at: opening.at,
             kind: inner.kind,
@@ -149,7 +149,7 @@ impl<'t> Parser<'t> {
         Ok(Node { at, kind })
     }
 
-    /// The arguments of a function in their brackets, whatever their number.
+    /// Parses the arguments of a function in their brackets. Any number is accepted here.
     fn arguments(&mut self, at: usize, function: &Function) -> Result<Vec<Node<'t>>, Fault> {
         let opening = self.ahead;
         if !self.eat("(")? {
@@ -174,7 +174,7 @@ impl<'t> Parser<'t> {
         }
     }
 
-    /// Operands joined by any of the `operators`.
+    /// Parses operands that are joined by any of the `operators`.
     fn chain(
         &mut self,
         operators: &'static [Operator],
@@ -203,7 +203,7 @@ impl<'t> Parser<'t> {
         })
     }
 
-    /// What `inner` parses, one level deeper. The level began at `at`.
+    /// Parses `inner` one level deeper. The level began at `at`.
     fn nested(&mut self, at: usize, inner: fn(&mut Parser<'t>) -> Parsed<'t>) -> Parsed<'t> {
         if self.depth == MAX_DEPTH {
             let text = format!("the expression is nested deeper than {MAX_DEPTH} levels");
@@ -220,7 +220,7 @@ impl<'t> Parser<'t> {
         Ok(())
     }
 
-    /// Steps over `expected` if it is ahead, which is the answer.
+    /// Skips `expected` if it is the next lexeme, and returns whether it was.
     fn eat(&mut self, expected: &str) -> Result<bool, Fault> {
         let found = self.ahead.text == expected;
         if found {
@@ -229,7 +229,7 @@ impl<'t> Parser<'t> {
         Ok(found)
     }
 
-    /// Why what is ahead cannot be an operand.
+    /// Returns the reason why the next lexeme cannot be an operand.
     fn no_operand(&self) -> Fault {
         let Lexeme { at, text, token } = self.ahead;
         if token == Token::Word && !words::is_known(text) {
@@ -246,7 +246,8 @@ impl<'t> Parser<'t> {
         Fault::evaluation(at, text)
     }
 
-    /// Why what is ahead cannot follow an operand, perhaps within brackets.
+    /// Returns the reason why the next lexeme cannot follow an operand. `opening` is the open
+    /// bracket, if any.
     fn misplaced(&self, opening: Option<Lexeme<'_>>) -> Fault {
         let Lexeme { at, text, token } = self.ahead;
         match (token, text, opening) {
@@ -271,7 +272,7 @@ impl<'t> Parser<'t> {
         }
     }
 
-    /// That the language does not have the word ahead, and what it has instead.
+    /// Reports that the language does not have the next word, and which alternative exists.
     fn unknown_word(&self, instead: String) -> Fault {
         let word = self.ahead.text;
         let way_out = match words::ignoring_case(word) {
@@ -283,7 +284,7 @@ impl<'t> Parser<'t> {
         Fault::new(FaultKind::Operator, self.ahead.at, text)
     }
 
-    /// What may be meant by an unknown word in the place of an operand.
+    /// Suggests the meaning of an unknown word at the position of an operand.
     fn function_or_parameter(&self) -> String {
         let word = self.ahead.text;
         let is_called = self.lexer.clone().read().is_ok_and(|next| next.text == "(");

@@ -1,4 +1,4 @@
-//! What the parser makes of an expression.
+//! Syntax tree of an expression.
 
 use super::Value;
 use super::arithmetic::{OfOne, OfTwo};
@@ -6,13 +6,13 @@ use super::words::{Function, Operator};
 
 /// An expression or a part of one.
 pub(super) struct Node<'t> {
-    /// Where it begins: byte offset into the text.
+    /// Start: byte offset into the text.
     pub at: usize,
     pub kind: NodeKind<'t>,
 }
 
 pub(super) enum NodeKind<'t> {
-    /// A number as written, in agreement with the grammar.
+    /// A number as written, valid by the grammar.
     Number(&'t str),
     /// `true`, `false`.
     Constant(Value),
@@ -24,8 +24,8 @@ pub(super) enum NodeKind<'t> {
     Minus(Box<Node<'t>>),
     /// `not` before its operand.
     Not(Box<Node<'t>>),
-    /// Operands joined by operators of one precedence, to be taken from left to right. As a list
-    /// `1+1+1+…` is not deep, however long.
+    /// Operands joined by operators of one precedence, evaluated from left to right. The list keeps
+    /// `1+1+1+…` flat, however long it is.
     Chain(Box<Node<'t>>, Vec<Link<'t>>),
     /// A function of one argument.
     Call1(&'static Function, OfOne, Box<Node<'t>>),
@@ -33,9 +33,9 @@ pub(super) enum NodeKind<'t> {
     Call2(&'static Function, OfTwo, Box<[Node<'t>; 2]>),
 }
 
-/// An operator and what follows it.
+/// An operator and its right operand.
 pub(super) struct Link<'t> {
-    /// Where the operator stands.
+    /// Position of the operator.
     pub at: usize,
     pub operator: &'static Operator,
     pub operand: Node<'t>,

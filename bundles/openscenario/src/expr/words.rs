@@ -1,4 +1,4 @@
-//! The words and signs of the language.
+//! Words and signs of the language.
 
 use super::Version;
 use super::arithmetic::{self as numbers, OfOne, OfTwo};
@@ -9,7 +9,7 @@ pub(super) struct Operator {
     pub action: Action,
 }
 
-/// What an operator does with its operands.
+/// Computation of an operator.
 #[derive(Clone, Copy)]
 pub(super) enum Action {
     Numbers(OfTwo),
@@ -19,19 +19,19 @@ pub(super) enum Action {
 /// A function.
 pub(super) struct Function {
     pub name: &'static str,
-    /// The version that it came with.
+    /// Version that introduced it.
     pub since: Version,
     pub form: Form,
 }
 
-/// How many arguments a function takes, and what it does with them.
+/// Number of arguments of a function, and its computation.
 #[derive(Clone, Copy)]
 pub(super) enum Form {
     One(OfOne),
     Two(OfTwo),
 }
 
-/// The operators that bind least.
+/// Operators with the lowest precedence.
 pub(super) static OR: [Operator; 1] = [Operator::booleans("or", |a, b| a || b)];
 
 pub(super) static AND: [Operator; 1] = [Operator::booleans("and", |a, b| a && b)];
@@ -41,14 +41,14 @@ pub(super) static SUM: [Operator; 2] = [
     Operator::numbers("-", numbers::subtract),
 ];
 
-/// The operators that bind most.
+/// Operators with the highest precedence.
 pub(super) static PRODUCT: [Operator; 3] = [
     Operator::numbers("*", numbers::multiply),
     Operator::numbers("/", numbers::divide),
     Operator::numbers("%", numbers::remainder),
 ];
 
-/// The functions. What the standard has since 1.3, simulators have taken from 1.1 on.
+/// The functions. Simulators accept those of version 1.3 from 1.1 on.
 pub(super) static FUNCTIONS: [Function; 15] = {
     use Form::{One, Two};
     [
@@ -70,26 +70,26 @@ pub(super) static FUNCTIONS: [Function; 15] = {
     ]
 };
 
-/// The version that `pi` came with. Simulators have taken it before.
+/// Version that introduced `pi`. Simulators accepted it earlier.
 pub(super) const PI_SINCE: Version = (1, 4);
 
-/// Words that are neither functions nor behind a `$`.
+/// Words that are neither functions nor preceded by `$`.
 const RESERVED: [&str; 6] = ["not", "and", "or", "true", "false", "pi"];
 
-/// Whether the language has this word.
+/// Checks whether the language has this word.
 pub(super) fn is_known(word: &str) -> bool {
     RESERVED.contains(&word) || Function::named(word).is_some()
 }
 
-/// The word of the language that `word` is but for capitals.
+/// Returns the word of the language that equals `word` if case is ignored.
 pub(super) fn ignoring_case(word: &str) -> Option<&'static str> {
     let functions = FUNCTIONS.iter().map(|function| function.name);
     let mut words = functions.chain(RESERVED);
     words.find(|known| known.eq_ignore_ascii_case(word))
 }
 
-/// What other languages write and this one does not, the longer before the shorter, each with the
-/// way out.
+/// Notations of other languages that this one does not have, each with the alternative. The longer
+/// ones come before the shorter ones.
 pub(super) static FOREIGN: [(&str, &str); 28] = [
     ("**", POWER),
     ("^", POWER),
@@ -144,12 +144,12 @@ impl Function {
         Function { name, since, form }
     }
 
-    /// The function of this name.
+    /// Returns the function of this name.
     pub fn named(name: &str) -> Option<&'static Function> {
         FUNCTIONS.iter().find(|function| function.name == name)
     }
 
-    /// What it takes, for messages.
+    /// Returns the expected arguments for messages.
     pub fn takes(&self) -> String {
         let name = self.name;
         match self.form {

@@ -1,4 +1,4 @@
-//! Scenarios made of text.
+//! Scenarios made from text, for tests.
 
 #![expect(clippy::expect_used, reason = "helpers of tests may fail a test")]
 
@@ -8,7 +8,7 @@ use qcbus_document::{Document, FileKind};
 use qcbus_ingest::{Limits, prepare_bytes};
 use qcbus_openscenario::{Inputs, LinkedCatalog, LinkedMap, Scenario};
 
-/// The image of a file.
+/// Returns the image of a file.
 fn image(name: &str, text: &str) -> Vec<u8> {
     prepare_bytes(
         Path::new(name),
@@ -18,8 +18,9 @@ fn image(name: &str, text: &str) -> Vec<u8> {
     .build()
 }
 
-/// Runs `test` on what `body` makes of a file of version 1.3, with these catalogs, each the content of
-/// a `Catalog` called `c` plus its number, in the directory of the location at the same place.
+/// Runs `test` on the scenario with this `body` in a file of version 1.3, with these catalogs. Each
+/// text is the content of a `Catalog` with the name `c` plus its number. Its directory is the
+/// catalog location with the same index.
 pub fn with_catalogs<T>(body: &str, catalogs: &[&str], test: impl FnOnce(&Scenario<'_>) -> T) -> T {
     let header = "<FileHeader revMajor=\"1\" revMinor=\"3\" date=\"2026-01-01T00:00:00\" description=\"\" author=\"\"/>";
     let root = image(
@@ -57,7 +58,7 @@ pub fn with_catalogs<T>(body: &str, catalogs: &[&str], test: impl FnOnce(&Scenar
     test(&Scenario::new(&inputs).expect("there is a root"))
 }
 
-/// Runs `test` on what `body` makes of a file of version 1.3.
+/// Runs `test` on the scenario with this `body` in a file of version 1.3.
 pub fn with_scenario<T>(body: &str, test: impl FnOnce(&Scenario<'_>) -> T) -> T {
     with_catalogs(body, &[], test)
 }

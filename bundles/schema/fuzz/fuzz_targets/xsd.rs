@@ -5,7 +5,8 @@ use std::path::Path;
 use qcbus_document::Document;
 use qcbus_schema::{Limits, Schema, compile};
 
-// An XSD and, behind a NUL, a document for it. Tables written and read again judge alike.
+// The input is an XSD and, after a NUL, a document for it. Tables that are written and read again
+// must give the same verdict.
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let mut parts = bytes.splitn(2, |byte| *byte == 0);
     let image = |name: &str, bytes: &[u8]| {

@@ -1,4 +1,4 @@
-//! Whether an assertion holds for an element.
+//! Evaluation of an assertion for an element.
 
 use std::collections::HashSet;
 use std::ops::ControlFlow;
@@ -11,7 +11,7 @@ use crate::names::NameId;
 use crate::simple::{XML_SPACE, float_value, is_float};
 use crate::work;
 
-/// An element as assertions see it: names already translated to the schema's numbers.
+/// Context of an assertion: a document with its names translated to the schema's numbers.
 #[derive(Clone, Copy)]
 pub(crate) struct Scope<'a, 'm> {
     pub(crate) document: Document<'a>,
@@ -19,13 +19,13 @@ pub(crate) struct Scope<'a, 'm> {
     pub(crate) names: &'m [NameId],
 }
 
-/// A comparison between things that cannot be compared; XPath raises an error, and an assertion
+/// A comparison between values that cannot be compared. XPath raises an error for it. An assertion
 /// that raises an error does not hold.
 #[derive(Debug)]
 struct Clash;
 
 impl Assertion {
-    /// Whether the assertion holds for `node`.
+    /// Checks whether the assertion holds for `node`.
     pub(crate) fn holds(&self, node: Node<'_>, scope: &Scope<'_, '_>) -> bool {
         truth(&self.root, node, scope).unwrap_or(false)
     }
@@ -83,7 +83,7 @@ fn compare(
     }
 }
 
-/// A general comparison: true if one of the path's values fulfils it.
+/// Evaluates a general comparison. It is true if one of the path's values fulfils it.
 fn any_value(
     relation: Relation,
     path: &Path,
@@ -175,7 +175,8 @@ fn number(expr: &Expr, node: Node<'_>, scope: &Scope<'_, '_>) -> Option<f64> {
 
 type Visitor<'v> = dyn FnMut(Option<&str>) -> ControlFlow<()> + 'v;
 
-/// Calls `found` for each item of the path (with the value of an attribute); true if it broke off.
+/// Calls `found` for each item of the path, with the value of an attribute. Returns `true` if
+/// `found` stopped the walk.
 fn visit(path: &Path, node: Node<'_>, scope: &Scope<'_, '_>, found: &mut Visitor<'_>) -> bool {
     visit_steps(&path.steps, path.attribute, node, scope, found).is_break()
 }

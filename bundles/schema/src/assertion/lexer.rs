@@ -1,4 +1,4 @@
-//! Cuts expressions into tokens; XPath and the table notation share them.
+//! Lexer of expressions. XPath and the table notation share the tokens.
 
 /// A token, borrowed from the expression.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,7 +13,7 @@ pub(super) enum Token<'t> {
     Sign(&'t str),
 }
 
-/// The tokens of `text`, or what cannot be read.
+/// Splits `text` into tokens, or returns a description of the unreadable part.
 pub(super) fn tokens(text: &str) -> Result<Vec<Token<'_>>, String> {
     let mut rest = text.trim_start();
     let mut all = Vec::new();

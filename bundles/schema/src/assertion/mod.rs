@@ -1,9 +1,9 @@
-//! Assertions and alternatives of XML Schema 1.1: the XPath 2.0 forms that schemas of this field
-//! use, as a small tree.
+//! Assertions and alternatives of XML Schema 1.1: the XPath 2.0 forms that the schemas of OpenDRIVE
+//! and OpenSCENARIO use, as a small tree.
 //!
-//! Understood: `and`, `or`, `not(…)`, `exists(…)`, `if (…) then … else …`, `true()`, `false()`,
+//! Supported: `and`, `or`, `not(…)`, `exists(…)`, `if (…) then … else …`, `true()`, `false()`,
 //! comparisons, `count(…)`, `count(distinct-values(…))`, literals, and paths of child and
-//! descendant steps that may end in an attribute. Anything else is refused by the compiler.
+//! descendant steps that may end in an attribute. The compiler rejects everything else.
 
 mod evaluate;
 mod lexer;
@@ -21,7 +21,7 @@ pub struct Assertion {
 }
 
 impl Assertion {
-    /// Whether it asks for descendants at any depth.
+    /// Checks whether the assertion refers to descendants at any depth.
     pub(crate) fn is_deep(&self) -> bool {
         self.root.is_deep()
     }
@@ -42,13 +42,13 @@ impl Expr {
     }
 }
 
-/// Why an XPath expression is not understood.
+/// Reason why an XPath expression is not supported.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("understand the XPath `{text}`: {what}")]
 pub struct XPathProblem {
     /// The expression.
     pub text: String,
-    /// What is not understood.
+    /// Description of the unsupported part.
     pub what: String,
 }
 
@@ -95,7 +95,7 @@ impl Relation {
     }
 }
 
-/// Steps from the element; the last may be an attribute.
+/// Steps from the element. The last one may be an attribute.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Path {
     pub(crate) steps: Vec<PathStep>,
@@ -104,11 +104,11 @@ pub(crate) struct Path {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct PathStep {
-    /// Whether it reaches all descendants (`//`) or children only.
+    /// Whether the step selects all descendants (`//`) or only children.
     pub(crate) deep: bool,
-    /// The name it selects.
+    /// Name of the selected elements.
     pub(crate) name: NameId,
 }
 
-/// How deep expressions may nest.
+/// Maximum nesting depth of expressions.
 pub(crate) const MAX_DEPTH: usize = 48;

@@ -7,7 +7,7 @@ use super::{Assertion, Expr, MAX_DEPTH, Path, Relation};
 use crate::names::Names;
 
 impl Assertion {
-    /// Writes the tree; [`Assertion::from_notation`] reads it back.
+    /// Writes the tree in the notation that [`Assertion::from_notation`] reads.
     pub(crate) fn notation(&self, names: &Names) -> String {
         let mut out = String::new();
         // Writing to a String cannot fail.
@@ -15,7 +15,7 @@ impl Assertion {
         out
     }
 
-    /// Reads what [`Assertion::notation`] wrote.
+    /// Reads the notation that [`Assertion::notation`] writes.
     pub(crate) fn from_notation(text: &str, names: &mut Names) -> Result<Assertion, String> {
         let tokens = tokens(text)?;
         let mut at = 0;

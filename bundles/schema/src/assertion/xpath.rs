@@ -1,11 +1,11 @@
-//! XPath text into trees.
+//! Parser of XPath expressions.
 
 use super::lexer::{Token, tokens};
 use super::{Assertion, Expr, MAX_DEPTH, Path, PathStep, Relation, XPathProblem};
 use crate::names::Names;
 
 impl Assertion {
-    /// Reads an XPath expression, giving its names numbers.
+    /// Reads an XPath expression and assigns numbers to its names.
     pub(crate) fn from_xpath(text: &str, names: &mut Names) -> Result<Assertion, XPathProblem> {
         let problem = |what: String| XPathProblem {
             text: text.to_owned(),
@@ -188,7 +188,7 @@ impl<'t> Parser<'t, '_> {
     }
 }
 
-/// Only comparisons whose meaning does not depend on the types of attributes are understood.
+/// Checks that a comparison is supported: its result must not depend on the types of attributes.
 fn comparable(left: &Expr, right: &Expr, general: bool) -> Parsed<()> {
     let literal = |side: &Expr| matches!(side, Expr::Number(_) | Expr::Text(_) | Expr::Bool(_));
     let number = |side: &Expr| {
@@ -217,7 +217,7 @@ impl Path {
             let last = parts.peek().is_none();
             match part {
                 "." if index == 0 && !last => {}
-                // With a second `//` an item could be reached twice.
+                // A second `//` could select an item twice.
                 "" if index > 0 && !last && !path.steps.iter().any(|step| step.deep) && !deep => {
                     deep = true;
                 }

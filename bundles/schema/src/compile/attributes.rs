@@ -9,8 +9,8 @@ use crate::model::AttributeUse;
 use crate::simple::{Builtin, Variety};
 
 impl<'d> Compiler<'d, '_> {
-    /// Adds what an `xs:attribute` or `xs:attributeGroup` declares; a later declaration of a name
-    /// replaces an inherited one.
+    /// Adds the declarations of an `xs:attribute` or `xs:attributeGroup`. A later declaration of a
+    /// name replaces an inherited one.
     pub(super) fn add_attribute(
         &mut self,
         node: Node<'d>,
@@ -40,7 +40,7 @@ impl<'d> Compiler<'d, '_> {
         Ok(())
     }
 
-    /// An attribute, and whether it is prohibited.
+    /// Reads an attribute, and whether it is prohibited.
     fn attribute(&mut self, node: Node<'d>) -> Result<(AttributeUse, bool), CompileError> {
         only_attributes(
             node,

@@ -12,14 +12,14 @@ use super::particle::Draft;
 use crate::assertion::Assertion;
 use crate::model::{AttributeUse, ComplexType, Content, TypeRef};
 
-/// What has been numbered, and what still has to be defined.
+/// Numbered types and types that still need a definition.
 #[derive(Default)]
 pub(super) struct Known<'d> {
     nodes: HashMap<Node<'d>, u32>,
     waiting: Vec<(Node<'d>, u32)>,
 }
 
-/// A type with everything it inherits.
+/// A type with all inherited parts.
 #[derive(Default)]
 struct Body {
     draft: Draft,
@@ -31,7 +31,7 @@ struct Body {
 }
 
 impl<'d> Compiler<'d, '_> {
-    /// The number of a complex type; its definition follows later, so types may be recursive.
+    /// Returns the number of a complex type. The type is defined later, so types may be recursive.
     pub(super) fn complex_of(&mut self, node: Node<'d>) -> Result<u32, CompileError> {
         if let Some(&id) = self.complex.nodes.get(&node) {
             return Ok(id);
@@ -79,7 +79,7 @@ impl<'d> Compiler<'d, '_> {
         Ok(())
     }
 
-    /// Adds what a type says, base types first.
+    /// Adds the content of a type. Base types come first.
     fn collect(&mut self, node: Node<'d>, body: &mut Body) -> Result<(), CompileError> {
         only_attributes(node, &["name", "abstract", "mixed", "final"])?;
         let mut members = parts(node);
@@ -119,7 +119,7 @@ impl<'d> Compiler<'d, '_> {
             ("extension", _) => self.deeper(step, |this| this.inherit(step, base, simple, body))?,
             ("restriction", false) => {
                 self.deeper(step, |this| this.inherit(step, base, simple, body))?;
-                // A restriction spells its content out again; only attributes are inherited.
+                // A restriction repeats its content. It inherits only attributes.
                 body.draft = Draft::default();
                 body.mixed = false;
             }
@@ -206,7 +206,7 @@ fn placeholder(node: Node<'_>) -> ComplexType {
     }
 }
 
-/// A boolean attribute of a schema construct.
+/// Returns a boolean attribute of a schema construct.
 pub(super) fn flag(node: Node<'_>, name: &'static str) -> Result<Option<bool>, CompileError> {
     match node.attr(name).map(str::trim) {
         None => Ok(None),

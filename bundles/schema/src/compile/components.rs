@@ -8,7 +8,7 @@ use super::error::{CompileError, Problem, only_attributes, parts, required};
 
 const XSD: &str = "http://www.w3.org/2001/XMLSchema";
 
-/// Kinds of global components; types share one space of names, simple or complex.
+/// Kinds of global components. Simple and complex types share one symbol space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Kind {
     Simple,
@@ -31,7 +31,7 @@ pub(super) fn kind(node: Node<'_>) -> Option<Kind> {
     })
 }
 
-/// What a qualified name refers to.
+/// Target of a qualified name.
 pub(super) enum Resolved<'d> {
     BuiltIn(&'d str),
     Own(&'d str),
@@ -42,7 +42,7 @@ pub(super) struct Components<'d> {
     found: HashMap<(Kind, &'d str), Node<'d>>,
     order: Vec<Node<'d>>,
     pub(super) namespace: Option<&'d str>,
-    /// The first of the files.
+    /// Path of the first file.
     pub(super) path: &'d str,
 }
 
@@ -99,7 +99,7 @@ impl<'d> Components<'d> {
     fn add(&mut self, node: Node<'d>) -> Result<(), CompileError> {
         let kind = kind(node).ok_or_else(|| CompileError::at(node, Problem::Unsupported))?;
         let name = required(node, "name")?;
-        // Types share one symbol space, whatever their kind.
+        // Simple and complex types share one symbol space.
         let other = match kind {
             Kind::Simple => self.found.contains_key(&(Kind::Complex, name)),
             Kind::Complex => self.found.contains_key(&(Kind::Simple, name)),
@@ -120,7 +120,7 @@ impl<'d> Components<'d> {
         self.found.get(&(kind, name)).copied()
     }
 
-    /// A component that must exist.
+    /// Returns a component, or an error if it is missing.
     pub(super) fn get(
         &self,
         from: Node<'d>,
@@ -138,7 +138,7 @@ impl<'d> Components<'d> {
             .ok_or_else(|| CompileError::at(from, Problem::Missing(what, name.to_owned())))
     }
 
-    /// Splits a qualified name by the namespaces in scope.
+    /// Resolves a qualified name with the namespaces in scope.
     pub(super) fn resolve<'n>(
         &self,
         node: Node<'d>,
@@ -159,7 +159,7 @@ impl<'d> Components<'d> {
     }
 }
 
-/// The namespace bound to a prefix at `node`.
+/// Returns the namespace bound to a prefix at `node`.
 fn namespace_of<'d>(node: Node<'d>, prefix: &str) -> Option<&'d str> {
     let declares = |node: Node<'d>| {
         node.attributes().find_map(|attribute| {

@@ -1,4 +1,4 @@
-//! Drafts of content models into their final form.
+//! Conversion of draft content models to their final form.
 
 use qcbus_document::Node;
 
@@ -7,7 +7,7 @@ use super::error::{CompileError, Problem};
 use super::particle::Draft;
 use crate::model::{AllModel, Content};
 
-/// The content of a type whose children are described by `draft`.
+/// Returns the content of a type with the children of `draft`.
 pub(super) fn finish(node: Node<'_>, draft: Draft) -> Result<Content, CompileError> {
     let Draft {
         children,

@@ -1,7 +1,7 @@
-//! Particle trees into minimal deterministic automata.
+//! Conversion of particle trees to minimal deterministic automata.
 //!
-//! Glushkov's construction gives every occurrence of a child a position and says which positions
-//! may follow it; sets of positions are the states; equivalent states are merged (Moore).
+//! Glushkov's construction gives every occurrence of a child a position and lists the positions
+//! that may follow it. The states are sets of positions. Equivalent states are merged (Moore).
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -12,10 +12,10 @@ const MAX_POSITIONS: usize = 4_096;
 const MAX_FOLLOWS: usize = 500_000;
 const MAX_STATES: usize = 2_048;
 
-/// A limit was reached: what of, and how many there may be.
+/// An exceeded limit: the limited item and the maximum number.
 pub(super) type TooLarge = (&'static str, usize);
 
-/// The automaton of a content model.
+/// Builds the automaton of a content model.
 pub(super) fn build(particle: &Particle, children: Vec<ElementDecl>) -> Result<Model, TooLarge> {
     let mut positions = Positions::default();
     let whole = positions.add(particle)?;
@@ -148,7 +148,7 @@ impl Positions {
                     optional = self.join(once, optional)?;
                     optional.nullable = true;
                     if optional.last.is_empty() {
-                        break; // nothing in it: more turns change nothing
+                        break; // an empty body stays empty, so further repetitions change nothing
                     }
                 }
                 optional
@@ -169,7 +169,7 @@ impl Positions {
         Ok(tail)
     }
 
-    /// The subset construction; a named child takes precedence over a wildcard.
+    /// Runs the subset construction. A named child takes precedence over a wildcard.
     fn states(&self, whole: &Fragment) -> Result<Vec<Raw>, TooLarge> {
         let mut known: HashMap<Vec<u32>, usize> = HashMap::new();
         let mut sets: Vec<Vec<u32>> = vec![Vec::new()];
@@ -238,7 +238,7 @@ struct Raw {
     edges: Vec<(Symbol, usize)>,
 }
 
-/// Merges states that accept the same continuations and numbers them in order of first use.
+/// Merges equivalent states and numbers them in order of first use.
 fn merge(raw: &[Raw], children: Vec<ElementDecl>) -> Model {
     let class = classes(raw);
     let mut numbers: HashMap<usize, u16> = HashMap::new();
@@ -282,7 +282,7 @@ fn merge(raw: &[Raw], children: Vec<ElementDecl>) -> Model {
     model
 }
 
-/// The equivalence class of each state.
+/// Returns the equivalence class of each state.
 fn classes(raw: &[Raw]) -> Vec<usize> {
     let mut class: Vec<usize> = raw.iter().map(|state| usize::from(state.accepts)).collect();
     let mut count = 0;

@@ -13,7 +13,7 @@ const GLOBAL: &[&str] = &["name", "type", "nillable"];
 const LOCAL: &[&str] = &["name", "type", "nillable", "minOccurs", "maxOccurs", "form"];
 
 impl<'d> Compiler<'d, '_> {
-    /// An element within a content model, references resolved.
+    /// Reads an element in a content model and resolves references.
     pub(super) fn local_element(&mut self, node: Node<'d>) -> Result<ElementDecl, CompileError> {
         let Some(reference) = node.attr("ref") else {
             only_attributes(node, LOCAL)?;
@@ -26,7 +26,7 @@ impl<'d> Compiler<'d, '_> {
         self.element(global)
     }
 
-    /// A global element.
+    /// Reads a global element.
     pub(super) fn element(&mut self, node: Node<'d>) -> Result<ElementDecl, CompileError> {
         only_attributes(node, GLOBAL)?;
         self.declaration(node)

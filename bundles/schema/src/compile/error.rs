@@ -1,30 +1,30 @@
-//! What the compiler says when it does not understand a schema.
+//! Compile errors for unsupported or invalid schemas.
 
 use qcbus_document::{Node, Position};
 
 use crate::assertion::XPathProblem;
 use crate::regex::PatternError;
 
-/// Why a schema could not be compiled, and where.
+/// Reason and position of a compile error.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("compile {position}: {problem}")]
 pub struct CompileError {
-    /// Where.
+    /// Position of the error.
     pub position: SourcePosition,
-    /// The problem.
+    /// Reason for the error.
     pub problem: Problem,
 }
 
-/// A row and column of an XSD file, and what stands there.
+/// Row and column in an XSD file, with the construct at this position.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SourcePosition {
-    /// The file; empty if the problem concerns the schema as a whole.
+    /// The file. Empty if the problem concerns the schema as a whole.
     pub path: String,
     /// Row from 1.
     pub row: u32,
     /// Column from 1.
     pub column: u32,
-    /// The construct, e.g. `xs:element name="road"`; empty if the file is no XML.
+    /// The construct, e.g. `xs:element name="road"`. Empty if the file is not XML.
     pub construct: String,
 }
 
@@ -41,7 +41,7 @@ impl std::fmt::Display for SourcePosition {
     }
 }
 
-/// What is wrong.
+/// Reason for a compile error.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Problem {
     /// The document is not a schema.
@@ -50,7 +50,7 @@ pub enum Problem {
     /// The file is not well-formed XML.
     #[error("the file is not well-formed: {0}")]
     NotWellFormed(String),
-    /// No global element.
+    /// The schema has no global element.
     #[error("no global element is declared")]
     NoRoot,
     /// A construct outside the subset.
@@ -62,48 +62,48 @@ pub enum Problem {
     /// An attribute value outside the subset.
     #[error("the value `{1}` of the attribute {0} is not supported")]
     Value(&'static str, String),
-    /// The same where one value is known.
+    /// An attribute value outside the subset, where only one value is supported.
     #[error("the value `{1}` of the attribute {0} is not supported, only `{2}`")]
     Only(&'static str, String, &'static str),
     /// A built-in type outside the subset.
     #[error("the built-in type `{0}` is not supported")]
     Builtin(String),
-    /// An included file that was not given.
+    /// An included file that is missing in the input.
     #[error("`{0}` was not given; all files of a schema lie in one directory")]
     NotGiven(String),
-    /// An attribute that must be there.
+    /// A required attribute is missing.
     #[error("the attribute {0} is missing")]
     NoAttribute(&'static str),
-    /// A reference to nothing.
+    /// A reference to a missing component.
     #[error("the {0} `{1}` is not declared")]
     Missing(&'static str, String),
-    /// Two components with one name.
+    /// Two components with the same name.
     #[error("`{0}` is declared twice")]
     Twice(String),
     /// A definition that refers to itself.
     #[error("the definition refers to itself")]
     Circular,
-    /// A condition that would be looked at again at every depth.
+    /// A condition that would be evaluated again at every depth.
     #[error(
         "a condition with // on the type `{0}`, whose elements can contain themselves, is not supported"
     )]
     EndlessCondition(String),
-    /// Nested beyond the limit.
+    /// Nesting deeper than the limit.
     #[error("definitions are nested too deeply")]
     TooDeep,
     /// Larger than the limit.
     #[error("more than {1} {0}")]
     TooLarge(&'static str, usize),
-    /// Two children of one name with different types.
+    /// Two children with the same name and different types.
     #[error("the child `{0}` has two different types in one content model")]
     Inconsistent(String),
-    /// A pattern.
+    /// An invalid pattern.
     #[error("failed to {0}")]
     Pattern(#[from] PatternError),
-    /// An XPath expression.
+    /// An unsupported XPath expression.
     #[error("failed to {0}")]
     XPath(#[from] XPathProblem),
-    /// Something the schema says that does not make sense.
+    /// An inconsistent declaration in the schema.
     #[error("{0}")]
     Invalid(&'static str),
 }
@@ -140,7 +140,7 @@ impl CompileError {
         }
     }
 
-    /// A problem of a file that is not even XML.
+    /// Creates an error for a file that is not well-formed XML.
     pub(crate) fn ill_formed(at: Position<'_>, fault: &str) -> Self {
         let position = SourcePosition {
             path: at.path.to_owned(),
@@ -152,7 +152,7 @@ impl CompileError {
         Self { position, problem }
     }
 
-    /// A problem of a file as a whole.
+    /// Creates an error for a file as a whole.
     pub(crate) fn somewhere_in(path: &str, problem: Problem) -> Self {
         let position = SourcePosition {
             path: path.to_owned(),
@@ -164,7 +164,7 @@ impl CompileError {
     }
 }
 
-/// Checks that a construct has no attributes but those listed (and foreign ones with a prefix).
+/// Checks that a construct has only the listed attributes, or foreign ones with a prefix.
 pub(crate) fn only_attributes(node: Node<'_>, known: &[&str]) -> Result<(), CompileError> {
     for attribute in node.attributes() {
         let name = attribute.name();
@@ -176,12 +176,12 @@ pub(crate) fn only_attributes(node: Node<'_>, known: &[&str]) -> Result<(), Comp
     Ok(())
 }
 
-/// The children of a construct without annotations.
+/// Returns the children of a construct without annotations.
 pub(crate) fn parts<'d>(node: Node<'d>) -> impl Iterator<Item = Node<'d>> {
     node.children().filter(|child| !child.is("annotation"))
 }
 
-/// An attribute that must be there.
+/// Returns a required attribute.
 pub(crate) fn required<'d>(node: Node<'d>, name: &'static str) -> Result<&'d str, CompileError> {
     node.attr(name)
         .ok_or_else(|| CompileError::at(node, Problem::NoAttribute(name)))

@@ -1,4 +1,4 @@
-//! `key`, `unique` and `keyref`.
+//! Identity constraints: `key`, `unique` and `keyref`.
 
 use qcbus_document::Node;
 
@@ -7,7 +7,7 @@ use super::error::{CompileError, Problem, only_attributes, parts, required};
 use crate::constraint::{Constraint, ConstraintKind, Constraints, Step};
 
 impl<'d> Compiler<'d, '_> {
-    /// The constraints declared on one element.
+    /// Reads the constraints declared on one element.
     pub(super) fn constraints(
         &mut self,
         element: Node<'d>,

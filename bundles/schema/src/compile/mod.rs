@@ -1,9 +1,9 @@
-//! From XSD documents to tables.
+//! Compiler from XSD documents to tables.
 //!
-//! The XSD files are read through document images like every other file. The compiler knows the
-//! subset of XML Schema that the schemas of this field use; each construct lists the attributes
-//! and children it understands, and anything else is an error that names the construct, the file
-//! and the line. Nothing is skipped silently.
+//! The XSD files are read through document images like all other files. The compiler supports the
+//! subset of XML Schema that the schemas of OpenDRIVE and OpenSCENARIO use. Each construct lists
+//! its supported attributes and children. All others give an error with the construct, the file and
+//! the line. The compiler never skips a construct silently.
 
 mod attributes;
 mod complex;
@@ -23,13 +23,12 @@ pub use error::{CompileError, Problem};
 use crate::model::{Edition, Schema, TypeRef};
 use components::{Components, Kind};
 
-/// Compiles a set of XSD documents that belong together (a schema and what it includes).
+/// Compiles a set of XSD documents that belong together (a schema and its includes).
 ///
 /// The result does not depend on the order of `documents`.
 ///
 /// # Errors
-/// When a document is not a schema, refers to something that is missing, or uses a construct
-/// outside the supported subset.
+/// If a document is not a schema, refers to a missing component, or uses an unsupported construct.
 pub fn compile(title: &str, documents: &[Document<'_>]) -> Result<Schema, CompileError> {
     let components = Components::collect(documents)?;
     let mut compiler = Compiler::new(title, &components);
@@ -52,17 +51,17 @@ pub fn compile(title: &str, documents: &[Document<'_>]) -> Result<Schema, Compil
     compiler.finish()
 }
 
-/// Work in progress.
+/// State of a compilation.
 struct Compiler<'d, 'c> {
     components: &'c Components<'d>,
     schema: Schema,
     simple: simple::Known<'d>,
     complex: complex::Known<'d>,
-    /// How deep the current construct is nested, anonymous types and group references included.
+    /// Nesting depth of the current construct, including anonymous types and group references.
     depth: usize,
 }
 
-/// Nesting of anonymous types, base types and group references; a person stays below ten.
+/// Maximum nesting of anonymous types, base types and group references. Authors stay below ten.
 const MAX_DEPTH: usize = 64;
 
 impl<'d, 'c> Compiler<'d, 'c> {
@@ -126,7 +125,7 @@ impl<'d, 'c> Compiler<'d, 'c> {
             .ok_or_else(|| CompileError::at(node, Problem::TooLarge("names", 65_534)))
     }
 
-    /// The type a `type`, `base` or `itemType` attribute refers to.
+    /// Returns the type that a `type`, `base` or `itemType` attribute refers to.
     fn type_ref(&mut self, node: Node<'d>, name: &str) -> Result<TypeRef, CompileError> {
         match self.components.resolve(node, name)? {
             components::Resolved::BuiltIn("anyType") => Ok(TypeRef::Any),

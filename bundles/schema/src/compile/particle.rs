@@ -1,4 +1,4 @@
-//! Content models as trees of particles, groups and references resolved.
+//! Content models as trees of particles with resolved groups and references.
 
 use qcbus_document::Node;
 
@@ -27,25 +27,26 @@ pub(super) struct Draft {
     pub(super) children: Vec<ElementDecl>,
     pub(super) particle: Option<Particle>,
     pub(super) all: Option<AllDraft>,
-    /// Particles met so far, against explosive group references.
+    /// Number of particles so far. It limits exponential growth by group references.
     met: usize,
 }
 
-/// An `all` group: members by index into the children, with whether they are required.
+/// An `all` group: indexes of its members in the children, each with whether it is required.
 #[derive(Clone, Debug, Default)]
 pub(super) struct AllDraft {
     pub(super) members: Vec<(u16, bool)>,
     pub(super) optional: bool,
 }
 
-/// Particles of one content model after groups are resolved; schemas of this field stay below 500.
+/// Maximum number of particles of one content model after groups are resolved. Published schemas
+/// stay below 500.
 const MAX_PARTICLES: usize = 10_000;
 
-/// Bounds beyond this would only make a large automaton.
+/// Maximum value of `maxOccurs`. Larger values would only make a large automaton.
 const MAX_OCCURS: u32 = 2_000;
 
 impl<'d> Compiler<'d, '_> {
-    /// Adds the particle that stands directly in a type: what came before (a base type's) first.
+    /// Adds the top-level particle of a type after the content of its base type.
     pub(super) fn add_content(
         &mut self,
         node: Node<'d>,
@@ -71,7 +72,7 @@ impl<'d> Compiler<'d, '_> {
         Ok(())
     }
 
-    /// `all`, or a reference to a group that consists of `all`.
+    /// Reads `all`, or a reference to a group that consists of `all`.
     fn top_level_all(
         &mut self,
         node: Node<'d>,
@@ -195,7 +196,7 @@ impl<'d> Compiler<'d, '_> {
         })
     }
 
-    /// The index of a child's declaration; equal names in one model must have equal types.
+    /// Returns the index of a child's declaration. Equal names in one model need equal types.
     fn child(&mut self, node: Node<'d>, draft: &mut Draft) -> Result<u16, CompileError> {
         let declared = self.local_element(node)?;
         if let Some(index) = draft
@@ -211,7 +212,7 @@ impl<'d> Compiler<'d, '_> {
             return Ok(u16::try_from(index).unwrap_or(u16::MAX));
         }
         draft.children.push(declared);
-        // MAX_PARTICLES keeps the number within 16 bits.
+        // `MAX_PARTICLES` limits the number to 16 bits.
         Ok(u16::try_from(draft.children.len() - 1).unwrap_or(u16::MAX))
     }
 }
@@ -237,7 +238,7 @@ fn any(node: Node<'_>) -> Result<Particle, CompileError> {
     }
 }
 
-/// `minOccurs` and `maxOccurs`; `None` is unbounded.
+/// Reads `minOccurs` and `maxOccurs`. `None` means unbounded.
 pub(super) fn occurs(node: Node<'_>) -> Result<(u32, Option<u32>), CompileError> {
     let number = |name: &'static str, text: &str| {
         let parsed = text

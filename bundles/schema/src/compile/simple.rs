@@ -13,7 +13,7 @@ use crate::simple::{
     is_integer,
 };
 
-/// What has been compiled already.
+/// Types that are already compiled.
 #[derive(Default)]
 pub(super) struct Known<'d> {
     builtins: HashMap<Builtin, u32>,
@@ -21,11 +21,11 @@ pub(super) struct Known<'d> {
     open: HashSet<Node<'d>>,
 }
 
-/// Values of one enumeration; schemas of this field stay below 300.
+/// Maximum number of values of one enumeration. Published schemas stay below 300.
 const MAX_VALUES: usize = 20_000;
 
 impl<'d> Compiler<'d, '_> {
-    /// The number of a built-in type.
+    /// Returns the number of a built-in type.
     pub(super) fn builtin(&mut self, node: Node<'d>, local: &str) -> Result<u32, CompileError> {
         let Some(builtin) = Builtin::find(local) else {
             return Err(CompileError::at(node, Problem::Builtin(local.to_owned())));
@@ -38,7 +38,7 @@ impl<'d> Compiler<'d, '_> {
         Ok(id)
     }
 
-    /// The number of the type that an `xs:simpleType` defines.
+    /// Returns the number of the type that an `xs:simpleType` defines.
     pub(super) fn simple_of(&mut self, node: Node<'d>) -> Result<u32, CompileError> {
         if let Some(&id) = self.simple.nodes.get(&node) {
             return Ok(id);
@@ -69,7 +69,7 @@ impl<'d> Compiler<'d, '_> {
         let plain =
             node.attr("name").is_none() && body.is("restriction") && parts(body).next().is_none();
         if let (true, Some(base)) = (plain, body.attr("base")) {
-            // It adds nothing: the base type under another roof.
+            // This restriction adds nothing, so the result is the base type.
             only_attributes(body, &["base"])?;
             return self.simple_named(body, base);
         }
@@ -83,7 +83,7 @@ impl<'d> Compiler<'d, '_> {
         Ok(self.push_simple(defined))
     }
 
-    /// The number of a type that must be simple.
+    /// Returns the number of a type that must be simple.
     pub(super) fn simple_named(&mut self, node: Node<'d>, name: &str) -> Result<u32, CompileError> {
         match self.type_ref(node, name)? {
             TypeRef::Simple(id) => Ok(id),
@@ -167,12 +167,12 @@ impl<'d> Compiler<'d, '_> {
     }
 }
 
-/// The facets of one restriction step.
+/// Facets of one restriction step.
 #[derive(Default)]
 struct Own {
     facets: Facets,
     values: Vec<Box<str>>,
-    /// Patterns of one step are alternatives; those of different steps must all match.
+    /// Patterns of one step are alternatives. Patterns of different steps must all match.
     pattern: Option<Pattern>,
 }
 

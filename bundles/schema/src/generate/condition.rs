@@ -1,9 +1,9 @@
-//! Conditions of a schema over documents that are being made.
+//! Evaluation of schema conditions for generated documents.
 
 use super::Tree;
 use crate::assertion::{Expr, Path};
 
-/// Whether an assertion holds for a tree; the same rules as for documents, over other data.
+/// Checks whether an assertion holds for a tree. The rules are the same as for documents.
 pub(super) fn holds(expr: &Expr, tree: &Tree<'_>) -> bool {
     match expr {
         Expr::And(parts) => parts.iter().all(|part| holds(part, tree)),
@@ -55,7 +55,7 @@ fn compare(symbol: &str, left: &Expr, right: &Expr, tree: &Tree<'_>) -> bool {
     }
 }
 
-/// The attribute values (or a blank per element) a path leads to.
+/// Returns the attribute values that a path selects, or a blank for each selected element.
 fn items(path: &Path, tree: &Tree<'_>) -> Vec<String> {
     let mut at = vec![tree];
     for step in &path.steps {

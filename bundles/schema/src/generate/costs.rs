@@ -1,8 +1,8 @@
-//! The shortest way to end an element, so that generation ends.
+//! Costs of the shortest way to end an element. They ensure that generation ends.
 
 use crate::model::{Content, ElementDecl, Model, Schema, TypeRef};
 
-/// Elements that the smallest element of each complex type needs; `MAX` if there is no end.
+/// Number of elements in the smallest element of each complex type; `MAX` if it cannot end.
 pub(super) struct Costs(Vec<u32>);
 
 const ENDLESS: u32 = u32::MAX / 4;
@@ -52,7 +52,7 @@ impl Costs {
         }
     }
 
-    /// For each state, the least cost to an end and the edge to take (`None` to end here).
+    /// Returns for each state the lowest cost to an end and the next edge (`None` to end here).
     pub(super) fn ways(&self, model: &Model) -> Vec<(u32, Option<usize>)> {
         let mut ways: Vec<(u32, Option<usize>)> = model
             .states

@@ -1,16 +1,16 @@
-//! Chance that is the same on every machine.
+//! Random choices that are the same on every machine.
 
-/// Choices that a seed decides.
+/// Random choices determined by a seed.
 #[derive(Clone, Debug)]
 pub struct Dice(fastrand::Rng);
 
 impl Dice {
-    /// Dice that fall the same way for the same seed.
+    /// Creates a generator. The same seed gives the same choices.
     pub fn new(seed: u64) -> Self {
         Self(fastrand::Rng::with_seed(seed))
     }
 
-    /// A number below `limit`, or 0.
+    /// Returns a number below `limit`, or 0.
     pub fn below(&mut self, limit: usize) -> usize {
         self.0.usize(..limit.max(1))
     }

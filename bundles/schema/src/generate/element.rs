@@ -1,4 +1,4 @@
-//! One element with all that is in it.
+//! Generation of one element with its content.
 
 use super::condition::holds;
 use super::costs::Costs;
@@ -7,16 +7,16 @@ use crate::assertion::{Assertion, Expr};
 use crate::model::{Content, ElementDecl, Model, Schema, TypeRef};
 use crate::simple::{Builtin, Facets, SimpleType, Variety};
 
-/// Makes elements until enough are there; what must still come is made as short as possible.
+/// Generator of a number of elements. After that it keeps required content short.
 pub(super) struct Generator<'s, 'c> {
     pub(super) schema: &'s Schema,
     pub(super) costs: &'c Costs,
     pub(super) dice: Dice,
-    /// Elements still wanted.
+    /// Number of elements that are still wanted.
     pub(super) left: usize,
 }
 
-/// Attempts to fulfil the assertions of one element.
+/// Maximum number of attempts to fulfil the assertions of one element.
 const ATTEMPTS: usize = 60;
 
 impl<'s> Generator<'s, '_> {
@@ -109,7 +109,7 @@ impl<'s> Generator<'s, '_> {
                 self.dice.below(edges.len())
             };
             let edge = edges.get(index)?;
-            // Ingest resolves OpenDRIVE's includes, and these would name no file.
+            // Ingest resolves OpenDRIVE's includes, and a generated one would name a missing file.
             if self.schema.names.text(edge.name) == "include" {
                 continue;
             }
@@ -182,7 +182,7 @@ impl<'s> Generator<'s, '_> {
     }
 }
 
-/// Gives the attribute the value that a type alternative asks for.
+/// Sets the attribute to the value that a type alternative requires.
 fn force<'s>(tree: &mut Tree<'s>, sides: &[Expr; 2], schema: &'s Schema) {
     let [Expr::Path(path), Expr::Text(value)] = sides else {
         return;

@@ -1,11 +1,11 @@
-//! Keys and references of documents that are being made.
+//! Keys and references of generated documents.
 
 use super::Tree;
 use crate::constraint::{Constraint, ConstraintKind, Constraints, Step};
 use crate::model::Schema;
 
-/// Makes keys unique and references lead somewhere; false if a required reference has nothing to
-/// lead to.
+/// Makes keys unique and points references at existing keys. Returns `false` if a required
+/// reference has no target.
 pub(super) fn settle<'s>(tree: &mut Tree<'s>, schema: &'s Schema) -> bool {
     let mut settled = true;
     for child in &mut tree.children {
@@ -107,7 +107,7 @@ fn refer(tree: &mut Tree<'_>, constraint: &Constraint, all: &Constraints, to: u1
     settled
 }
 
-/// Calls `keep` for the elements of a path and takes out those it does not want to keep.
+/// Calls `keep` for the elements of a path and removes those for which it returns `false`.
 fn select<'s>(tree: &mut Tree<'s>, path: &[Step], keep: &mut dyn FnMut(&mut Tree<'s>) -> bool) {
     let Some((step, rest)) = path.split_first() else {
         return;

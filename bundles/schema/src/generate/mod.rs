@@ -1,6 +1,6 @@
-//! Documents made from tables: every one is valid, and every construct of a schema turns up.
+//! Documents generated from tables. Each one is valid, and together they use every construct.
 //!
-//! For property tests, and for base documents that other validators are compared over.
+//! They are for property tests, and they are base documents for comparisons with other validators.
 
 mod condition;
 mod costs;
@@ -16,8 +16,8 @@ use costs::Costs;
 pub use dice::Dice;
 use element::Generator;
 
-/// A document valid against `schema`, with roughly `size` elements; `None` if the tables allow none
-/// that the generator could find.
+/// Generates a document that is valid against `schema`, with about `size` elements. Returns `None`
+/// if the generator finds no valid document.
 pub fn document(schema: &Schema, root: usize, seed: u64, size: usize) -> Option<String> {
     let declared = schema.roots.get(root)?;
     let costs = Costs::of(schema);

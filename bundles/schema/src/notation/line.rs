@@ -1,8 +1,8 @@
-//! One line of the notation as words and quoted texts.
+//! Splits one line of the notation into words and quoted texts.
 
 use std::borrow::Cow;
 
-/// What is left of a line.
+/// The unread part of a line.
 pub(super) struct Line<'t> {
     rest: &'t str,
 }
@@ -16,12 +16,12 @@ impl<'t> Line<'t> {
         }
     }
 
-    /// The rest of the line.
+    /// Returns the rest of the line.
     pub(super) fn rest(&self) -> &'t str {
         self.rest
     }
 
-    /// The next word, if there is one.
+    /// Returns the next word, if there is one.
     pub(super) fn next(&mut self) -> Option<&'t str> {
         if self.rest.is_empty() {
             return None;
@@ -46,12 +46,12 @@ impl<'t> Line<'t> {
             .map_err(|_| format!("{what} `{word}` is no number"))
     }
 
-    /// Whether a quoted text comes next.
+    /// Checks whether a quoted text comes next.
     pub(super) fn at_quote(&self) -> bool {
         self.rest.starts_with('"')
     }
 
-    /// A text in double quotes.
+    /// Reads a text in double quotes.
     pub(super) fn quoted(&mut self) -> Parsed<Cow<'t, str>> {
         let body = self
             .rest

@@ -1,4 +1,4 @@
-//! Text into tables.
+//! Reader of tables in text notation.
 
 use std::collections::HashMap;
 
@@ -18,7 +18,7 @@ impl Schema {
     /// Reads tables in the notation that [`Schema::to_notation`] writes.
     ///
     /// # Errors
-    /// When a line is not understood or refers to something that is not there.
+    /// If a line is invalid or refers to something missing.
     pub fn from_notation(text: &str) -> Result<Schema, NotationError> {
         let mut lines = text.lines().enumerate();
         if lines.next().map(|(_, line)| line.trim_ascii()) != Some(HEADER) {
@@ -44,9 +44,9 @@ impl Schema {
 
 struct Reader {
     schema: Schema,
-    /// Constraints of the element read last, merged once they are complete.
+    /// Constraints of the element that was read last. They are merged when they are complete.
     constraints: Vec<Constraint>,
-    /// Each distinct pattern is compiled once.
+    /// Compiled patterns. Each distinct pattern is compiled once.
     patterns: HashMap<Box<str>, Pattern>,
     last: Last,
 }
@@ -478,12 +478,12 @@ fn type_ref(text: &str) -> Parsed<TypeRef> {
     }
 }
 
-/// Checks that every number leads somewhere and that no type contains itself without end.
+/// Checks that every number is valid and that no simple type contains itself.
 fn check(schema: &Schema) -> Parsed<()> {
     let is_simple = |number: u32| (number as usize) < schema.simple.len();
     let is_complex = |number: u32| (number as usize) < schema.complex.len();
     for (index, simple) in schema.simple.iter().enumerate() {
-        // Members come before what is made of them, so no union can contain itself.
+        // Members come before their list or union, so no union can contain itself.
         let before = |number: &u32| (*number as usize) < index;
         let sound = match &simple.variety {
             Variety::Atomic(_) => true,

@@ -1,4 +1,4 @@
-//! Tables into text.
+//! Writer of tables in text notation.
 
 use std::fmt::{self, Write};
 
@@ -8,7 +8,7 @@ use crate::model::{ComplexType, Content, Edition, ElementDecl, Model, Schema, Ty
 use crate::simple::{Facets, SimpleType, Variety};
 
 impl Schema {
-    /// The tables as text; [`Schema::from_notation`] reads them back.
+    /// Writes the tables in the notation that [`Schema::from_notation`] reads.
     pub fn to_notation(&self) -> String {
         let mut out = String::new();
         // Writing to a String cannot fail.

@@ -1,5 +1,6 @@
-//! Trees into deterministic automata: positions by Thompson's construction, states as sets of
-//! positions, characters grouped into classes that no set of the pattern tells apart.
+//! Conversion of pattern trees to deterministic automata. Thompson's construction gives positions,
+//! and states are sets of positions. Characters that no set of the pattern distinguishes form a
+//! class.
 
 use std::collections::{HashMap, VecDeque};
 
@@ -10,13 +11,13 @@ const MAX_NODES: usize = 4096;
 const MAX_STATES: usize = 512;
 const MAX_CLASSES: usize = 250;
 
-/// The state no text leaves again.
+/// The state from which no text can match.
 const DEAD: u16 = u16::MAX;
 
 #[derive(Clone, Debug)]
 pub(super) struct Automaton {
     ascii: Box<[u8; 128]>,
-    /// First character of each class region and its class.
+    /// First character of each region, with the class of the region.
     regions: Box<[(u32, u8)]>,
     classes: usize,
     steps: Box<[u16]>,
@@ -24,7 +25,7 @@ pub(super) struct Automaton {
 }
 
 impl Automaton {
-    /// Fails with the limit that was reached.
+    /// Builds the automaton, or returns the exceeded limit.
     pub(super) fn build(tree: &Tree) -> Result<Self, usize> {
         let mut nodes = Nodes::default();
         let end = nodes.push(Node::End)?;
@@ -64,7 +65,7 @@ impl Automaton {
         128 + self.regions.len() * 8 + self.steps.len() * 2 + self.accepts.len()
     }
 
-    /// A shortest match, by breadth-first search.
+    /// Finds a shortest match by breadth-first search.
     pub(super) fn example(&self) -> Option<String> {
         let mut came: HashMap<u16, (u16, u8)> = HashMap::new();
         let mut queue = VecDeque::from([0u16]);
@@ -128,7 +129,7 @@ impl Nodes {
         Ok(self.nodes.len() - 1)
     }
 
-    /// Adds `tree` so that it continues at `next`; returns where it starts.
+    /// Adds `tree` with `next` as its successor and returns its first node.
     fn add(&mut self, tree: &Tree, next: usize) -> Result<usize, usize> {
         match tree {
             Tree::Set(set) => {
@@ -181,7 +182,8 @@ impl Nodes {
         for _ in 0..min {
             let inner = self.add(what, start)?;
             if inner == start {
-                // An empty body adds no node, so the limit on nodes would not end nested repeats of it.
+                // An empty body adds no node, so the limit on nodes would not end nested repeats of
+                // it.
                 break;
             }
             start = inner;
@@ -189,7 +191,7 @@ impl Nodes {
         Ok(start)
     }
 
-    /// Cuts the code space wherever some set begins or ends; regions in the same sets share a class.
+    /// Splits the code space at the borders of all sets. Regions in the same sets share a class.
     fn regions(&self) -> Result<(Vec<(u32, u8)>, usize), usize> {
         let mut cuts: Vec<u32> = vec![0];
         for &(first, last) in self.sets.iter().flat_map(CharSet::ranges) {
@@ -213,7 +215,7 @@ impl Nodes {
         Ok((regions, known.len()))
     }
 
-    /// For each set, which classes it holds.
+    /// Returns for each set the classes that it contains.
     fn members(&self, regions: &[(u32, u8)], classes: usize) -> Vec<Vec<bool>> {
         let mut members = vec![vec![false; classes]; self.sets.len()];
         for (set, row) in self.sets.iter().zip(&mut members) {
@@ -270,7 +272,7 @@ impl Nodes {
         state.iter().filter_map(step).collect()
     }
 
-    /// The nodes reachable without reading a character, splits left out, sorted.
+    /// Returns the nodes that are reachable without reading a character, sorted and without splits.
     fn closure(&self, from: &[usize]) -> Vec<usize> {
         let mut seen = vec![false; self.nodes.len()];
         let mut stack = from.to_vec();

@@ -4,7 +4,7 @@ use crate::simple::{is_name_char, is_name_start};
 
 const LAST: u32 = 0x10_FFFF;
 
-/// First digits of the decimal-digit blocks of Unicode (each ten characters long).
+/// First digits of Unicode's blocks of decimal digits. Each block has ten characters.
 const ZEROS: &[u32] = &[
     0x30, 0x660, 0x6F0, 0x7C0, 0x966, 0x9E6, 0xA66, 0xAE6, 0xB66, 0xBE6, 0xC66, 0xCE6, 0xD66,
     0xDE6, 0xE50, 0xED0, 0xF20, 0x1040, 0x1090, 0x17E0, 0x1810, 0x1946, 0x19D0, 0x1A80, 0x1A90,
@@ -69,14 +69,14 @@ impl CharSet {
         outside.negated()
     }
 
-    /// `.`: everything but line ends.
+    /// Returns the set of `.`: all characters except line ends.
     pub(super) fn dot() -> Self {
         let mut ends = Self::one('\n');
         ends.add(&Self::one('\r'));
         ends.negated()
     }
 
-    /// The set a letter after a backslash stands for.
+    /// Returns the set for a letter after a backslash.
     pub(super) fn escape(letter: char) -> Option<Self> {
         Some(match letter {
             's' => Self::of(|c| matches!(c, ' ' | '\t' | '\n' | '\r'), 0x20),

@@ -1,8 +1,8 @@
 //! The regular expressions of XML Schema as deterministic automata.
 //!
-//! XSD patterns differ from everybody else's: they are anchored at both ends, `^` and `$` are
-//! ordinary characters, and `[a-z-[aeiou]]` subtracts. Matching takes one table lookup per
-//! character; a pattern whose automaton would grow beyond its limits is refused when it is read.
+//! XSD patterns differ from other regular expressions: they are anchored at both ends, `^` and `$`
+//! are ordinary characters, and `[a-z-[aeiou]]` subtracts. A match takes one table lookup per
+//! character. A pattern with an automaton beyond the limits is rejected when it is read.
 
 mod automaton;
 mod charset;
@@ -10,14 +10,14 @@ mod parse;
 
 use automaton::Automaton;
 
-/// A pattern, ready to match.
+/// A compiled pattern.
 #[derive(Clone, Debug)]
 pub struct Pattern {
     source: Box<str>,
     automaton: Automaton,
 }
 
-/// Why a pattern cannot be used.
+/// Reason why a pattern cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PatternError {
     /// It is not a regular expression, or uses a construct that is not supported.
@@ -25,9 +25,9 @@ pub enum PatternError {
     Syntax {
         /// The pattern.
         pattern: String,
-        /// Where, counted in characters from 1.
+        /// Position of the error in characters, from 1.
         at: usize,
-        /// What is wrong there.
+        /// Description of the error.
         what: &'static str,
     },
     /// It needs more states than the limit allows.
@@ -54,12 +54,12 @@ impl Pattern {
         })
     }
 
-    /// The pattern as written.
+    /// Returns the pattern as written.
     pub fn source(&self) -> &str {
         &self.source
     }
 
-    /// Whether the whole of `text` matches.
+    /// Checks whether the whole of `text` matches.
     pub fn matches(&self, text: &str) -> bool {
         self.automaton.matches(text)
     }
@@ -68,7 +68,7 @@ impl Pattern {
         self.source.len() + self.automaton.heap_bytes()
     }
 
-    /// A short text that matches, if the automaton has one.
+    /// Returns a short text that matches, if there is one.
     pub(crate) fn example(&self) -> Option<String> {
         self.automaton.example()
     }

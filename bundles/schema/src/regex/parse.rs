@@ -1,9 +1,9 @@
-//! XSD regular expressions into trees.
+//! Parser of XSD regular expressions.
 
 use super::PatternError;
 use super::charset::CharSet;
 
-/// Deepest nesting of groups; far beyond what a person writes.
+/// Maximum nesting of groups. Handwritten patterns stay far below it.
 const MAX_DEPTH: usize = 64;
 
 /// Largest bound of a quantifier.
@@ -169,7 +169,7 @@ impl Parser {
         }
     }
 
-    /// A class after its opening bracket.
+    /// Reads a class after its opening bracket.
     fn class(&mut self, depth: usize) -> Parsed<CharSet> {
         if depth > MAX_DEPTH {
             return Err("classes are nested too deeply");
@@ -195,7 +195,7 @@ impl Parser {
         Ok(minus.map_or(set.clone(), |minus| set.without(&minus)))
     }
 
-    /// One character, escape or range of a class.
+    /// Reads one character, escape or range of a class.
     fn member(&mut self, first: char) -> Parsed<CharSet> {
         let (start, set) = if first == '\\' {
             let set = self.escape()?;

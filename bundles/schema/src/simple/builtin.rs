@@ -10,10 +10,10 @@ macro_rules! builtins {
         pub enum Builtin { $(#[doc = concat!("`xs:", $name, "`")] $variant,)* }
 
         impl Builtin {
-            /// Every built-in type that is understood.
+            /// All supported built-in types.
             pub const ALL: &'static [Builtin] = &[$(Builtin::$variant,)*];
 
-            /// Its name without prefix.
+            /// Returns its name without prefix.
             pub fn name(self) -> &'static str {
                 match self { $(Builtin::$variant => $name,)* }
             }
@@ -32,7 +32,7 @@ builtins! {
     HexBinary "hexBinary" Base64 "base64Binary"
 }
 
-/// How two values of a type are compared.
+/// Order of the values of a type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
     /// As text.
@@ -46,7 +46,7 @@ pub enum Order {
 }
 
 impl Builtin {
-    /// The type with this local name.
+    /// Returns the type with this local name.
     pub fn find(name: &str) -> Option<Builtin> {
         Self::ALL
             .iter()
@@ -54,7 +54,7 @@ impl Builtin {
             .find(|builtin| builtin.name() == name)
     }
 
-    /// How its values are compared.
+    /// Returns the order of its values.
     pub fn order(self) -> Order {
         use Builtin::{Boolean, Decimal, Double, Float, Integer};
         match self {
@@ -66,7 +66,7 @@ impl Builtin {
         }
     }
 
-    /// Whether white space around (and, for `token`, within) the value is dropped.
+    /// Checks whether white space around the value (and, for `token`, in it) is dropped.
     pub fn collapses(self) -> bool {
         !matches!(
             self,
@@ -74,7 +74,7 @@ impl Builtin {
         )
     }
 
-    /// The smallest and largest value of an integer type; empty means no end.
+    /// Returns the smallest and largest value of an integer type. An empty text means no limit.
     pub fn range(self) -> Option<(&'static str, &'static str)> {
         Some(match self {
             Self::NonNegative => ("0", ""),
@@ -93,7 +93,7 @@ impl Builtin {
         })
     }
 
-    /// Whether `text` (white space already dropped where the type says so) is a value.
+    /// Checks whether `text` is a value. White space to be dropped must already be gone.
     pub fn accepts(self, text: &str, edition: Edition) -> bool {
         match self {
             Self::AnySimple
@@ -150,7 +150,7 @@ fn is_name(text: &str) -> bool {
     text.chars().next().is_some_and(is_name_start) && text.chars().all(is_name_char)
 }
 
-/// XML 1.0, fifth edition, production `NameStartChar`.
+/// Checks for XML 1.0, fifth edition, production `NameStartChar`.
 pub(crate) fn is_name_start(c: char) -> bool {
     matches!(c, ':' | '_' | 'A'..='Z' | 'a'..='z' | '\u{C0}'..='\u{D6}' | '\u{D8}'..='\u{F6}'
         | '\u{F8}'..='\u{2FF}' | '\u{370}'..='\u{37D}' | '\u{37F}'..='\u{1FFF}'
@@ -159,7 +159,7 @@ pub(crate) fn is_name_start(c: char) -> bool {
         | '\u{10000}'..='\u{EFFFF}')
 }
 
-/// XML 1.0, fifth edition, production `NameChar`.
+/// Checks for XML 1.0, fifth edition, production `NameChar`.
 pub(crate) fn is_name_char(c: char) -> bool {
     is_name_start(c)
         || matches!(c, '-' | '.' | '0'..='9' | '\u{B7}' | '\u{300}'..='\u{36F}'

@@ -1,20 +1,20 @@
-//! What a simple type expects, in words.
+//! Description of the values that a simple type accepts.
 
 use super::{Bound, Builtin, Facets, SimpleType, Variety};
 use crate::model::Schema;
 
-/// What would have been right, as data.
+/// Description of the valid values as data.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Expectation {
-    /// The values allowed, if they can be listed.
+    /// The allowed values, if they can be listed.
     pub values: Vec<String>,
-    /// The rest in words, e.g. `a number of at least 0`.
+    /// Other allowed values as text, e.g. `a number of at least 0`.
     pub words: Vec<String>,
 }
 
 impl Expectation {
-    /// Both in one sentence part; long lists of values are cut. What stands for a value, parameters and
-    /// expressions, comes last.
+    /// Returns both as one part of a sentence. Long lists of values are cut. Parameters and
+    /// expressions come last.
     pub fn sentence(&self) -> String {
         const SHOWN: usize = 12;
         let mut parts = self.words.clone();
@@ -44,17 +44,17 @@ impl Expectation {
     }
 }
 
-/// How the words for a parameter of OpenSCENARIO begin.
+/// First words of the text for a parameter of OpenSCENARIO.
 const PARAMETER: &str = "a parameter";
-/// How the words for an expression begin.
+/// First words of the text for an expression.
 pub(crate) const EXPRESSION: &str = "an expression";
 
-/// Codes of countries, whose form everybody knows by its letters.
+/// Patterns of country codes. They are described by their number of letters.
 const LETTERS_2: &str = "[A-Z]{2}";
 const LETTERS_3: &str = "[A-Z]{3}";
 
 impl SimpleType {
-    /// What a value of this type looks like.
+    /// Describes the values of this type.
     pub fn expectation(&self, schema: &Schema) -> Expectation {
         let mut all = Expectation::default();
         self.collect(schema, &mut all);
@@ -99,7 +99,7 @@ impl SimpleType {
 impl Facets {
     fn words(&self, name: Option<&str>, builtin: Builtin) -> String {
         let mut words = match (name, self.patterns.is_empty()) {
-            // Named patterns speak for themselves: OpenSCENARIO's `parameter` and `expression`.
+            // The names of OpenSCENARIO's patterns `parameter` and `expression` are already clear.
             (Some("parameter"), false) => return format!("{PARAMETER} ($name)"),
             (Some("expression"), false) => return format!("{EXPRESSION} (${{…}})"),
             _ => noun(builtin).to_owned(),
@@ -150,7 +150,7 @@ fn range(lowest: Option<&Bound>, highest: Option<&Bound>) -> String {
     }
 }
 
-/// What the standards call the types that authors know by their names.
+/// Returns the name used in the standards for types that authors know by name.
 fn standard_name(builtin: Builtin) -> Option<&'static str> {
     Some(match builtin {
         Builtin::Boolean => "boolean",

@@ -1,4 +1,4 @@
-//! Simple types: is this text a value, and if not, what would be one?
+//! Simple types: check whether a text is a value, and describe the valid values.
 
 mod builtin;
 mod describe;
@@ -19,11 +19,11 @@ use crate::regex::Pattern;
 /// A simple type with all its restrictions.
 #[derive(Clone, Debug)]
 pub struct SimpleType {
-    /// The schema's name for it, if it has one.
+    /// Name of the type in the schema, if it has one.
     pub name: Option<Box<str>>,
-    /// One value, several, or one of several types.
+    /// One value, several values, or one of several types.
     pub variety: Variety,
-    /// What restricts it further.
+    /// Further restrictions.
     pub facets: Facets,
 }
 
@@ -32,7 +32,7 @@ pub struct SimpleType {
 pub enum Variety {
     /// One value of a built-in type.
     Atomic(Builtin),
-    /// Values of a type, separated by white space.
+    /// White-space-separated values of a type.
     List(u32),
     /// A value of any of these types.
     Union(Vec<u32>),
@@ -41,21 +41,21 @@ pub enum Variety {
 /// Restrictions of a simple type.
 #[derive(Clone, Debug, Default)]
 pub struct Facets {
-    /// The values allowed, as written in the schema; `None` is no restriction.
+    /// The allowed values as written in the schema, or `None` for no restriction.
     pub enumeration: Option<Vec<Box<str>>>,
     /// Patterns that must all match.
     pub patterns: Vec<Pattern>,
-    /// Smallest value.
+    /// Lower limit of the value.
     pub lowest: Option<Bound>,
-    /// Largest value.
+    /// Upper limit of the value.
     pub highest: Option<Bound>,
-    /// Fewest characters (or list items).
+    /// Minimum number of characters (or list items).
     pub min_length: Option<u32>,
-    /// Most characters (or list items).
+    /// Maximum number of characters (or list items).
     pub max_length: Option<u32>,
-    /// Most digits.
+    /// Maximum number of digits.
     pub total_digits: Option<u32>,
-    /// Most digits after the point.
+    /// Maximum number of digits after the point.
     pub fraction_digits: Option<u32>,
     /// Whether white space is dropped although the built-in type keeps it.
     pub collapse: bool,
@@ -73,7 +73,7 @@ pub struct Bound {
 }
 
 impl SimpleType {
-    /// A built-in type without restrictions.
+    /// Creates a built-in type without restrictions.
     pub(crate) fn builtin(builtin: Builtin) -> Self {
         Self {
             name: None,
@@ -94,7 +94,7 @@ impl SimpleType {
         size_of::<Self>() + values + patterns
     }
 
-    /// Whether `text` is a value of this type. Unions nest at most as deep as the schema does.
+    /// Checks whether `text` is a value of this type. Unions nest at most as deep as in the schema.
     pub fn accepts(&self, text: &str, schema: &Schema) -> bool {
         match &self.variety {
             Variety::Atomic(builtin) => self.accepts_atomic(*builtin, text, schema.edition),
@@ -134,7 +134,7 @@ impl SimpleType {
         self.facets.accept_length(count) && self.facets.accept_text(text.trim_matches(XML_SPACE))
     }
 
-    /// The text with white space treated as the type demands; borrowed in all but odd cases.
+    /// Returns the text with its white space normalized for the type. It is usually borrowed.
     pub(crate) fn normalized<'t>(&self, builtin: Builtin, text: &'t str) -> Cow<'t, str> {
         if !builtin.collapses() && !self.facets.collapse {
             return Cow::Borrowed(text);
@@ -151,7 +151,7 @@ impl SimpleType {
     }
 }
 
-/// The text without white space around it; mostly there is none, and two bytes tell.
+/// Returns the text without white space around it. Usually a check of two bytes is enough.
 fn trim(text: &str) -> &str {
     match text.as_bytes() {
         [first, .., last] if *first > b' ' && *last > b' ' => text,
@@ -159,7 +159,7 @@ fn trim(text: &str) -> &str {
     }
 }
 
-/// Whether collapsing would change something within a trimmed text.
+/// Checks whether collapsing white space would change a trimmed text.
 fn has_inner_space(text: &str) -> bool {
     let bytes = text.as_bytes();
     bytes
@@ -201,7 +201,7 @@ impl Facets {
             && (self.no_length() || self.accept_length(length(builtin, text)))
     }
 
-    /// The facets that look at a whole union or list: as text.
+    /// Checks the facets that apply to the text of a whole union or list.
     fn accept_text(&self, text: &str) -> bool {
         let listed = |values: &Vec<Box<str>>| {
             values
@@ -213,7 +213,7 @@ impl Facets {
     }
 
     fn accept_range(&self, builtin: Builtin, text: &str) -> bool {
-        // Most ranges are `at least 0`, for which nothing needs to be read but the sign.
+        // Most ranges are `at least 0`, and these need only a check of the sign.
         let unsigned = matches!(builtin, Builtin::Float | Builtin::Double)
             && matches!(text.as_bytes().first(), Some(b'0'..=b'9' | b'.'));
         let above = |bound: &Bound| {
@@ -290,7 +290,7 @@ fn ordered(
 ) -> bool {
     let order = match builtin.order() {
         Order::Decimal => Some(Digits::of(text).cmp(&Digits::of(bound))),
-        // NaN compares with nothing and so lies in no range.
+        // NaN cannot be compared, so it is in no range.
         _ => float_value(text).and_then(|value| value.partial_cmp(&number)),
     };
     match order {
@@ -300,7 +300,7 @@ fn ordered(
     }
 }
 
-/// Whether two lexically correct texts denote the same value.
+/// Checks whether two lexically correct texts represent the same value.
 pub(crate) fn same_value(order: Order, left: &str, right: &str) -> bool {
     if left == right {
         return true;

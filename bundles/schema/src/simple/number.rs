@@ -1,4 +1,4 @@
-//! Numbers as XML Schema writes them, checked and compared without allocation.
+//! Numbers in the notation of XML Schema, checked and compared without allocation.
 
 use std::cmp::Ordering;
 
@@ -16,7 +16,7 @@ pub(crate) fn is_decimal(text: &str) -> bool {
     mantissa(bytes) == Some(bytes.len())
 }
 
-/// A decimal with an optional exponent, or `INF`, `-INF`, `NaN` (and `+INF` since XSD 1.1).
+/// Checks for a decimal with optional exponent, `INF`, `-INF` or `NaN` (`+INF` since XSD 1.1).
 pub(crate) fn is_float(text: &str, edition: Edition) -> bool {
     let bytes = unsigned(text);
     let Some(end) = mantissa(bytes) else {
@@ -39,7 +39,7 @@ fn is_special(text: &str, edition: Edition) -> bool {
     matches!(text, "INF" | "-INF" | "NaN") || (text == "+INF" && edition == Edition::V1_1)
 }
 
-/// The value of a text that passed [`is_float`].
+/// Returns the value of a text that passed [`is_float`].
 pub(crate) fn float_value(text: &str) -> Option<f64> {
     match text {
         "INF" | "+INF" => Some(f64::INFINITY),
@@ -49,7 +49,7 @@ pub(crate) fn float_value(text: &str) -> Option<f64> {
     }
 }
 
-/// What follows the sign.
+/// Returns the text after the sign.
 fn unsigned(text: &str) -> &[u8] {
     match text.as_bytes() {
         [b'+' | b'-', rest @ ..] => rest,
@@ -57,7 +57,7 @@ fn unsigned(text: &str) -> &[u8] {
     }
 }
 
-/// Length of `[0-9]+(\.[0-9]*)?|\.[0-9]+` at the start of `bytes`.
+/// Returns the length of `[0-9]+(\.[0-9]*)?|\.[0-9]+` at the start of `bytes`.
 fn mantissa(bytes: &[u8]) -> Option<usize> {
     let whole = digits(bytes);
     if bytes.get(whole) != Some(&b'.') {
@@ -67,7 +67,8 @@ fn mantissa(bytes: &[u8]) -> Option<usize> {
     (whole + fraction > 0).then_some(whole + 1 + fraction)
 }
 
-/// How many digits `bytes` begins with; exporters write up to 17, so eight are looked at at once.
+/// Returns the number of digits at the start of `bytes`. Exporters write up to 17, so eight are
+/// checked at the same time.
 fn digits(bytes: &[u8]) -> usize {
     let (words, _) = bytes.as_chunks::<8>();
     let eights = words.iter().take_while(|word| are_digits(**word)).count();
@@ -75,8 +76,8 @@ fn digits(bytes: &[u8]) -> usize {
     8 * eights + rest.take_while(|byte| byte.is_ascii_digit()).count()
 }
 
-/// Whether eight bytes are digits: their upper halves are 3, and still are when 6 is added. No sum is
-/// carried into the next byte, since what begins with 3 does not overflow.
+/// Checks whether eight bytes are digits: their upper halves are 3, before and after an addition of
+/// 6. A byte that begins with 3 does not overflow, so there is no carry into the next byte.
 fn are_digits(word: [u8; 8]) -> bool {
     const UPPER: u64 = 0xF0F0_F0F0_F0F0_F0F0;
     const THREES: u64 = 0x3030_3030_3030_3030;
@@ -85,7 +86,7 @@ fn are_digits(word: [u8; 8]) -> bool {
     word & UPPER == THREES && word.wrapping_add(SIXES) & UPPER == THREES
 }
 
-/// A decimal number as its significant digits: sign, digits before and after the point.
+/// Significant digits of a decimal number: the sign and the digits before and after the point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Digits<'a> {
     negative: bool,
@@ -135,7 +136,7 @@ impl PartialOrd for Digits<'_> {
     }
 }
 
-/// Whether an integer lies within `(lowest, highest)`; an empty end is open.
+/// Checks whether an integer is in the range `(lowest, highest)`. An empty text means no limit.
 pub(crate) fn in_bounds(text: &str, (lowest, highest): (&str, &str)) -> bool {
     let value = Digits::of(text);
     (lowest.is_empty() || value >= Digits::of(lowest))

@@ -1,6 +1,6 @@
 //! `dateTime`, `date` and `time`.
 
-/// `-?YYYY-MM-DDThh:mm:ss(.s+)?zone?`
+/// Checks for `-?YYYY-MM-DDThh:mm:ss(.s+)?zone?`
 pub(crate) fn is_date_time(text: &str) -> bool {
     let Some((date, time)) = text.split_once('T') else {
         return false;
@@ -8,12 +8,12 @@ pub(crate) fn is_date_time(text: &str) -> bool {
     is_day(date) && is_time(time)
 }
 
-/// `-?YYYY-MM-DDzone?`
+/// Checks for `-?YYYY-MM-DDzone?`
 pub(crate) fn is_date(text: &str) -> bool {
     without_zone(text).is_some_and(is_day)
 }
 
-/// `hh:mm:ss(.s+)?zone?`
+/// Checks for `hh:mm:ss(.s+)?zone?`
 pub(crate) fn is_time(text: &str) -> bool {
     without_zone(text).is_some_and(is_clock)
 }

@@ -1,4 +1,4 @@
-//! Attributes of one element against its type.
+//! Validation of the attributes of one element against its type.
 
 use qcbus_document::{Attribute, Node};
 
@@ -12,7 +12,7 @@ use crate::simple::{Order, Variety, XML_SPACE, same_value};
 use crate::violation::Code;
 use crate::work::steps;
 
-/// Which attributes of a type were seen; types have at most 512.
+/// Attributes of a type that occurred so far. Types have at most 512 attributes.
 #[derive(Default)]
 struct Seen {
     bits: [u64; 8],
@@ -20,7 +20,7 @@ struct Seen {
 }
 
 impl Seen {
-    /// Marks an attribute; false if it was marked before.
+    /// Marks an attribute. Returns `false` if it was already marked.
     fn mark(&mut self, index: usize, required: bool) -> bool {
         let Some(word) = self.bits.get_mut(index / 64) else {
             return false;
@@ -46,8 +46,8 @@ impl<'a, 's> Walk<'a, 's> {
             Kind::Complex(id, ty) => (id as usize, &ty.attributes, ty.required),
         };
         let mut seen = Seen::default();
-        // Files keep to one order of attributes, mostly that of the schema: start where the last
-        // one was found.
+        // Files use one order of attributes, mostly that of the schema. So the search starts after
+        // the last attribute found.
         let mut guess = 0;
         for attribute in node.attributes() {
             steps(1);
@@ -165,7 +165,7 @@ impl<'a, 's> Walk<'a, 's> {
 }
 
 impl<'a, 's> Walk<'a, 's> {
-    /// Whether an unknown attribute, which is reported, probably is the missing one misspelt.
+    /// Checks whether a reported unknown attribute is probably the missing one misspelt.
     fn was_meant(
         &self,
         node: Node<'a>,
@@ -186,7 +186,7 @@ impl<'a, 's> Walk<'a, 's> {
     }
 }
 
-/// Where `name` is declared, looking from `guess` on and then from the start.
+/// Returns the index of the declaration of `name`. The search starts at `guess` and wraps.
 #[inline]
 fn position(declared: &[AttributeUse], guess: usize, name: NameId) -> Option<usize> {
     let guess = guess.min(declared.len());
@@ -200,7 +200,7 @@ fn position(declared: &[AttributeUse], guess: usize, name: NameId) -> Option<usi
 }
 
 impl ComplexType {
-    /// The declaration of an attribute.
+    /// Returns the declaration of an attribute.
     pub(crate) fn attribute(&self, name: NameId) -> Option<&AttributeUse> {
         self.attributes.iter().find(|one| one.name == name)
     }

@@ -1,9 +1,10 @@
-//! Children of one element against its content model, and how to go on after a wrong one.
+//! Validation of the children of one element against its content model, and recovery after a wrong
+//! child.
 //!
-//! A wrong child is one of these: a child that the model knows but expects only after others (those
-//! are missing), one that it knows but no longer expects (repeated or misplaced), or one that it
-//! does not know (perhaps a slip of the pen). In each case the automaton is brought into the state
-//! from which the rest of the children makes most sense, so that one cause gives one violation.
+//! A wrong child is one of these: a child that the model expects only after others (these are
+//! missing), a child that it no longer expects (repeated or misplaced), or a child that it does not
+//! know (perhaps misspelt). In each case the automaton changes to the state that fits the remaining
+//! children best. So one cause gives one violation.
 
 use std::collections::{HashMap, HashSet, VecDeque};
 
@@ -17,11 +18,12 @@ use crate::names::NameId;
 use crate::violation::Code;
 use crate::work::steps;
 
-/// States looked at when searching the way to an expected child.
+/// Maximum number of visited states in the search for an expected child.
 const MAX_SEARCH: usize = 256;
 
 impl<'a, 's> Walk<'a, 's> {
-    /// The declaration of an element within its parent; `None` if its content is not checked.
+    /// Returns the declaration of an element in its parent, or `None` if its content is not
+    /// checked.
     pub(super) fn declaration_of(&mut self, node: Node<'a>) -> Option<&'s ElementDecl> {
         let name = self.names.element(node);
         let frame = self.stack.last_mut()?;
@@ -110,7 +112,7 @@ impl<'a, 's> Walk<'a, 's> {
             .iter()
             .position(|known| *known == name)
         {
-            // Reported as missing before; it was only late.
+            // The child was reported as missing before, but it only came late.
             self.stack.last_mut()?.troubles.swap_remove(at);
         } else if !self.is_surplus(node, name, key.0, |memo| memo.most(model, name)) {
             self.stack.last_mut()?.troubles.push(name);
@@ -121,8 +123,8 @@ impl<'a, 's> Walk<'a, 's> {
         model.children.get(index)
     }
 
-    /// Whether there are more children of a name beside this one than there may be; said once, at the
-    /// first that does not fit.
+    /// Checks whether a name has more children than allowed. This is reported once, at the first
+    /// child that does not fit.
     fn is_surplus(
         &mut self,
         node: Node<'a>,
@@ -142,7 +144,7 @@ impl<'a, 's> Walk<'a, 's> {
             }
             numbers
         });
-        // A name that the model knows may occur at least once.
+        // The model allows at least one child of every known name.
         let Some(number) = numbers.get_mut(&name).filter(|it| it.children > 1) else {
             return false;
         };
@@ -159,7 +161,7 @@ impl<'a, 's> Walk<'a, 's> {
         true
     }
 
-    /// A child that the model does not know at all.
+    /// Handles a child with a name that the model does not know.
     fn unknown_child(
         &mut self,
         node: Node<'a>,
@@ -200,7 +202,7 @@ impl<'a, 's> Walk<'a, 's> {
         model.children.get(usize::from(edge.child))
     }
 
-    /// Counts an unknown child once the list is full; says nothing where the overlay allows it.
+    /// Counts an unknown child when the list is full, unless the overlay allows it.
     fn count_unknown(&mut self, node: Node<'a>, parent: Node<'a>) {
         if !self.overlay.allows_element(parent.name(), node.name()) {
             let key = (0, u32::from(node.name_number()));
@@ -210,7 +212,7 @@ impl<'a, 's> Walk<'a, 's> {
         }
     }
 
-    /// A child that an `all` group does not know.
+    /// Handles a child that an `all` group does not know.
     fn strange_member(&mut self, node: Node<'a>) -> Option<&'s ElementDecl> {
         let frame = self.stack.last_mut()?;
         let parent = self.document.node(frame.node)?;
@@ -222,7 +224,7 @@ impl<'a, 's> Walk<'a, 's> {
         }
         let schema = self.schema;
         let meant = self.memo.member((node, parent), model, schema);
-        // One that is there already was not meant.
+        // A member that is already present is not suggested.
         let open = |name: &&str| {
             let index = model
                 .members
@@ -252,7 +254,7 @@ impl<'a, 's> Walk<'a, 's> {
         model.members.get(index)
     }
 
-    /// Checks, at the end of an element, that nothing is missing.
+    /// Checks at the end of an element whether required children are missing.
     pub(super) fn complete(&mut self, frame: &Frame<'s>) {
         match frame.body {
             Body::Children { model, state } => self.complete_children(frame, model, state),
@@ -264,7 +266,7 @@ impl<'a, 's> Walk<'a, 's> {
                 let Some(node) = self.document.node(frame.node) else {
                     return;
                 };
-                // Each unknown child probably stands for one that is missing.
+                // Each unknown child is probably a misspelling of a missing one.
                 let members = model.members.iter().enumerate();
                 let absent = members.filter(|(index, _)| missing & (1 << index) != 0);
                 for (_, member) in absent.skip(frame.strangers as usize) {
@@ -309,11 +311,11 @@ impl<'a, 's> Walk<'a, 's> {
     }
 }
 
-/// A way through a model: the state it leads to, and the children skipped on it.
+/// A path through a model: the target state and the skipped children.
 pub(super) type Way = (u16, Vec<NameId>);
 
-/// The shortest way from `state` to an edge that `found` recognises by the child's name, or to a
-/// state that it recognises by whether the element may end there.
+/// Returns the shortest path from `state` to a target that `found` accepts. The target is an edge
+/// with a child's name, or a state with the flag whether the element may end there.
 pub(super) fn way_to(
     model: &Model,
     state: u16,
@@ -322,7 +324,7 @@ pub(super) fn way_to(
     way_without(model, state, None, &found)
 }
 
-/// Those of the skipped children that every way contains: the ones that are surely missing.
+/// Returns the skipped children that are on every path. These are certainly missing.
 fn needed(
     model: &Model,
     state: u16,

@@ -1,4 +1,4 @@
-//! The open elements.
+//! State of the open elements.
 
 use std::collections::HashMap;
 
@@ -15,27 +15,27 @@ pub(super) struct Frame<'s> {
     pub(super) body: Body<'s>,
     pub(super) mixed: bool,
     pub(super) keys: Mark,
-    /// Children already reported as missing or misplaced: the same cause is not reported twice.
-    /// Empty, and so without allocation, for every sound element.
+    /// Children already reported as missing or misplaced, so that one cause is not reported twice.
+    /// It is empty and needs no allocation for a valid element.
     pub(super) troubles: Vec<NameId>,
-    /// Where the last unknown child stood: the state of the automaton. If nothing has come since,
-    /// that child probably stands for the one that is missing.
+    /// State of the automaton at the last unknown child. If no child followed, the unknown child
+    /// probably replaces the missing one.
     pub(super) stranger: Option<u16>,
-    /// How many unknown children an `all` group met.
+    /// Number of unknown children in an `all` group.
     pub(super) strangers: u32,
-    /// The children, counted by name once one of them is wrong.
+    /// Number of children for each name. It is computed at the first wrong child.
     pub(super) numbers: Option<HashMap<NameId, Number>>,
 }
 
-/// The children of one name.
+/// Count of the children with one name.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Number {
     pub(super) children: u32,
-    /// That they are too many was said.
+    /// Whether the excess was reported.
     pub(super) told: bool,
 }
 
-/// What an open element may contain, and how far it has come.
+/// Allowed content of an open element, with the current position in it.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Body<'s> {
     Nothing,

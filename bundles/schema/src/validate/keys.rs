@@ -1,7 +1,7 @@
 //! Keys and references, collected during the walk.
 //!
-//! Each open element knows where in the selectors of the enclosing scopes it stands; almost always
-//! that is nowhere, and costs nothing. Values are compared as values of their types.
+//! Each open element stores its positions in the selectors of the enclosing scopes. Most elements
+//! have none, which costs nothing. Values are compared as values of their types.
 
 use foldhash::HashSet;
 use qcbus_document::{Attribute, Node};
@@ -18,7 +18,7 @@ use crate::simple::{Digits, Order, Variety, XML_SPACE, float_value, is_decimal};
 use crate::violation::Code;
 use crate::work::steps;
 
-/// Sets of keys up to this capacity are used again.
+/// Maximum capacity of key sets that are reused.
 const SMALL_SET: usize = 64;
 
 /// A key's value in the value space of its type.
@@ -30,7 +30,7 @@ enum KeyValue<'a> {
     Boolean(bool),
 }
 
-/// Where an element stands in one scope's selectors.
+/// Position of an element in the selectors of one scope.
 #[derive(Clone, Copy, Debug)]
 struct Active {
     scope: usize,
@@ -44,7 +44,7 @@ struct Scope<'a, 's> {
     references: Vec<(u16, KeyValue<'a>, Attribute<'a>)>,
 }
 
-/// What an open element must undo when it closes.
+/// State that an open element restores when it closes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Mark {
     from: usize,
@@ -55,14 +55,14 @@ pub(super) struct Mark {
 #[derive(Debug, Default)]
 pub(super) struct Keys<'a, 's> {
     active: Vec<Active>,
-    /// Where the entries of the innermost open element begin.
+    /// Index of the first entry of the innermost open element.
     from: usize,
     scopes: Vec<Scope<'a, 's>>,
-    /// Closed scopes, kept for their memory.
+    /// Closed scopes, stored to reuse their memory.
     spare: Vec<Scope<'a, 's>>,
 }
 
-/// What an element brings along when it is opened.
+/// Input for opening an element.
 pub(super) struct Opening<'a, 's, 'm> {
     pub(super) node: Node<'a>,
     pub(super) name: NameId,
@@ -150,7 +150,7 @@ impl<'a, 's> Keys<'a, 's> {
                 );
             }
         }
-        // Emptying a set costs its capacity: a large one is not kept for scopes that may be small.
+        // Clearing a set costs its capacity. A large one is dropped: the next scope may be small.
         if scope.values.capacity() > SMALL_SET {
             scope.values = HashSet::default();
         }

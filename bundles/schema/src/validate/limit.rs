@@ -1,14 +1,14 @@
-//! How often children of one name may occur in an element, told from its automaton.
+//! Maximum number of children with one name in an element, computed from its automaton.
 
 use crate::model::Model;
 use crate::names::NameId;
 use crate::work::steps;
 
-/// The most children of a name on any way through the model; `None` if there is no limit.
+/// Returns the maximum number of children with a name on any path, or `None` without a limit.
 ///
-/// The longest way in a graph whose knots (strongly connected components, found as Tarjan does)
-/// come one by one, each after those it leads to. A child of that name inside a knot can be repeated
-/// for ever.
+/// This is a longest path in a graph of strongly connected components. Tarjan's algorithm yields
+/// each component after its successors. A child of that name in a component can be repeated without
+/// limit.
 pub(super) fn most(model: &Model, name: NameId) -> Option<u32> {
     let states = model.states.len();
     let mut search = Search {
@@ -28,12 +28,12 @@ const UNSEEN: u32 = u32::MAX;
 struct Search<'m> {
     model: &'m Model,
     name: NameId,
-    /// When a state was first seen, and the earliest state that it leads back to.
+    /// Discovery index of each state, and in `low` the smallest index that it leads back to.
     order: Vec<u32>,
     low: Vec<u32>,
-    /// Of states whose knot is done.
+    /// Result for the states of finished components.
     most: Vec<Option<u32>>,
-    /// States whose knot is not done.
+    /// States of unfinished components.
     open: Vec<u16>,
     next: u32,
 }
@@ -66,7 +66,7 @@ impl Search<'_> {
         self.most.first().copied().flatten()
     }
 
-    /// The step from a state with this number: where it leads, and whether by the name.
+    /// Returns a state's step with this number: the next state, and whether it reads the name.
     fn step(&self, state: u16, number: usize) -> Option<(u16, bool)> {
         let edges = self.model.edges(state);
         if let Some(edge) = edges.get(number) {
@@ -99,7 +99,7 @@ impl Search<'_> {
         }
     }
 
-    /// Ends the knot that begins with this state; `None` if the name can be repeated in it.
+    /// Finishes the component that begins here. Returns `None` if the name can be repeated in it.
     fn close(&mut self, first: u16) -> Option<()> {
         let start = self.open.iter().rposition(|state| *state == first)?;
         let knot = self.open.split_off(start);
@@ -112,7 +112,7 @@ impl Search<'_> {
                 let beyond = self.most.get(usize::from(to)).copied().flatten();
                 match beyond {
                     Some(beyond) => most = most.max(beyond + u32::from(by_name)),
-                    // Not done: it is in this knot.
+                    // The target is unfinished, so it is in this component.
                     None if by_name => return None,
                     None => {}
                 }

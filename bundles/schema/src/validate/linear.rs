@@ -1,4 +1,5 @@
-//! Validation takes steps in proportion to the document, whatever it contains: counted, not timed.
+//! Tests that validation is linear in the size of the document, for any content. They count steps
+//! and do not measure time.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -9,16 +10,16 @@ use crate::generate::Dice;
 use crate::work::counted;
 use crate::{Limits, SHIPPED, Schema, compile};
 
-/// Steps per element and attribute: a few for a sound one, and for a wrong one the width of the
-/// widest type and about thirty siblings.
+/// Maximum steps per element and attribute. A valid one needs a few. A wrong one needs the width of
+/// the widest type and about thirty siblings.
 const PER_PART: u64 = 200;
-/// Violations listed, and steps for wording them all.
+/// Limits of listed violations, and the maximum steps for their texts.
 const LISTED: Limits = Limits {
     per_kind: 5,
     total: 50,
 };
 const WORDING: u64 = 100_000;
-/// Twice the document, twice the steps; a square would be four times.
+/// Maximum growth of the steps for a doubled document. Quadratic time would give four.
 const GROWTH: f64 = 2.3;
 
 fn image(name: &str, text: &str) -> Vec<u8> {
@@ -26,7 +27,7 @@ fn image(name: &str, text: &str) -> Vec<u8> {
     qcbus_ingest::prepare_bytes(Path::new(name), bytes, &qcbus_ingest::Limits::default()).build()
 }
 
-/// Steps for a document, and its elements and attributes.
+/// Returns the steps for a document, and the number of its elements and attributes.
 fn work(schema: &Schema, text: &str) -> (u64, u64) {
     let image = image("a.xodr", text);
     let document = Document::open(&image).expect("an image of our own");
@@ -43,7 +44,7 @@ fn work(schema: &Schema, text: &str) -> (u64, u64) {
     (steps, parts)
 }
 
-/// Fails if a document of size `2 n` takes more than its share.
+/// Checks that a document of size `2 n` takes at most its linear number of steps.
 fn assert_linear(what: &str, schema: &Schema, size: usize, make: impl Fn(usize) -> String) {
     let (once, _) = work(schema, &make(size));
     let (twice, parts) = work(schema, &make(2 * size));
@@ -81,12 +82,12 @@ fn repeat(from: usize, to: usize, one: impl Fn(usize) -> String) -> String {
     (from..to).map(one).collect()
 }
 
-/// Names of a schema nested at random below its root, with its attributes.
+/// Generates a document of random nested names below the root of a schema, with its attributes.
 fn soup(schema: &Schema, size: usize, depth: usize) -> String {
     let names: Vec<&str> = (0..u16::MAX)
         .map(|id| schema.names.text(crate::names::NameId(id)))
         .take_while(|name| !name.is_empty())
-        // An include would be followed.
+        // Ingest would follow an include.
         .filter(|name| *name != "include" && name.bytes().all(|byte| byte.is_ascii_alphanumeric()))
         .collect();
     let root = schema.names.text(schema.roots[0].name);
@@ -175,7 +176,7 @@ fn prefixes_are_not_looked_up_again_and_again() {
     });
 }
 
-/// A schema of everything that could cost more than its share, in sizes that a person might write.
+/// Returns a schema with all constructs that could cost more than linear time, in realistic sizes.
 fn made(wide: usize) -> Schema {
     let optional = repeat(0, wide, |n| {
         format!("<xs:element name='s{n}' minOccurs='0'/>")
@@ -227,6 +228,6 @@ fn what_could_not_be_linear_is_refused() {
         error.contains("a.xsd:2:1") && error.contains("`t`"),
         "{error}"
     );
-    // The same condition on a type that does not contain itself is fine.
+    // The same condition is accepted for a type that does not contain itself.
     compiled(&body.replace("type='t' minOccurs", "minOccurs"));
 }

@@ -1,4 +1,4 @@
-//! What is worked out about wrong children, kept: a document can repeat one mistake a million times.
+//! Cached results about wrong children, because a document can repeat one mistake a million times.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -13,31 +13,31 @@ use crate::similar::closest;
 use crate::versions::is_known_elsewhere;
 use crate::work::steps;
 
-/// Answers kept; a schema and a document together seldom have more than a few dozen.
+/// Maximum number of cached results. A schema and a document usually need at most a few dozen.
 const MOST: usize = 65_536;
 
-/// A model, a state of it, and the name that is read there.
+/// A model, one of its states, and the name read there.
 type Transition = (usize, u16, u16);
 
 #[derive(Debug, Default)]
 pub(super) struct Memo<'s> {
     ways: HashMap<Transition, Option<Rc<Way>>>,
     meant: HashMap<Transition, Meant<'s>>,
-    /// How often a model allows a name.
+    /// Maximum number of children for a model and a name.
     most: HashMap<(usize, u16), Option<u32>>,
 }
 
-/// Which child was probably meant.
+/// Suggestions for a misspelt child.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Meant<'s> {
-    /// One that may stand here.
+    /// A child that is allowed here.
     pub(super) here: Option<&'s str>,
-    /// One that the parent knows.
+    /// A child that the parent allows anywhere.
     pub(super) anywhere: Option<&'s str>,
 }
 
 impl<'s> Memo<'s> {
-    /// The way from a state to the child of this name, or (no name) to the end.
+    /// Returns the path from a state to the child of this name, or (without a name) to the end.
     pub(super) fn way(
         &mut self,
         model: &'s Model,
@@ -59,7 +59,7 @@ impl<'s> Memo<'s> {
         self.ways.entry(key).or_insert_with(search).clone()
     }
 
-    /// How many children of a name a model allows; `None` is any number.
+    /// Returns the maximum number of children with a name, or `None` without a limit.
     pub(super) fn most(&mut self, model: &'s Model, name: NameId) -> Option<u32> {
         let key = (std::ptr::from_ref(model) as usize, name.0);
         *self
@@ -68,8 +68,8 @@ impl<'s> Memo<'s> {
             .or_insert_with(|| limit::most(model, name))
     }
 
-    /// What a child unknown to a model was probably meant to be: nothing but itself where another
-    /// version knows it. Once too many were asked for, nothing.
+    /// Returns the suggestions for a child that a model does not know. There are none if another
+    /// version knows the child, or if the cache is full.
     pub(super) fn child(
         &mut self,
         (node, parent): (Node<'_>, Node<'_>),
@@ -92,7 +92,7 @@ impl<'s> Memo<'s> {
         })
     }
 
-    /// The same for a member of an `all` group.
+    /// Returns the suggestion for a member of an `all` group in the same way.
     pub(super) fn member(
         &mut self,
         (node, parent): (Node<'_>, Node<'_>),

@@ -1,8 +1,8 @@
-//! One walk over the document image.
+//! Validation in one walk over the document image.
 //!
-//! Every element is met once: its declaration follows from one lookup in its parent's automaton,
-//! its attributes from its type's table. Names are compared as numbers, which are looked up once
-//! per distinct name of the document. Memory grows with depth, keys and violations, not with size.
+//! Every element is visited once. One lookup in its parent's automaton gives its declaration, and
+//! the table of its type gives its attributes. Names are compared as numbers, with one lookup per
+//! distinct name of the document. Memory grows with depth, keys and violations, not with size.
 
 mod attributes;
 mod children;
@@ -34,14 +34,14 @@ use reporter::Reporter;
 use types::Bindings;
 
 impl Schema {
-    /// Validates a document, namespaces disregarded: elements count by their local names.
+    /// Validates a document. Namespaces are ignored: elements are compared by their local names.
     ///
     /// Takes time linear in the document's size.
     pub fn validate<'a>(&self, document: &Document<'a>, limits: Limits) -> Report<'a> {
         self.validate_with(document, limits, Overlay::None)
     }
 
-    /// Validates a document that may contain more than the schema says.
+    /// Validates a document that may contain more than its schema allows.
     pub fn validate_with<'a>(
         &self,
         document: &Document<'a>,
@@ -68,7 +68,7 @@ impl Schema {
     }
 }
 
-/// Start and text of each file, ascending.
+/// Returns start and text of each file in ascending order.
 fn sources<'a>(document: &Document<'a>) -> Vec<(u32, &'a str)> {
     let mut sources: Vec<(u32, &str)> = document
         .sources()
@@ -82,12 +82,12 @@ struct Walk<'a, 's> {
     schema: &'s Schema,
     document: Document<'a>,
     names: NameMap,
-    /// Start and text of each file, ascending.
+    /// Start and text of each file in ascending order.
     sources: Vec<(u32, &'a str)>,
     stack: Vec<Frame<'s>>,
     keys: Keys<'a, 's>,
     memo: Memo<'s>,
-    /// The prefixes bound by open elements.
+    /// Prefixes bound by open elements.
     bindings: Bindings<'a>,
     reporter: Reporter<'a, 's>,
     overlay: Overlay,
@@ -115,7 +115,7 @@ impl<'a, 's> Walk<'a, 's> {
         self.close_until(end);
     }
 
-    /// Meets an element below the root; returns where the walk goes on.
+    /// Visits an element below the root and returns the index of the next node.
     fn element(&mut self, node: Node<'a>) -> u32 {
         steps(1);
         if self.is_spliced_include(node) {
@@ -127,13 +127,13 @@ impl<'a, 's> Walk<'a, 's> {
         }
     }
 
-    /// An OpenDRIVE `include` whose file has been put in its place: what counts is what came from
-    /// there, in the order in which it stands.
+    /// Checks for an OpenDRIVE `include` that was replaced by the content of its file. Only that
+    /// content is validated, in its order.
     fn is_spliced_include(&self, node: Node<'a>) -> bool {
         self.sources.len() > 1 && node.is("include") && node.attr("file").is_some()
     }
 
-    /// Checks an element against its declaration and opens it; returns where the walk goes on.
+    /// Checks an element against its declaration and opens it. Returns the index of the next node.
     fn start(&mut self, node: Node<'a>, declared: &'s ElementDecl) -> u32 {
         let name = self.names.element(node);
         let end = node.subtree_end();

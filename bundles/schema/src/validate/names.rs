@@ -1,11 +1,11 @@
-//! The document's names in the schema's numbers.
+//! Translation of the document's names to the schema's numbers.
 
 use qcbus_document::{Attribute, Document, Node};
 
 use crate::model::Schema;
 use crate::names::NameId;
 
-/// What an attribute's name means.
+/// Meaning of an attribute's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum AttributeName {
     /// A name to look up in the type.
@@ -16,7 +16,7 @@ pub(super) enum AttributeName {
     Prefixed,
 }
 
-/// Looked up once per distinct name of the document.
+/// Map of the document's names, with one lookup per distinct name.
 pub(crate) struct NameMap {
     ids: Vec<NameId>,
     marks: Vec<u8>,

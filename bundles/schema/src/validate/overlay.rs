@@ -1,14 +1,14 @@
-//! What a document may contain beyond its schema.
+//! Content that a document may have in addition to its schema.
 
 /// Elements and attributes that are allowed although the schema does not know them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Overlay {
-    /// Nothing.
+    /// No additions.
     #[default]
     None,
-    /// The tags of modular scenarios: `ScenarioReference` (with what is in it) in a
-    /// `ManeuverGroup`, and the attribute `parameterAttributes` on any element. What is in a
-    /// reference is judged by the rules for modular scenarios, not here.
+    /// The tags of modular scenarios: `ScenarioReference` with its content in a `ManeuverGroup`,
+    /// and the attribute `parameterAttributes` on any element. The rules for modular scenarios
+    /// check the content of a reference.
     ModularScenario,
 }
 

@@ -1,4 +1,4 @@
-//! Collects violations, so many per kind and in all; counts the rest.
+//! Collection of violations up to a limit per kind and in total. Further ones are counted.
 
 use std::collections::HashMap;
 
@@ -8,11 +8,10 @@ use super::wording::Wording;
 use crate::defects;
 use crate::violation::{Code, Limits, Report, Rest, Violation};
 
-/// What makes two violations the same kind, beside their code: the type or model they are about and
-/// a name within it.
+/// Part of a violation's kind besides its code: the type or model, and a name in it.
 pub(super) type KindKey = (usize, u32);
 
-/// Kinds told apart; all further ones share one count per code.
+/// Maximum number of separate kinds. All further ones share one count per code.
 const MAX_KINDS: usize = 4_096;
 
 #[derive(Debug)]
@@ -20,7 +19,7 @@ struct Tally {
     subject: String,
     listed: u32,
     unlisted: u64,
-    /// Whether every one so far is the schema's fault.
+    /// Whether all violations of this kind so far are defects of the schema.
     defect: bool,
     order: usize,
 }
@@ -28,14 +27,14 @@ struct Tally {
 #[derive(Debug)]
 pub(super) struct Reporter<'a, 's> {
     limits: Limits,
-    /// What the schema is called.
+    /// Title of the schema.
     title: &'s str,
     violations: Vec<Violation<'a>>,
-    /// By code, kind, and whether they are known to be the schema's fault before they are worded.
+    /// Counts by code, kind, and whether the schema defect is known without a text.
     kinds: HashMap<(Code, KindKey, bool), Tally>,
 }
 
-/// How many violations of one kind are listed that are the schema's fault and stand in every such file.
+/// Number of listed violations per kind for schema defects that occur in every such file.
 const LISTED_DEFECTS: u32 = 1;
 
 impl<'a, 's> Reporter<'a, 's> {
@@ -48,12 +47,12 @@ impl<'a, 's> Reporter<'a, 's> {
         }
     }
 
-    /// Whether nothing more will be listed.
+    /// Checks whether the list is full.
     pub(super) fn is_full(&self) -> bool {
         self.violations.len() >= self.limits.total as usize
     }
 
-    /// Lists the violation, worded by `word`, or counts it.
+    /// Lists a violation with the text from `word`, or counts it.
     pub(super) fn add(
         &mut self,
         code: Code,
@@ -64,7 +63,7 @@ impl<'a, 's> Reporter<'a, 's> {
         self.add_at(code, kind, node, None, word);
     }
 
-    /// The same for a violation about an attribute.
+    /// Lists or counts a violation of an attribute in the same way.
     pub(super) fn add_at(
         &mut self,
         code: Code,
@@ -95,7 +94,7 @@ impl<'a, 's> Reporter<'a, 's> {
             },
             listed: 0,
             unlisted: 0,
-            // No other violations are ever the schema's fault, so they need not be worded to know.
+            // Only these codes can be schema defects, so other violations need no text for this.
             defect: is_known
                 || matches!(
                     code,

@@ -1,4 +1,4 @@
-//! Character data.
+//! Validation of character data.
 
 use qcbus_document::Node;
 
@@ -8,11 +8,11 @@ use crate::simple::{Builtin, Variety, XML_SPACE};
 use crate::violation::Code;
 use crate::work::steps;
 
-/// End tags longer than this are not looked into.
+/// Maximum length of searched end tags.
 const MAX_END_TAG: usize = 256;
 
 impl<'a> Walk<'a, '_> {
-    /// Meets character data; returns where the walk goes on.
+    /// Visits character data and returns the index of the next node.
     pub(super) fn run_of_text(&mut self, node: Node<'a>) -> u32 {
         let next = node.subtree_end();
         let Some(frame) = self.stack.last() else {
@@ -32,8 +32,8 @@ impl<'a> Walk<'a, '_> {
         next
     }
 
-    /// XML Schema forbids even white space in an element without content; the image does not keep
-    /// it, the text it was made of does.
+    /// Checks for white space in an element without content, which XML Schema forbids. The image
+    /// does not contain it, but the source text does.
     pub(super) fn emptiness(&mut self, node: Node<'a>, body: Body<'_>, mixed: bool) {
         if mixed || !matches!(body, Body::Nothing) || node.subtree_end() > node.index() + 1 {
             return;

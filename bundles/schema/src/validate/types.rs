@@ -1,4 +1,4 @@
-//! Which type an element has.
+//! Types of elements.
 
 use std::collections::HashMap;
 
@@ -21,7 +21,7 @@ pub(super) enum Kind<'s> {
 }
 
 impl<'a, 's> Walk<'a, 's> {
-    /// The element's type; `None` if there is nothing (more) to check in it.
+    /// Returns the element's type, or `None` if its content needs no further check.
     pub(super) fn type_of(
         &mut self,
         node: Node<'a>,
@@ -61,7 +61,7 @@ impl<'a, 's> Walk<'a, 's> {
         }
     }
 
-    /// The type `xsi:type` names, if it is the declared one or derived from it.
+    /// Returns the type that `xsi:type` names, if it is the declared type or derived from it.
     fn written_type(
         &mut self,
         node: Node<'a>,
@@ -76,7 +76,7 @@ impl<'a, 's> Walk<'a, 's> {
             .position(|ty| ty.name.as_deref() == Some(local));
         let mut at = found.and_then(|index| u32::try_from(index).ok());
         let chosen = at;
-        // Base types form no circle in compiled tables, but a table file could claim one.
+        // Compiled tables have no cycle of base types, but a table file could contain one.
         for _ in 0..=self.schema.complex.len().min(64) {
             let Some(id) = at else { break };
             if declared == TypeRef::Complex(id) || declared == TypeRef::Any {
@@ -93,7 +93,7 @@ impl<'a, 's> Walk<'a, 's> {
         None
     }
 
-    /// The value of an `xsi:` attribute, whatever prefix it is written with.
+    /// Returns the value of an `xsi:` attribute, with any prefix for its namespace.
     pub(super) fn xsi(&mut self, node: Node<'a>, local: &str) -> Option<&'a str> {
         if !self.names.prefixed {
             return None;
@@ -137,14 +137,14 @@ impl<'a, 's> Walk<'a, 's> {
     }
 }
 
-/// The prefixes that open elements bind, each with where its bindings end.
+/// Prefixes bound by open elements, each with the end of its scope.
 #[derive(Debug, Default)]
 pub(super) struct Bindings<'a> {
     by_prefix: HashMap<&'a str, Vec<(u32, bool)>>,
 }
 
 impl<'a> Bindings<'a> {
-    /// Whether `prefix` is bound to the namespace of schema instances at `node`.
+    /// Checks whether `prefix` is bound to the namespace of schema instances at `node`.
     pub(super) fn is_xsi(&mut self, node: Node<'_>, prefix: &str) -> bool {
         let Some(bound) = self.by_prefix.get_mut(prefix) else {
             return prefix == "xsi";
@@ -158,7 +158,7 @@ impl<'a> Bindings<'a> {
 }
 
 impl<'a> Walk<'a, '_> {
-    /// Takes note of the prefixes that an element binds.
+    /// Stores the prefixes that an element binds.
     pub(super) fn bind(&mut self, node: Node<'a>) {
         if !self.names.prefixed {
             return;

@@ -1,4 +1,4 @@
-//! Violations in words: what was found, what was expected, what was probably meant.
+//! Texts of violations: the value found, the expected value and a suggestion.
 
 use qcbus_document::{Attribute, Node};
 
@@ -13,7 +13,7 @@ use crate::similar::closest;
 use crate::simple::{EXPRESSION, SimpleType};
 use crate::work::steps;
 
-/// A violation without its place.
+/// A violation without its position.
 #[derive(Debug, Default)]
 pub(super) struct Wording {
     pub(super) found: String,
@@ -54,7 +54,7 @@ impl Wording {
     }
 }
 
-/// Longest part of a value that is repeated in a message.
+/// Maximum length of a value quoted in a message.
 const MAX_QUOTED: usize = 80;
 
 fn quote(text: &str) -> String {
@@ -89,7 +89,7 @@ fn texts(names: impl Iterator<Item = NameId>, schema: &Schema) -> Vec<String> {
     all
 }
 
-/// "expected <a> or the end of <b>".
+/// Returns the text "expected <a> or the end of <b>".
 fn expected_here(
     model: &Model,
     state: u16,
@@ -147,7 +147,7 @@ pub(super) fn no_children(node: Node<'_>, parent: Node<'_>, title: &str) -> Word
     .excused(defects::children_of_none(parent, title))
 }
 
-/// Siblings looked at to say how a child and they belong together.
+/// Maximum number of siblings examined to explain the place of a child.
 const MAX_SIBLINGS: usize = 200;
 
 pub(super) fn missing_before(
@@ -176,11 +176,11 @@ pub(super) fn missing_before(
         .excused(defect)
 }
 
-/// The sibling because of which a child has no place.
+/// Sibling that makes a child misplaced.
 enum Obstacle<'a> {
     /// The child must come before it.
     Before(&'a str),
-    /// There may be only one of the two.
+    /// Only one of the two is allowed.
     Instead(&'a str),
 }
 
@@ -202,7 +202,7 @@ fn obstacle<'a, 's>(
         let Some(known) = schema.names.find(sibling.name()) else {
             continue;
         };
-        // As the walk went: what should have come before a sibling counts as if it had.
+        // As in the walk, children that are missing before a sibling count as present.
         let Some(to) = way(state, known).filter(|to| *to != state) else {
             continue;
         };
@@ -294,7 +294,7 @@ pub(super) fn unexpected_member(
         .suggesting(suggestion)
 }
 
-/// "; it belongs in <a>" for a name that the schema knows elsewhere.
+/// Returns "; it belongs in <a>" for a name that the schema knows elsewhere.
 fn homes(name: &str, schema: &Schema) -> String {
     let Some(id) = schema.names.find(name) else {
         return String::new();
@@ -370,7 +370,7 @@ pub(super) fn invalid_value(
         .suggesting(suggestion.as_deref())
 }
 
-/// What keeps a value from being the expression of OpenSCENARIO as which it is meant.
+/// Returns the reason why an intended expression of OpenSCENARIO is invalid.
 fn foreign_to_expressions(value: &str, expected: &[String]) -> String {
     let takes_one = expected.iter().any(|words| words.starts_with(EXPRESSION));
     let inner = value.strip_prefix("${").filter(|_| takes_one);
@@ -410,12 +410,13 @@ pub(super) fn invalid_text(
         .suggesting(suggestion.as_deref())
 }
 
-/// Whether one name is the beginning of the other: `from` of `fromLane`.
+/// Checks whether `written` is the beginning of `name`: `from` of `fromLane`.
 pub(super) fn is_short_for(written: &str, name: &str) -> bool {
     written.len() >= 2 && name.starts_with(written)
 }
 
-/// Whether a name is another one with letters left out: `hdg` of `heading`, `curvStart` of `curvatureStart`.
+/// Checks whether `name` is `written` without some letters: `hdg` of `heading`, `curvStart` of
+/// `curvatureStart`.
 pub(super) fn is_abbreviation(name: &str, written: &str) -> bool {
     let mut letters = written.chars();
     let mut wanted = name.chars();
@@ -424,7 +425,7 @@ pub(super) fn is_abbreviation(name: &str, written: &str) -> bool {
         && wanted.all(|one| letters.any(|letter| letter == one))
 }
 
-/// Attributes of an element that are looked at to name those it does not use.
+/// Maximum number of attributes examined to find the unused ones.
 pub(super) const MAX_ATTRIBUTES: usize = 64;
 
 pub(super) fn unexpected_attribute(
@@ -433,7 +434,7 @@ pub(super) fn unexpected_attribute(
     declared: &[AttributeUse],
     schema: &Schema,
 ) -> Wording {
-    // An element with more is no slip, and each of its attributes may come here.
+    // More attributes are not a typing error, and this may run for each of them.
     let used = |name: &str| {
         let mut some = node.attributes().take(MAX_ATTRIBUTES);
         some.any(|one| {
@@ -478,7 +479,7 @@ pub(super) fn unexpected_attribute(
         .suggesting(suggestion.as_deref())
 }
 
-/// What an element may have, said in full while that is short.
+/// Returns the allowed attributes of an element. A long list is cut.
 fn names_of(declared: &[AttributeUse], schema: &Schema) -> String {
     const SHOWN: usize = 8;
     let names = declared.iter().map(|one| schema.names.text(one.name));
@@ -489,7 +490,7 @@ fn names_of(declared: &[AttributeUse], schema: &Schema) -> String {
     list.join(", ")
 }
 
-/// An attribute such as `xsi:type` whose prefix means something else, or nothing.
+/// Reports an attribute such as `xsi:type` with a prefix that has another meaning or none.
 pub(super) fn unbound_prefix(node: Node<'_>, attribute: Attribute<'_>, prefix: &str) -> Wording {
     let text = format!(
         "{} of <{}> means nothing: xmlns:{prefix} must be \"{XSI}\"",

@@ -1,4 +1,4 @@
-//! Shared by the tests: documents from text, tables by name.
+//! Helpers of the tests: documents from text, tables by name.
 
 #![expect(
     clippy::expect_used,
@@ -11,7 +11,7 @@ use qcbus_document::{Document, FileKind};
 use qcbus_ingest::{Limits, prepare_bytes};
 use qcbus_schema::{SHIPPED, Schema, Shipped};
 
-/// The image of a text.
+/// Returns the image of a text.
 pub fn image(name: &str, text: &str) -> Vec<u8> {
     prepare_bytes(
         Path::new(name),
@@ -21,13 +21,13 @@ pub fn image(name: &str, text: &str) -> Vec<u8> {
     .build()
 }
 
-/// The image's document.
+/// Opens the document of an image.
 pub fn open(image: &[u8]) -> Document<'_> {
     Document::open(image).expect("an image of our own")
 }
 
 #[allow(dead_code, reason = "not every test names tables")]
-/// What a shipped table's file is called.
+/// Returns the name of a shipped table's file.
 pub fn name_of(shipped: &Shipped) -> String {
     let kind = if shipped.kind == FileKind::Xodr {
         "xodr"
@@ -38,7 +38,7 @@ pub fn name_of(shipped: &Shipped) -> String {
 }
 
 #[allow(dead_code, reason = "not every test names tables")]
-/// A shipped table by name, e.g. `xodr-1.7`.
+/// Returns a shipped table by name, e.g. `xodr-1.7`.
 pub fn table(name: &str) -> &'static Schema {
     let found = SHIPPED.iter().find(|one| name_of(one) == name);
     found
@@ -54,7 +54,7 @@ pub fn compiled(text: &str) -> Result<Schema, String> {
     qcbus_schema::compile("Test", &[open(&image)]).map_err(|error| error.to_string())
 }
 
-/// The codes and texts of all violations for a document.
+/// Returns the codes and texts of all violations of a document.
 #[allow(dead_code, reason = "not every test asks for texts")]
 pub fn violations(schema: &Schema, name: &str, text: &str) -> Vec<(&'static str, String)> {
     let image = image(name, text);

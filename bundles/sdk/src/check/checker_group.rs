@@ -1,4 +1,4 @@
-//! The checkers of one model, in turn.
+//! Runs the checkers of one model in order.
 
 use super::gates::Pass;
 use super::spread::ScheduledRule;
@@ -6,7 +6,7 @@ use super::{Outcome, RuleState, Work, catch};
 use crate::rule::Built;
 use qcbus_formats::xqar::Issue;
 
-/// A checker at its end.
+/// A checker that has ended.
 pub(super) struct Ended {
     pub index: usize,
     pub issues: Vec<Issue>,
@@ -14,10 +14,10 @@ pub(super) struct Ended {
     pub rule_state: RuleState,
 }
 
-/// Runs checkers of one model.
+/// Runner for the checkers of one model.
 pub(super) struct CheckerGroup<'r> {
     pub work: Work<'r>,
-    /// Of all checkers: those of earlier batches, and those of this strand.
+    /// States of all checkers: those of earlier batches, and those of this group.
     pub standings: Vec<Option<RuleState>>,
     ended: Vec<Ended>,
 }
@@ -31,7 +31,7 @@ impl<'r> CheckerGroup<'r> {
         }
     }
 
-    /// Runs those of the group that take part, and gives what ended.
+    /// Runs the members of the group that take part. Returns the ended checkers.
     pub fn run(mut self, group: &[usize]) -> Vec<Ended> {
         let entries = &self.work.plan.entries;
         let runs = |index: &usize| entries[*index].runs;
@@ -40,7 +40,7 @@ impl<'r> CheckerGroup<'r> {
         self.ended
     }
 
-    /// Runs checkers of one model, which is built when the first of them gets through its gates.
+    /// Runs checkers of one model. The model is built when the first of them passes its gates.
     fn group(&mut self, members: &[usize]) {
         let mut rest = members.iter().copied();
         let builder = loop {
@@ -79,8 +79,8 @@ impl<'r> CheckerGroup<'r> {
         }
     }
 
-    /// Runs checkers on the model that was built. As many as possible look at a part in turn: they
-    /// wait until one comes that needs to know how one of them ended.
+    /// Runs checkers on the built model. As many as possible work on the same part one after the
+    /// other. They are collected until a checker needs the ending of one of them.
     fn on_model(
         &mut self,
         first: (usize, Pass<'r>),
@@ -118,7 +118,7 @@ impl<'r> CheckerGroup<'r> {
         }
     }
 
-    /// Has checkers look at the parts of the model and at the whole, and ends them.
+    /// Runs checkers on the parts of the model and on the whole, and stores their endings.
     fn take(&mut self, schedule: &[ScheduledRule<'r>], built: &dyn Built<'r>) {
         let Some(looked) = self.work.look(schedule, built) else {
             return;

@@ -1,4 +1,4 @@
-//! What a checker must get through before it looks: parameters, preconditions, version.
+//! Gates in front of a checker: parameters, preconditions, version.
 
 use qcbus_formats::pool::Ending;
 
@@ -7,14 +7,14 @@ use super::{Outcome, RuleState};
 use crate::plan::Entry;
 use crate::{Backport, Checker, Values, Version};
 
-/// How a checker is let through: with a note when its rule is not normative for the version.
+/// Admission of a checker, with a note if its rule is not normative for the version.
 pub(super) struct Pass<'r> {
     pub values: &'r Values,
     pub not_normative: Option<String>,
 }
 
 impl<'r> CheckerGroup<'r> {
-    /// Parameters, preconditions, version: in this order.
+    /// Checks parameters, preconditions and version, in this order.
     pub(super) fn gate(&self, index: usize) -> Result<Pass<'r>, Outcome> {
         let plan = self.work.plan;
         let (checker, entry) = (&plan.checkers[index], &plan.entries[index]);
@@ -32,8 +32,8 @@ impl<'r> CheckerGroup<'r> {
         })
     }
 
-    /// Whether everything that the checker rests on has looked and found no error. What rests on a
-    /// checker that does not apply does not apply either; anything else is in its way.
+    /// Checks whether every precondition of the checker has run and found no error. If a
+    /// precondition does not apply, the checker does not apply either. Any other cause blocks it.
     fn preconditions(&self, entry: &Entry) -> Result<(), Outcome> {
         let fails = |reason: &String| Outcome::failed(reason.clone());
         let after = entry.after.as_ref().map_err(fails)?;
@@ -60,7 +60,8 @@ impl<'r> CheckerGroup<'r> {
         }))
     }
 
-    /// Whether the checker applies to the document's version; with the note of a backport.
+    /// Checks whether the checker applies to the document's version. Returns the note of a
+    /// backport.
     fn version_gate(&self, checker: &Checker) -> Result<Option<String>, Outcome> {
         let fails = |reason: &String| Outcome::failed(reason.clone());
         let skips = |reason: String| Outcome::without_run(Ending::NotApplicable { reason });
@@ -72,7 +73,7 @@ impl<'r> CheckerGroup<'r> {
         let Some(version) = self.work.subject.version() else {
             let reason =
                 format!("the rule applies to {standard} {range}; the file names no version");
-            // Whether it applies cannot be known, because the document lacks what it must say.
+            // The document lacks the version, so applicability is unknown.
             return Err(Outcome::without_run(Ending::Blocked {
                 by: Vec::new(),
                 reason,

@@ -1,9 +1,10 @@
-//! Checks one subject: gates, preconditions, models, panics, and who does it.
+//! Checks one subject: gates, preconditions, models, panics and threads.
 //!
-//! Checkers of one model make a *strand*: the model is built when the first of them gets through its
-//! gates. Strands of which none rests on another go side by side (`Plan::batches`). Within a strand the
-//! parts of the model and the checkers that look at the whole of it are tasks, which go to as many
-//! threads as there are hands free (`spread.rs`). What is found does not depend on how many there are.
+//! Checkers of one model form a *checker group*. The model is built when the first of them passes
+//! its gates. Groups without mutual preconditions run in parallel (`Plan::batches`). Within a
+//! group, each part of the model is a task, and so is each checker of the whole model. As many
+//! threads as there are free permits run the tasks (`spread.rs`). The findings do not depend on the
+//! number of threads.
 
 mod checker_group;
 mod gates;
@@ -22,44 +23,45 @@ use crate::{Subject, permits::Permit};
 
 use checker_group::{CheckerGroup, Ended};
 
-/// How a checker ended, and what is to be said besides its findings.
+/// Ending of a checker, with further facts besides its findings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// How it ended.
+    /// The ending.
     pub ending: Ending,
-    /// The parameters that it used.
+    /// The parameters that the checker used.
     pub params: Vec<Param>,
     /// Further facts.
     pub metadata: Vec<Metadata>,
-    /// Time that it took, that of all threads together. No result may depend on it.
+    /// Time spent by all threads together. No result may depend on it.
     pub took: Duration,
 }
 
-/// Hears how a check goes on. Checkers are named by their index in [`Plan::checkers`].
+/// Observer of a check. Checkers are identified by their index in [`Plan::checkers`].
 pub trait Listener: Sync {
-    /// Asked by every thread between two tasks: whether to stop.
+    /// Returns whether to stop. Every thread asks this between two tasks.
     fn is_cancelled(&self) -> bool {
         false
     }
 
-    /// A checker begins, or goes on with another part of the document. Said by whatever thread it is on.
+    /// Reports that a checker begins, or continues with another part of the document. Any thread
+    /// may call it.
     fn begins(&self, checker: usize) {
         let _ = checker;
     }
 
-    /// A checker has ended with these findings: a demanded one, or one besides that kept a demanded
-    /// one from looking. The latter come last. The order is always the same.
+    /// Reports the findings and the ending of a checker. It is a demanded checker, or another one
+    /// that blocked a demanded one. The latter come last. The order is always the same.
     fn ended(&mut self, checker: usize, issues: Vec<Issue>, outcome: Outcome);
 }
 
-/// Runs the plan's checkers on a subject, in this thread. Returns whether it came to its end, that is,
-/// was not cancelled. A panic in a rule or a model is that checker's error and nobody else's.
+/// Runs the plan's checkers on a subject in this thread. Returns `false` if the check was
+/// cancelled. A panic in a rule or a model is an error of that checker only.
 pub fn check(plan: &Plan, subject: &Subject<'_>, listener: &mut dyn Listener) -> bool {
     check_with(plan, subject, &Permits::new(1), listener)
 }
 
-/// Runs the plan's checkers on a subject as [`check`] does. This thread counts as one of the `permits`;
-/// of those that are free, a large document gets as many as there are.
+/// Runs the plan's checkers on a subject as [`check`] does. This thread already has one of the
+/// `permits`. A large document gets all free ones.
 pub fn check_with(
     plan: &Plan,
     subject: &Subject<'_>,
@@ -94,23 +96,23 @@ pub fn check_with(
     true
 }
 
-/// Bytes of a document from which on it pays to start a thread for a share of its tasks.
+/// Minimum size in bytes of a document for which starting another thread pays off.
 const WORTH_SPREADING: u32 = 96 << 10;
 
-/// What all threads of a check share.
+/// Data shared by all threads of a check.
 #[derive(Clone, Copy)]
 struct Work<'r> {
     plan: &'r Plan,
     subject: &'r Subject<'r>,
     permits: &'r Permits,
     listener: &'r dyn Listener,
-    /// The document is large enough for several threads.
+    /// Whether the document is large enough for several threads.
     spreads: bool,
 }
 
 impl<'r> Work<'r> {
-    /// Runs strands of which none rests on another: the largest one here, the others beside it where
-    /// hands are free. Gives what ended, by strand.
+    /// Runs checker groups without mutual preconditions. The largest one runs in this thread, the
+    /// others in new threads if permits are free. Returns the ended checkers by group.
     fn side_by_side(
         self,
         checker_groups: &[usize],
@@ -119,7 +121,8 @@ impl<'r> Work<'r> {
         let run = move |checker_group: usize, _permit: Option<Permit<'_>>| {
             CheckerGroup::new(self, standings).run(&self.plan.groups[checker_group])
         };
-        // The longest list of checkers stays here, so that whoever is beside is free for it soon.
+        // The longest list of checkers stays in this thread, so that the other threads are soon
+        // free to help with it.
         let Some(here) =
             (0..checker_groups.len()).max_by_key(|&it| self.plan.groups[checker_groups[it]].len())
         else {
@@ -153,7 +156,7 @@ impl<'r> Work<'r> {
     }
 }
 
-/// A strand that this thread will take or has taken, or that is in a thread of its own.
+/// A checker group: not yet run, run in this thread, or running in its own thread.
 enum Begun<'s> {
     Due(usize),
     Over(Vec<Ended>),
@@ -170,18 +173,18 @@ impl Begun<'_> {
     }
 }
 
-/// What is known of the checkers of all strands that have ended.
+/// Results of the checkers of all groups that have ended.
 struct Run<'r> {
     plan: &'r Plan,
     standings: Vec<Option<RuleState>>,
-    /// What undemanded checkers said, as far as they may be in the way of a demanded one.
+    /// Results of undemanded checkers that may block a demanded one.
     aside: BTreeMap<usize, (Vec<Issue>, Outcome)>,
 }
 
-/// What matters of a checker to those that come after it.
+/// State of a checker as seen by the checkers that depend on it.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum RuleState {
-    /// Not yet at its end: it waits for its turn.
+    /// Not yet ended: the checker waits to be run.
     Waits,
     Clean,
     FoundErrors,
@@ -203,7 +206,7 @@ impl RuleState {
         }
     }
 
-    /// What it means for those that rest on the checker; `None`: nothing, they may look.
+    /// Returns the reason why dependent checkers cannot run, or `None` if they can.
     fn in_the_way(self) -> Option<&'static str> {
         match self {
             RuleState::Clean => None,
@@ -214,8 +217,8 @@ impl RuleState {
         }
     }
 
-    /// Whether those that rest on the checker could not look because of it. That it does not apply
-    /// is no such reason.
+    /// Checks whether the checker blocks its dependents. A checker that does not apply does not
+    /// block them.
     fn is_stop(self) -> bool {
         self.in_the_way().is_some() && self != RuleState::NotApplicable
     }
@@ -237,8 +240,8 @@ impl Run<'_> {
         }
     }
 
-    /// The fault that was found is reported, whoever asked: what kept demanded checkers from
-    /// looking, directly or through others, says so in the order of the checkers.
+    /// Reports the undemanded checkers that blocked demanded ones, directly or indirectly, in the
+    /// order of the checkers. A found fault is reported even if its checker is not demanded.
     fn tell_what_was_in_the_way(&mut self, listener: &mut dyn Listener) {
         let demanded = |index: &usize| self.plan.entries[*index].demanded;
         let mut open: Vec<usize> = (0..self.standings.len()).filter(demanded).collect();
@@ -273,9 +276,9 @@ impl Outcome {
     }
 }
 
-/// Runs something that may panic; what a panic said becomes the error.
+/// Runs code that may panic. The panic message becomes the error.
 pub(crate) fn catch<T>(run: impl FnOnce() -> T) -> Result<T, String> {
-    // What the closure leaves half done is either dropped or a list of finished findings.
+    // A panic leaves only two kinds of data: data that is dropped, and a list of complete findings.
     catch_unwind(AssertUnwindSafe(run)).map_err(|payload| {
         let text = payload
             .downcast_ref::<&str>()

@@ -1,10 +1,10 @@
-//! Tasks of a strand, and the threads that take them.
+//! Tasks of a checker group, and the threads that run them.
 //!
-//! A task is a part of the model, at which all checkers that go by parts look in turn, or the whole of
-//! it, at which one checker looks. Every thread has sinks of its own for what its tasks find. What one
-//! thread alone would have listed is put together from them: findings in the order of their parts. Where
-//! that cannot be told from the sinks (a checker found more than it lists, or counts references) it looks
-//! once more, alone: rules give the same answer every time.
+//! A task is either a part of the model for all checkers that work by parts, or the whole for one
+//! checker. Every thread has its own sinks for the findings of its tasks. They are merged into the
+//! list that a single thread would produce: findings in the order of their parts. In some cases the
+//! sinks are not sufficient for this: a checker found more than it lists, or counts references.
+//! Then it runs once more in one thread, because rules are deterministic.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::{Builder, Scope, ScopedJoinHandle};
@@ -20,7 +20,7 @@ use crate::rule::{Built, Facts};
 use crate::sink::WHOLE;
 use crate::{AnyRule, Sink};
 
-/// A checker that may look.
+/// A checker that has passed its gates.
 pub(super) struct ScheduledRule<'r> {
     pub index: usize,
     pub rule: &'static dyn AnyRule,
@@ -28,39 +28,40 @@ pub(super) struct ScheduledRule<'r> {
     pub pass: Pass<'r>,
 }
 
-/// What a checker found, and how it ended.
+/// Findings of a checker, and its ending.
 type Looked = (Vec<Issue>, Outcome);
 
-/// What one thread has of one checker.
+/// Findings of one checker in one thread.
 struct Had<'r> {
     sink: Sink<'r>,
     took: Duration,
-    /// Where it failed or said that it has ended, and how; it is not asked again.
+    /// Part at which the checker failed or ended, and its ending. It is not called again.
     ended: Option<(u32, Ending)>,
 }
 
-/// The tasks, and which of them is next.
+/// The tasks and the number of the next one.
 struct Tasks<'t, 'r> {
     work: Work<'r>,
     schedule: &'t [ScheduledRule<'r>],
-    /// By place in `schedule`: those that go by parts.
+    /// Indices in `schedule` of the checkers that work by parts.
     by_parts: Vec<usize>,
-    /// Those that look at the whole only. The others do so after the parts, and may ask what was found in them.
+    /// Indices of the checkers that look at the whole model only. The others do so after the parts,
+    /// and may ask for the findings of the parts.
     wholes: Vec<usize>,
     built: &'t dyn Built<'r>,
     next: AtomicUsize,
 }
 
-/// How long a thread has been at tasks before it asks others: a few that are soon done are not worth it.
-/// Starting a thread takes a tenth of a millisecond.
+/// Time that a thread works on tasks before it starts others. A few short tasks are not worth a
+/// thread: a start takes a tenth of a millisecond.
 const WORTH_A_THREAD: Duration = Duration::from_micros(100);
 
-/// What one thread has found, by place in the turns.
+/// Findings of one thread, by index of the scheduled checker.
 type Pile<'r> = Vec<Option<Had<'r>>>;
 
 impl<'r> Work<'r> {
-    /// Has checkers look at the parts of the model and at the whole: what they say, in their order. `None`
-    /// when the check was cancelled.
+    /// Runs checkers on the parts of the model and on the whole. Returns their results in their
+    /// order, or `None` if the check was cancelled.
     pub(super) fn look(
         self,
         schedule: &[ScheduledRule<'r>],
@@ -99,7 +100,7 @@ impl<'r> Work<'r> {
 }
 
 impl<'r> Tasks<'_, 'r> {
-    /// Takes tasks in this thread, and has others take some as long as there are hands to spare.
+    /// Runs tasks in this thread, and starts other threads as long as permits are free.
     fn by_many(&self) -> Vec<Pile<'r>> {
         let begun = Instant::now();
         std::thread::scope(|scope| {
@@ -123,7 +124,7 @@ impl<'r> Tasks<'_, 'r> {
         })
     }
 
-    /// Takes tasks with a hand that is lent: until a job wants it.
+    /// Runs tasks with a borrowed permit until a job needs it.
     fn lend(&self, permit: Permit<'_>) -> Pile<'r> {
         let mut own = self.empty_pile();
         while !self.work.permits.are_wanted() && self.one(&mut own) {}
@@ -139,13 +140,13 @@ impl<'r> Tasks<'_, 'r> {
         self.built.parts() + self.wholes.len()
     }
 
-    /// How many tasks nobody has taken.
+    /// Returns the number of tasks that no thread has taken.
     fn left(&self) -> usize {
         self.count()
             .saturating_sub(self.next.load(Ordering::Relaxed))
     }
 
-    /// Takes one task. `false`: there is none.
+    /// Runs one task. Returns `false` if there is none.
     fn one(&self, own: &mut Pile<'r>) -> bool {
         if self.work.stops() {
             return false;
@@ -165,7 +166,7 @@ impl<'r> Tasks<'_, 'r> {
         task < self.count()
     }
 
-    /// A checker and what this thread has of it.
+    /// Returns a checker and its findings in this thread.
     fn in_pile<'p>(
         &self,
         pile: &'p mut Pile<'r>,
@@ -176,8 +177,8 @@ impl<'r> Tasks<'_, 'r> {
         (scheduled, had)
     }
 
-    /// Has a checker look at a part, or at the whole (`None`). `clock` is when that began, and then when it
-    /// ended.
+    /// Runs a checker on a part, or on the whole (`None`). `clock` holds the time of the start, and
+    /// afterwards that of the end.
     fn look(
         &self,
         scheduled: &ScheduledRule<'r>,
@@ -225,7 +226,7 @@ impl<'r> Tasks<'_, 'r> {
         }
     }
 
-    /// What a checker says, of which several threads may have something.
+    /// Merges the findings of a checker from all threads into its result.
     fn together(&self, scheduled: &ScheduledRule<'r>, mut found: Vec<Had<'r>>) -> Looked {
         let mut had = match found.len() {
             0 => self.nothing_yet(scheduled),
@@ -240,7 +241,7 @@ impl<'r> Tasks<'_, 'r> {
             ended,
             took,
         } = had;
-        // What was found before a panic is still true.
+        // The findings before a panic remain valid.
         let (issues, metadata) = sink.finish();
         let ending = ended.map_or(Ending::Completed, |(_, ending)| ending);
         let outcome = Outcome {
@@ -252,7 +253,7 @@ impl<'r> Tasks<'_, 'r> {
         (issues, outcome)
     }
 
-    /// Has a checker look at all parts, in this thread.
+    /// Runs a checker on all parts in this thread.
     fn alone(&self, scheduled: &ScheduledRule<'r>) -> Had<'r> {
         let mut had = self.nothing_yet(scheduled);
         let mut clock = Instant::now();
@@ -263,10 +264,11 @@ impl<'r> Tasks<'_, 'r> {
     }
 }
 
-/// What several threads have, as one, as one thread would have it. `None`: that cannot be told.
+/// Merges the findings of several threads into those of a single thread. Returns `None` if that is
+/// not possible.
 fn merged(mut found: Vec<Had<'_>>) -> Option<Had<'_>> {
     let ended = found.iter_mut().filter_map(|had| had.ended.take());
-    // One thread would have come no further than the first panic.
+    // A single thread would stop at the first panic.
     let ended = ended.min_by_key(|(part, _)| *part);
     let last = ended.as_ref().map_or(WHOLE, |(part, _)| *part);
     let took = found.iter().map(|had| had.took).sum();
@@ -278,7 +280,7 @@ fn merged(mut found: Vec<Had<'_>>) -> Option<Had<'_>> {
     Some(first)
 }
 
-/// Starts a thread. `None`: there is none to be had, and whoever asked does the work himself.
+/// Starts a thread. Returns `None` if that fails; the caller then does the work itself.
 pub(super) fn beside<'s, 'e, T: Send + 's>(
     scope: &'s Scope<'s, 'e>,
     work: impl FnOnce() -> T + Send + 's,
@@ -287,7 +289,8 @@ pub(super) fn beside<'s, 'e, T: Send + 's>(
     thread.spawn_scoped(scope, work).ok()
 }
 
-/// What a thread has to give. Panics of rules and models are caught in it; any other goes on here.
+/// Returns the result of a thread. It catches panics of rules and models itself; any other panic is
+/// propagated.
 pub(super) fn joined<T>(thread: ScopedJoinHandle<'_, T>) -> T {
     thread
         .join()

@@ -1,4 +1,4 @@
-//! Everything that a bundle finds in files, one line each, for those who judge whether it is right.
+//! Prints all findings of a bundle in files, one line each, for manual review.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -10,12 +10,12 @@ use qcbus_formats::xqar::{Issue, Level, Location};
 use crate::run::examine;
 use crate::{BACKPORT_SUFFIX, Bundle, Loaded, Plan};
 
-/// Prints every finding on the files that are named, and on those below directories: file, checker,
-/// level, row, text; or with `--counts` a table of how many of them each rule has on how many files.
-/// `[--counts] [--checker PART] PATH…`
+/// Prints every finding in the given files and in the files below given directories: file, checker,
+/// level, row, text. With `--counts` it prints a table with the number of findings and files of
+/// each rule. `[--counts] [--checker PART] PATH…`
 ///
 /// # Errors
-/// What could not be read.
+/// Returns an error for a file that cannot be read.
 #[expect(clippy::print_stdout, reason = "a tool for the terminal")]
 pub fn print_findings(
     bundle: &'static Bundle,
@@ -71,7 +71,7 @@ fn line(path: &Path, checker: &str, issue: &Issue) -> String {
     )
 }
 
-/// By rule (a checker for older versions is counted with its rule): of each level the findings and the files.
+/// Findings and files of each level, by rule. A checker for older versions counts with its rule.
 #[derive(Default)]
 struct Counts(BTreeMap<String, ByLevel>);
 
@@ -92,7 +92,7 @@ impl Counts {
         files.insert(path.to_owned());
     }
 
-    /// The rule with the most files first.
+    /// Formats the table, sorted by number of files in descending order.
     fn table(&self, files: usize) -> String {
         let mut text = format!(
             "{files} files\n\n| rule | errors | files | warnings | files | information | files |\n\
@@ -116,7 +116,7 @@ impl Counts {
     }
 }
 
-/// The files at and below a path that the bundle looks at, by name.
+/// Collects the files at and below a path that the bundle checks, sorted by name.
 fn gather(bundle: &Bundle, path: &Path, files: &mut Vec<PathBuf>) {
     if !path.is_dir() {
         files.push(path.to_owned());

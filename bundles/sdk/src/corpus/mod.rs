@@ -1,4 +1,4 @@
-//! Compares a bundle with recorded results of ASAM's own, for tests.
+//! Compares a bundle with recorded results of ASAM's bundles, for tests.
 
 mod findings;
 mod parity;
@@ -17,33 +17,33 @@ use crate::{Bundle, Loaded, Plan};
 pub use findings::print_findings;
 pub use parity::{Deviations, Parity, agrees_or_says};
 
-/// A case in which we differ from the recorded result on purpose.
+/// A case with an intended difference from the recorded result.
 #[derive(Debug, Clone, Copy)]
 pub struct Deviation {
     /// End of the input's path.
     pub input: &'static str,
     /// The checker.
     pub checker: &'static str,
-    /// Why ours is right.
+    /// Reason why our result is correct.
     pub reason: &'static str,
 }
 
-/// One recorded result of one checker, compared with ours.
+/// One recorded result of one checker, compared with the current one.
 #[derive(Debug, Clone)]
 pub struct Comparison {
     /// Path of the input below `cases/asam`.
     pub input: String,
     /// The checker.
     pub checker: String,
-    /// What differs; `None` when both agree.
+    /// The difference; `None` if both agree.
     pub difference: Option<String>,
 }
 
-/// Compares a bundle with the cases in `cases/asam-cases.json`; `None` when they are not there.
+/// Compares a bundle with the cases in `cases/asam-cases.json`; returns `None` if they are missing.
 /// An input that several cases share is compared once.
 ///
 /// # Errors
-/// What could not be read.
+/// Returns an error for a file that cannot be read.
 pub fn compare_asam_cases(
     bundle: &'static Bundle,
     cases: &Path,
@@ -72,14 +72,15 @@ pub fn compare_asam_cases(
     Ok(Some(comparisons))
 }
 
-/// Compares a bundle with what ASAM's found on the files of other projects, recorded in
-/// `cases/real-files.json`: status and number of issues by checker. `None` when it is not there.
+/// Compares a bundle with recorded results of ASAM's bundles on files of other projects: status and
+/// number of issues by checker. The record is `cases/real-files.json`. Returns `None` if it is
+/// missing.
 ///
-/// Where a finding about the schema silenced the recorded checker, ours may run. Checkers that no
-/// record mentions were not part of the recorded bundle.
+/// If a schema finding caused the recorded checker to be skipped, our checker may run. Checkers
+/// that no record mentions were not part of the recorded bundle.
 ///
 /// # Errors
-/// What could not be read.
+/// Returns an error for a file that cannot be read.
 pub fn compare_real_files(
     bundle: &'static Bundle,
     cases: &Path,
@@ -119,14 +120,15 @@ pub fn compare_real_files(
     Ok(Some(comparisons))
 }
 
-/// The difference between a checker that was skipped and one that looked and found nothing.
+/// Difference between a skipped checker and one that ran and found nothing.
 pub(super) const NOTHING_THERE: &str = "recorded skipped, ours completed and found nothing";
 
 fn looked_in_vain(theirs: &str, ours: &CheckerOutcome) -> bool {
     theirs == "skipped" && status_of(ours) == "completed" && ours.issues.is_empty()
 }
 
-/// The checkers that a record of a file mentions; those that ran and found nothing are not.
+/// Returns the checkers that the record of a file mentions. It does not mention those that ran and
+/// found nothing.
 fn mentioned(peer: &Value) -> Vec<String> {
     let skipped = peer["skipped"].as_array().into_iter().flatten();
     let tables = [&peer["issuesByChecker"], &peer["errors"]];
@@ -140,7 +142,7 @@ fn mentioned(peer: &Value) -> Vec<String> {
         .collect()
 }
 
-/// What differs in status or number of issues.
+/// Returns the difference in status or number of issues.
 fn counted(peer: &Value, ours: &CheckerOutcome) -> Option<String> {
     let skipped = |id: &str| {
         let all = peer["skipped"].as_array().into_iter().flatten();
@@ -172,11 +174,11 @@ fn status_of(ours: &CheckerOutcome) -> &'static str {
     ours.status().as_str()
 }
 
-/// Fails the running test with every disagreement that is not declared and every declared deviation
-/// that does not occur.
+/// Fails the running test for every undeclared difference and every declared deviation that does
+/// not occur.
 ///
 /// # Panics
-/// See above.
+/// Panics in the cases above, and if nothing was compared.
 #[expect(clippy::panic, reason = "it is an assertion for tests")]
 pub fn settle(bundle: &Bundle, comparisons: &[Comparison], deviations: &[Deviation]) {
     let mut used = BTreeSet::new();
@@ -219,7 +221,7 @@ struct Compared<'c> {
 }
 
 impl Compared<'_> {
-    /// What differs, by checker; `None` for those that agree.
+    /// Returns the difference of each checker; `None` if it agrees.
     fn case(
         plan: &Plan,
         input: &Path,
@@ -274,7 +276,7 @@ impl Compared<'_> {
         }
         let theirs = self.their_places(&recorded);
         let ours: Vec<Vec<String>> = ours.issues.iter().map(|one| self.our_places(one)).collect();
-        // Ours may name more places, such as the link that two lanes have.
+        // Our checker may name more places, such as the link between two lanes.
         let found = theirs
             .iter()
             .all(|place| ours.iter().flatten().any(|our| our == place));
@@ -285,7 +287,7 @@ impl Compared<'_> {
         (!found || !main).then(|| format!("places recorded {theirs:?}, ours {ours:?}"))
     }
 
-    /// Whether the recorded run skipped everything behind the schema's checker.
+    /// Checks whether the recorded run skipped all checkers after that of the schema.
     fn schema_silenced(&self) -> bool {
         let status = self.observed["status"].as_object().into_iter().flatten();
         let schema = status.filter(|(id, _)| id.ends_with("valid_schema"));
@@ -302,7 +304,8 @@ impl Compared<'_> {
             .collect()
     }
 
-    /// The places of issues: the elements that the XPaths select, or the row where there are none.
+    /// Returns the places of issues: the elements selected by the XPaths, or the row if there are
+    /// none.
     fn their_places(&self, issues: &[&Value]) -> BTreeSet<String> {
         let mut places = BTreeSet::new();
         for issue in issues {
@@ -317,7 +320,7 @@ impl Compared<'_> {
         places
     }
 
-    /// The places of an issue, each as its row and, where there is one, its element.
+    /// Returns the places of an issue: each row and, if it exists, each element.
     fn our_places(&self, issue: &Issue) -> Vec<String> {
         let all = issue.locations.iter().flat_map(|one| &one.places);
         let places = all.filter_map(|place| match place {

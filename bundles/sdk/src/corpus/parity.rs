@@ -1,4 +1,4 @@
-//! The page that shows where a bundle agrees with ASAM's own, and where not and why.
+//! The page that shows where a bundle agrees with that of ASAM, and where and why it differs.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -6,19 +6,19 @@ use std::path::Path;
 use super::{Comparison, Deviation, NOTHING_THERE, compare_asam_cases, compare_real_files, settle};
 use crate::Bundle;
 
-/// Inputs on which a checker differs from what is recorded, all for one reason.
+/// Inputs on which a checker differs from the record, all for the same reason.
 #[derive(Debug, Clone, Copy)]
 pub struct Deviations {
     /// The checker.
     pub checker: &'static str,
     /// Ends of the inputs' paths.
     pub inputs: &'static [&'static str],
-    /// Why ours is right.
+    /// Reason why our result is correct.
     pub reason: &'static str,
 }
 
 impl Deviations {
-    /// The deviations, input by input.
+    /// Returns one deviation for each input.
     fn each(&self) -> impl Iterator<Item = Deviation> + use<> {
         let (checker, reason) = (self.checker, self.reason);
         self.inputs.iter().map(move |input| Deviation {
@@ -29,31 +29,31 @@ impl Deviations {
     }
 }
 
-/// A bundle beside ASAM's.
+/// Comparison of a bundle with that of ASAM.
 #[derive(Clone, Copy)]
 pub struct Parity {
-    /// Ours.
+    /// Our bundle.
     pub bundle: &'static Bundle,
-    /// What the page says before its tables.
+    /// Text of the page before its tables.
     pub introduction: &'static str,
-    /// Whether a checker of theirs that was skipped agrees with one of ours that looked and found
-    /// nothing: theirs are skipped where there is no map or no storyboard to look at.
+    /// Whether a skipped recorded checker agrees with one that ran and found nothing. ASAM's
+    /// checkers are skipped if there is no map or no storyboard.
     pub theirs_skip_nothing_to_see: bool,
-    /// Where we differ on ASAM's own test files.
+    /// Deviations on ASAM's own test files.
     pub on_cases: &'static [Deviations],
-    /// What the page says before the table of other projects' files, with its heading.
+    /// Text of the page before the table of other projects' files, with its heading.
     pub about_real_files: &'static str,
-    /// Where we differ on files of other projects.
+    /// Deviations on files of other projects.
     pub on_real_files: &'static [Deviations],
 }
 
 impl Parity {
-    /// Fails the running test when ours disagrees with what is recorded in `cases` and no deviation is
-    /// declared, when a declared one does not occur, or when the page does not say so; writes the page
-    /// with `QCBUS_BLESS` set. Without the cases it says so and passes.
+    /// Fails the running test for an undeclared difference from the record in `cases`. It also
+    /// fails for a declared deviation that does not occur, and for an outdated page. Writes the
+    /// page if `QCBUS_BLESS` is set. Without the cases it prints a message and passes.
     ///
     /// # Panics
-    /// With all that differs.
+    /// Panics with all differences.
     pub fn assert(&self, cases: &Path, page: &Path) {
         let on_cases = self.recorded(compare_asam_cases, cases, self.on_cases);
         let on_real_files = self.recorded(compare_real_files, cases, self.on_real_files);
@@ -62,8 +62,8 @@ impl Parity {
         }
     }
 
-    /// The recorded results with ours, of which only declared ones differ; `None` when they are not at
-    /// hand.
+    /// Returns the comparisons with the record, in which only declared ones differ. Returns `None`
+    /// if the record is missing.
     #[expect(clippy::panic, reason = "it is an assertion for tests")]
     fn recorded(
         &self,
@@ -107,10 +107,11 @@ impl Parity {
 
 type Compare = fn(&'static Bundle, &Path) -> Result<Option<Vec<Comparison>>, String>;
 
-/// Fails the running test when the file does not say this; writes it with `QCBUS_BLESS` set.
+/// Fails the running test if the file does not contain this text. Writes the file if `QCBUS_BLESS`
+/// is set.
 ///
 /// # Panics
-/// See above.
+/// Panics if the text differs or the file cannot be written.
 pub fn agrees_or_says(path: &Path, text: &str) {
     if std::env::var_os("QCBUS_BLESS").is_some() {
         let written = std::fs::write(path, text);

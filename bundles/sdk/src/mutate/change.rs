@@ -1,4 +1,4 @@
-//! What is changed in which file, and where that is to be seen.
+//! Edits of files and the rows where their effect must be visible.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
@@ -8,15 +8,15 @@ use super::encode::{Storage, text, with_text};
 use super::scan::Scan;
 use super::select::Selector;
 
-/// Files that are changed, below the directory; none: removed.
+/// Contents of changed files by path relative to the directory; `None` means removed.
 pub type Changed = BTreeMap<PathBuf, Option<Vec<u8>>>;
 
-/// An element of a file, or the file.
+/// An element of a file, or the whole file.
 #[derive(Debug)]
 pub struct Target {
-    /// None: anywhere in it.
+    /// `None` means anywhere in the file.
     pub selector: Option<Selector>,
-    /// Below the directory.
+    /// Path relative to the directory.
     pub file: PathBuf,
 }
 
@@ -24,7 +24,7 @@ pub struct Target {
 #[derive(Debug)]
 pub struct Edit {
     change: Change,
-    /// Below the directory.
+    /// Path relative to the directory.
     pub file: PathBuf,
 }
 
@@ -41,12 +41,12 @@ enum Change {
 pub enum Rows {
     /// All of them.
     Any,
-    /// Some.
+    /// Some rows.
     These(BTreeSet<u64>),
 }
 
 impl Rows {
-    /// Whether a row is among them.
+    /// Checks whether a row is included.
     pub fn has(&self, row: u64) -> bool {
         match self {
             Rows::Any => true,
@@ -55,14 +55,14 @@ impl Rows {
     }
 }
 
-/// Rows by file, below the directory.
+/// Rows by file, relative to the directory.
 pub type Spots = BTreeMap<PathBuf, Rows>;
 
-/// Applies edits in order: what becomes of the files, and where that must be found: at the targets, or where
-/// the edits are when there are none.
+/// Applies edits in order. Returns the changed files and the rows where the effect must be found.
+/// These are the targets, or the edited rows if there are no targets.
 ///
 /// # Errors
-/// What cannot be done.
+/// Returns an error for an edit that cannot be made.
 pub fn apply(edits: &[Edit], at: &[Target], source: &Path) -> Result<(Changed, Spots), String> {
     let (mut changed, mut edited) = (Changed::new(), Spots::new());
     for edit in edits {
@@ -88,18 +88,18 @@ fn add(spots: &mut Spots, file: &Path, rows: Rows) {
 }
 
 impl Edit {
-    /// `SELECTOR | EDIT`; the words are described in `bundles/xosc/tests/seeded/README.md`.
+    /// Parses `SELECTOR | EDIT`. The words are described in `bundles/xosc/tests/seeded/README.md`.
     ///
     /// # Errors
-    /// What cannot be read.
+    /// Returns an error for text that cannot be parsed.
     pub fn parse(line: &str, file: PathBuf) -> Result<Edit, String> {
         Edit::by(line, file, "name")
     }
 
-    /// Likewise; `#value` in a selector means the attribute `key`.
+    /// Parses an edit; `#value` in a selector means the attribute `key`.
     ///
     /// # Errors
-    /// What cannot be read.
+    /// Returns an error for text that cannot be parsed.
     pub fn by(line: &str, file: PathBuf, key: &str) -> Result<Edit, String> {
         let (selector, action) = line
             .split_once(" | ")
@@ -144,18 +144,18 @@ impl Edit {
 }
 
 impl Target {
-    /// A selector, or `.` for the whole file.
+    /// Parses a selector, or `.` for the whole file.
     ///
     /// # Errors
-    /// What cannot be read.
+    /// Returns an error for text that cannot be parsed.
     pub fn parse(selector: &str, file: PathBuf) -> Result<Target, String> {
         Target::by(selector, file, "name")
     }
 
-    /// Likewise; `#value` in a selector means the attribute `key`.
+    /// Parses a target; `#value` in a selector means the attribute `key`.
     ///
     /// # Errors
-    /// What cannot be read.
+    /// Returns an error for text that cannot be parsed.
     pub fn by(selector: &str, file: PathBuf, key: &str) -> Result<Target, String> {
         let selector = (selector != ".").then(|| Selector::by(selector, key));
         let selector = selector.transpose()?;
@@ -185,10 +185,10 @@ fn content(source: &Path, changed: &Changed, file: &Path) -> Result<Vec<u8>, Str
     }
 }
 
-/// A path that starts at the directory of a file, both below the directory that is mirrored.
+/// Resolves a path that starts at the directory of a file. Both are below the mirrored directory.
 ///
 /// # Errors
-/// When it leads out of there.
+/// Returns an error if the path leads out of that directory.
 pub fn beside(file: &Path, path: &str) -> Result<PathBuf, String> {
     let folder = file.parent().unwrap_or(Path::new(""));
     let path = normal(&folder.join(path));
@@ -198,7 +198,7 @@ pub fn beside(file: &Path, path: &str) -> Result<PathBuf, String> {
     Ok(path)
 }
 
-/// A path without `.` and, as far as can be, without `..`.
+/// Returns a path without `.` and, as far as possible, without `..`.
 pub fn normal(path: &Path) -> PathBuf {
     let mut normal = PathBuf::new();
     for component in path.components() {

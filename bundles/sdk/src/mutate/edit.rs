@@ -1,4 +1,4 @@
-//! Edits of a file's text. None of them changes the number of its lines, save `cut`.
+//! Edits of a file's text. None of them changes the number of lines, except `cut`.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -6,54 +6,54 @@ use std::ops::Range;
 use super::scan::{Element, Scan, lines};
 use super::select::Selector;
 
-/// What is done to an element.
+/// An edit of an element.
 #[derive(Debug, Clone)]
 pub enum Action {
     /// Removes the element.
     Drop,
     /// Removes an attribute.
     DropAttribute(String),
-    /// Gives an attribute a value, and the element the attribute where it has none.
+    /// Sets the value of an attribute, and adds the attribute if it is missing.
     Set(String, String),
-    /// Adds to an attribute that is a number.
+    /// Adds a number to a numeric attribute.
     Shift(String, f64),
-    /// Changes the sign of one.
+    /// Changes the sign of a numeric attribute.
     Negate(String),
     /// Copies the element.
     Duplicate,
-    /// Exchanges it with its next sibling.
+    /// Exchanges the element with its next sibling.
     Swap,
-    /// Text before its content.
+    /// Inserts text before its content.
     Prepend(String),
-    /// Text after its content.
+    /// Inserts text after its content.
     Append(String),
-    /// Text before it.
+    /// Inserts text before the element.
     Before(String),
-    /// Text after it.
+    /// Inserts text after the element.
     After(String),
-    /// Text instead of it.
+    /// Replaces the element with text.
     Replace(String),
-    /// Another name for it.
+    /// Renames the element.
     Rename(String),
     /// Removes its end tag.
     Unclose,
-    /// Single quotes for its attributes.
+    /// Uses single quotes for its attributes.
     Quote,
-    /// Its attributes in reverse order.
+    /// Reverses the order of its attributes.
     Reverse,
 }
 
-/// An edited text, and the rows at which it was edited.
+/// An edited text, and the edited rows.
 pub type Edited = (String, BTreeSet<u64>);
 
-/// What replaces which bytes.
+/// Byte ranges and their replacements.
 type Splices = Vec<(Range<usize>, String)>;
 
 impl Action {
-    /// Reads what is described in `bundles/xosc/tests/seeded/README.md`.
+    /// Parses an edit as described in `bundles/xosc/tests/seeded/README.md`.
     ///
     /// # Errors
-    /// What cannot be read.
+    /// Returns an error for text that cannot be parsed.
     pub fn parse(text: &str) -> Result<Action, String> {
         let bad = || format!("no edit: {text}");
         let (verb, rest) = text.split_once(' ').unwrap_or((text, ""));
@@ -91,10 +91,10 @@ impl Action {
         Ok(action)
     }
 
-    /// Changes the one element that the selector means.
+    /// Changes the one element that the selector matches.
     ///
     /// # Errors
-    /// When there is no such element, or the edit cannot be made.
+    /// Returns an error if there is not exactly one such element, or the edit cannot be made.
     pub fn apply(&self, selector: &Selector, text: &str) -> Result<Edited, String> {
         let scan = Scan::of(text)?;
         let edited = self.apply_to(&scan, selector.one(&scan)?);
@@ -104,7 +104,7 @@ impl Action {
     /// Changes an element.
     ///
     /// # Errors
-    /// When the edit cannot be made.
+    /// Returns an error if the edit cannot be made.
     pub fn apply_to(&self, scan: &Scan<'_>, id: usize) -> Result<Edited, String> {
         let text = scan.text;
         let splices = self.splices(scan, id)?;
@@ -175,7 +175,7 @@ impl Action {
         Ok(splices)
     }
 
-    /// Where the edit is to be seen, in the edited text.
+    /// Returns the rows of the edited text where the edit is visible.
     fn rows(&self, scan: &Scan<'_>, id: usize) -> BTreeSet<u64> {
         let element = &scan.elements[id];
         let (start, end) = (element.start_tag.start, element.end);
@@ -209,12 +209,12 @@ impl Action {
     }
 }
 
-/// The lines of what is removed stay.
+/// Returns the line breaks of a removed text, so that the number of lines stays the same.
 fn gap(text: &str) -> String {
     "\n".repeat(lines(text))
 }
 
-/// An attribute that is a number, replaced by another.
+/// Replaces the value of a numeric attribute with a calculated one.
 fn calculated(
     scan: &Scan<'_>,
     id: usize,
@@ -249,13 +249,13 @@ fn end_tag(element: &Element) -> Result<Range<usize>, String> {
     tag.ok_or_else(|| "the element has no end tag".to_owned())
 }
 
-/// An empty element with content.
+/// Replaces an empty element with one that has content.
 fn opened(text: &str, element: &Element, xml: &str) -> (Range<usize>, String) {
     let tag = &text[element.start_tag.clone()];
     let slash = tag.rfind('/').unwrap_or(tag.len());
-    let cached = tag[..slash].trim_end().len();
-    let (gap, name) = (gap(&tag[cached..slash]), &text[element.name.clone()]);
-    let range = element.start_tag.start + cached..element.start_tag.end;
+    let kept = tag[..slash].trim_end().len();
+    let (gap, name) = (gap(&tag[kept..slash]), &text[element.name.clone()]);
+    let range = element.start_tag.start + kept..element.start_tag.end;
     (range, format!("{gap}>{xml}</{name}>"))
 }
 

@@ -1,8 +1,8 @@
-//! Edits of a file as a whole: how its text is stored.
+//! Edits of the encoding and storage of a whole file.
 
 use super::scan::lines;
 
-/// What is done to a file.
+/// Edit of a file's storage.
 #[derive(Debug, Clone)]
 pub enum Storage {
     Utf16 { big: bool },
@@ -63,9 +63,9 @@ impl Storage {
             }
             Storage::Cut(count) => {
                 let all: Vec<&str> = text.split('\n').collect();
-                let cached = all.len().checked_sub(*count);
-                let cached = cached.ok_or("it has not so many lines")?;
-                all[..cached].join("\n").into_bytes()
+                let kept = all.len().checked_sub(*count);
+                let kept = kept.ok_or("it has not so many lines")?;
+                all[..kept].join("\n").into_bytes()
             }
         };
         if changed == bytes {
@@ -75,13 +75,13 @@ impl Storage {
     }
 }
 
-/// The text of a file that is no other than UTF-8, without its mark.
+/// Returns the text of a UTF-8 file without its byte order mark.
 pub fn text(bytes: &[u8]) -> Result<&str, String> {
     let bytes = bytes.strip_prefix(MARK).unwrap_or(bytes);
     std::str::from_utf8(bytes).map_err(|error| error.to_string())
 }
 
-/// The same file with another text: its mark stays.
+/// Returns the file with another text. A byte order mark stays.
 pub fn with_text(bytes: &[u8], text: &str) -> Vec<u8> {
     let mark = if bytes.starts_with(MARK) { MARK } else { b"" };
     [mark, text.as_bytes()].concat()
@@ -96,7 +96,7 @@ fn declared(text: &str, encoding: &str) -> String {
     format!("<?xml version=\"1.0\" encoding=\"{encoding}\"?>{rest}")
 }
 
-/// One byte for a character.
+/// Encodes each character as one byte.
 fn narrow(text: &str, largest: u8) -> Result<Vec<u8>, String> {
     let byte = |c: char| u8::try_from(c).ok().filter(|byte| *byte <= largest);
     let narrow = text.chars().map(|c| byte(c).ok_or(c));

@@ -1,7 +1,8 @@
-//! Changes files as authors and tools do, for tests: lists of edits, and what a bundle says of the result.
+//! Test edits of files as authors and tools make them: lists of edits, and the new findings of a
+//! bundle.
 //!
-//! Edits change the text of a file and leave the rest of it alone: rows stay what they are. Files lie in a
-//! directory that is mirrored by links, so that catalogs and maps beside a scenario can be edited, too.
+//! Edits change the text of a file and nothing else: rows stay the same. The directory of the files
+//! is mirrored by links, so that catalogs and maps beside a scenario can be edited, too.
 
 #![expect(clippy::unwrap_used, reason = "a test may fail and tell what it tried")]
 
@@ -26,24 +27,24 @@ pub use said::{Said, name, new_ones, said};
 pub use scan::{Attribute, Element, Scan};
 pub use select::Selector;
 
-/// Does the work for every item, on all processors, each thread with a desk of its own; the results are in
+/// Processes every item, on all processors. Each thread has a state of its own. The results are in
 /// the items' order.
 ///
 /// # Panics
-/// When the work does.
+/// Panics if the work panics.
 pub fn in_parallel<D: Default, T: Sync, R: Send>(
     items: &[T],
     work: impl Fn(&mut D, &T) -> R + Sync,
 ) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let worker = || {
-        let (mut cli, mut done) = (D::default(), Vec::new());
+        let (mut state, mut done) = (D::default(), Vec::new());
         loop {
             let at = next.fetch_add(1, Ordering::Relaxed);
             let Some(item) = items.get(at) else {
                 return done;
             };
-            done.push((at, work(&mut cli, item)));
+            done.push((at, work(&mut state, item)));
         }
     };
     let threads = std::thread::available_parallelism().map_or(1, usize::from);

@@ -1,4 +1,4 @@
-//! A directory with a few other files in it: links to all that is the same.
+//! Mirror of a directory with some changed files. All others are links.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use tempfile::TempDir;
 
 use super::Changed;
 
-/// A directory of its own in which every file is a link into the original.
+/// A temporary directory in which every file is a link to the original.
 pub struct Overlay {
     source: PathBuf,
     copy: TempDir,
@@ -16,7 +16,7 @@ impl Overlay {
     /// Mirrors a directory.
     ///
     /// # Errors
-    /// When it cannot be read or the links cannot be made.
+    /// Returns an error if it cannot be read or the links cannot be made.
     pub fn of(source: &Path) -> std::io::Result<Overlay> {
         let overlay = Overlay {
             source: source.canonicalize()?,
@@ -26,15 +26,15 @@ impl Overlay {
         Ok(overlay)
     }
 
-    /// Where the files are.
+    /// Returns the path of the mirror.
     pub fn root(&self) -> &Path {
         self.copy.path()
     }
 
-    /// Does something while files are changed.
+    /// Runs an action while files are changed.
     ///
     /// # Errors
-    /// When a file cannot be changed or restored.
+    /// Returns an error if a file cannot be changed or restored.
     pub fn with<T>(&self, changed: &Changed, act: impl FnOnce(&Path) -> T) -> std::io::Result<T> {
         for (path, content) in changed {
             self.put(path, content.as_deref())?;
@@ -65,7 +65,7 @@ impl Overlay {
 
     fn put(&self, path: &Path, content: Option<&[u8]>) -> std::io::Result<()> {
         let copy = self.root().join(path);
-        // Never through a link: the file at its other end is not ours.
+        // The link is removed before writing; otherwise the write would change the original.
         if self.source.join(path).exists() {
             std::fs::remove_file(&copy)?;
         }

@@ -1,4 +1,4 @@
-//! What is said of a file, made comparable.
+//! Findings on a file in a comparable form.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use qcbus_formats::xqar::{Issue, Level, Location, Locations, Status};
 use super::change::normal;
 use crate::{Loaded, Plan, examine};
 
-/// An issue, without what depends on the directory of the scenario.
+/// An issue, independent of the directory of the scenario.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Said {
     /// The checker's id.
@@ -21,10 +21,10 @@ pub struct Said {
     pub rows: Vec<(PathBuf, u64)>,
 }
 
-/// Everything that is said of a file below a directory.
+/// Returns all findings on a file below a directory.
 ///
 /// # Errors
-/// When it cannot be examined.
+/// Returns an error if the file cannot be examined.
 pub fn said(plan: &Plan, root: &Path, scenario: &Path) -> Result<Vec<Said>, String> {
     let path = root.join(scenario);
     let folder = path.parent().unwrap_or(root);
@@ -41,7 +41,7 @@ pub fn said(plan: &Plan, root: &Path, scenario: &Path) -> Result<Vec<Said>, Stri
     Ok(all)
 }
 
-/// What is said now and was not before. An issue that comes twice is told from one that comes once.
+/// Returns the findings that are new. A second occurrence of the same issue is new, too.
 pub fn new_ones(before: &[Said], after: Vec<Said>) -> Vec<Said> {
     let mut left: Vec<_> = before.iter().map(Said::key).collect();
     let is_new = |said: &Said| match left.iter().position(|old| *old == said.key()) {
@@ -71,12 +71,12 @@ impl std::fmt::Display for Said {
     }
 }
 
-/// The last piece of a path.
+/// Returns the last component of a path.
 pub fn name(file: &Path) -> std::borrow::Cow<'_, str> {
     file.file_name().unwrap_or_default().to_string_lossy()
 }
 
-/// Makes issues comparable.
+/// Converter of issues to the comparable form.
 struct Reader<'r> {
     root: &'r Path,
     scenario: &'r Path,
@@ -113,7 +113,8 @@ impl Reader<'_> {
         }
     }
 
-    /// A place in another file is also at the reference to that file.
+    /// Returns the rows of a location. A place in another file also has the row of the reference to
+    /// that file.
     fn rows(&self, locations: &Locations) -> Vec<(PathBuf, u64)> {
         let elsewhere = locations.elsewhere.iter().map(|other| {
             let path = normal(Path::new(&other.path));

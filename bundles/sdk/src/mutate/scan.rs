@@ -1,35 +1,35 @@
-//! Where the elements and attributes of a file's text are: edits change the text and leave the rest of it alone,
-//! so no tree is written again. A file that is not well-formed has elements, too.
+//! Scanner for the elements and attributes in a file's text. Edits change only parts of the text,
+//! so the tree is never serialised. It also handles files that are not well-formed.
 
 use std::ops::Range;
 
-/// An element, by its bytes.
+/// An element, as byte ranges.
 #[derive(Debug)]
 pub struct Element {
     /// Its name.
     pub name: Range<usize>,
     /// Its attributes.
     pub attributes: Vec<Attribute>,
-    /// From its `<` to behind the `>`.
+    /// From its `<` to just after the `>`.
     pub start_tag: Range<usize>,
-    /// None when it closes itself or is never closed.
+    /// `None` if the element is self-closing or never closed.
     pub end_tag: Option<Range<usize>>,
-    /// Behind all of it.
+    /// End of the whole element.
     pub end: usize,
-    /// Without content and end tag.
+    /// Whether it is self-closing, without content and end tag.
     pub closes_itself: bool,
-    /// Number among the elements of the file.
+    /// Index of the parent among the elements of the file.
     pub parent: Option<usize>,
 }
 
-/// An attribute, by its bytes.
+/// An attribute, as byte ranges.
 #[derive(Debug)]
 pub struct Attribute {
     /// Its name.
     pub name: Range<usize>,
-    /// With the blanks before it and its quotes.
+    /// The attribute with its quotes and the blanks before it.
     pub whole: Range<usize>,
-    /// Without its quotes.
+    /// The value without its quotes.
     pub value: Range<usize>,
 }
 
@@ -42,10 +42,10 @@ pub struct Scan<'t> {
 }
 
 impl<'t> Scan<'t> {
-    /// Where the elements of a text are.
+    /// Scans the elements of a text.
     ///
     /// # Errors
-    /// When a tag is no tag.
+    /// Returns an error for an invalid tag.
     pub fn of(text: &'t str) -> Result<Scan<'t>, String> {
         let mut scan = Scan {
             text,
@@ -61,7 +61,7 @@ impl<'t> Scan<'t> {
         Ok(scan)
     }
 
-    /// One tag, comment or the like; returns where it ends.
+    /// Scans one tag, comment or similar item. Returns its end.
     fn piece(&mut self, start: usize, open: &mut Vec<usize>) -> Result<usize, String> {
         const OTHERS: [(&str, &str); 4] = [
             ("<!--", "-->"),
@@ -88,7 +88,7 @@ impl<'t> Scan<'t> {
         Ok(end)
     }
 
-    /// Whatever is open inside of the element ends with it.
+    /// Closes the element of an end tag. Elements that are still open inside of it end with it.
     fn close(&mut self, tag: Range<usize>, open: &mut Vec<usize>) {
         let name = self.text[tag.start + 2..tag.end - 1].trim();
         let is = |id: &usize| &self.text[self.elements[*id].name.clone()] == name;
@@ -102,24 +102,24 @@ impl<'t> Scan<'t> {
         self.elements[named].end_tag = Some(tag);
     }
 
-    /// The name of an element.
+    /// Returns the name of an element.
     pub fn name(&self, id: usize) -> &'t str {
         &self.text[self.elements[id].name.clone()]
     }
 
-    /// An attribute of an element.
+    /// Returns an attribute of an element.
     pub fn attribute(&self, id: usize, name: &str) -> Option<&Attribute> {
         let mut attributes = self.elements[id].attributes.iter();
         attributes.find(|it| &self.text[it.name.clone()] == name)
     }
 
-    /// The value of one, as it is written.
+    /// Returns the value of an attribute, as it is written.
     pub fn value(&self, id: usize, name: &str) -> Option<&'t str> {
         let attribute = self.attribute(id, name)?;
         Some(&self.text[attribute.value.clone()])
     }
 
-    /// The elements with the same parent, itself included.
+    /// Returns the elements with the same parent, including itself.
     pub fn siblings(&self, id: usize) -> impl Iterator<Item = usize> {
         let parent = self.elements[id].parent;
         let all = self.elements.iter().enumerate();
@@ -127,12 +127,12 @@ impl<'t> Scan<'t> {
             .map(|(other, _)| other)
     }
 
-    /// The row of a byte, from 1.
+    /// Returns the row of a byte, from 1.
     pub fn row(&self, at: usize) -> u64 {
         row(self.text, at)
     }
 
-    /// The rows of an element's start tag.
+    /// Returns the rows of an element's start tag.
     pub fn rows(&self, id: usize) -> std::ops::RangeInclusive<u64> {
         let tag = &self.elements[id].start_tag;
         self.row(tag.start)..=self.row(tag.end)
@@ -143,7 +143,7 @@ pub fn row(text: &str, at: usize) -> u64 {
     1 + lines(&text[..at]) as u64
 }
 
-/// How many ends of lines a text has.
+/// Returns the number of line breaks in a text.
 pub fn lines(text: &str) -> usize {
     text.bytes().filter(|byte| *byte == b'\n').count()
 }

@@ -1,38 +1,38 @@
-//! Selectors: which element of a file is meant.
+//! Selectors that identify an element of a file.
 
 use super::scan::Scan;
 
-/// Words from the outside in.
+/// A list of words, from the outermost element to the innermost.
 #[derive(Debug, Clone)]
 pub struct Selector {
-    /// As it is written.
+    /// The text of the selector.
     pub text: String,
     words: Vec<Compound>,
 }
 
-/// One word: a name and what must hold besides.
+/// One word: a name and further conditions.
 #[derive(Debug, Clone, Default)]
 struct Compound {
     name: String,
     nth: Option<usize>,
     attributes: Vec<(String, String)>,
-    /// A child of what the word before means, not any descendant.
+    /// Whether the element must be a child of the previous word's element, not just any descendant.
     child: bool,
 }
 
 impl Selector {
-    /// Reads a selector; `#value` means the attribute `name`.
+    /// Parses a selector; `#value` means the attribute `name`.
     ///
     /// # Errors
-    /// What cannot be read.
+    /// Returns an error for text that cannot be parsed.
     pub fn parse(text: &str) -> Result<Selector, String> {
         Selector::by(text, "name")
     }
 
-    /// Likewise; `#value` means the attribute `key`.
+    /// Parses a selector; `#value` means the attribute `key`.
     ///
     /// # Errors
-    /// What cannot be read.
+    /// Returns an error for text that cannot be parsed.
     pub fn by(text: &str, key: &str) -> Result<Selector, String> {
         let (mut words, mut child) = (Vec::new(), false);
         for word in split(text) {
@@ -53,16 +53,16 @@ impl Selector {
         })
     }
 
-    /// All elements that fit, in document order.
+    /// Returns all matching elements in document order.
     pub fn all(&self, scan: &Scan<'_>) -> impl Iterator<Item = usize> {
         let all = 0..scan.elements.len();
         all.filter(|id| fits(scan, *id, &self.words))
     }
 
-    /// The one element that fits.
+    /// Returns the one matching element.
     ///
     /// # Errors
-    /// When there are more or none.
+    /// Returns an error if there are several or none.
     pub fn one(&self, scan: &Scan<'_>) -> Result<usize, String> {
         let found: Vec<usize> = self.all(scan).collect();
         match found[..] {
@@ -72,7 +72,7 @@ impl Selector {
     }
 }
 
-/// At blanks that are in no brackets.
+/// Splits a text at blanks outside of brackets.
 fn split(text: &str) -> impl Iterator<Item = &str> {
     let (mut depth, mut quoted) = (0_usize, false);
     let blank = move |c: char| {
@@ -135,7 +135,7 @@ impl Compound {
     }
 }
 
-/// Whether the last word means the element, and those before it what is around it.
+/// Checks whether the last word matches the element and the earlier words match its ancestors.
 fn fits(scan: &Scan<'_>, id: usize, words: &[Compound]) -> bool {
     let Some((last, before)) = words.split_last() else {
         return true;

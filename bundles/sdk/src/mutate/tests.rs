@@ -1,4 +1,4 @@
-//! Edits and selectors, on documents small enough to be read: an edit that did nothing would find nothing.
+//! Tests of edits and selectors, on small documents. An edit without an effect would find nothing.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -16,7 +16,7 @@ fn edited(selector: &str, action: &str) -> Result<(String, Vec<u64>), String> {
     Ok((text, rows.into_iter().collect()))
 }
 
-/// The edit replaces one passage by another, and is seen at these rows.
+/// Asserts that the edit replaces one passage by another and reports these rows.
 #[track_caller]
 fn assert_edit(selector: &str, action: &str, from: &str, to: &str, rows: &[u64]) {
     assert_eq!(TEXT.matches(from).count(), 1, "{from}");

@@ -1,8 +1,9 @@
-//! Writes what rules find into their pages.
+//! Writes the findings of rules into their pages.
 
 use super::Example;
 
-/// A page with the `issues` blocks of some examples replaced, inserted, or (when empty) removed.
+/// Returns a page with the `issues` blocks of some examples replaced, inserted, or (when empty)
+/// removed.
 pub(super) fn blessed(page: &str, found: &[(&Example, String)]) -> String {
     let mut lines: Vec<String> = page.lines().map(str::to_owned).collect();
     for (example, issues) in found.iter().rev() {

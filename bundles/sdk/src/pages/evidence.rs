@@ -1,4 +1,4 @@
-//! What the examples of the pages prove, for tables and further tests.
+//! Documents and findings of the examples of the pages, for tables and further tests.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,18 +10,18 @@ use crate::Bundle;
 use crate::check::{Listener, Outcome, check};
 use crate::plan::Plan;
 
-/// A document of a page, complete.
+/// A complete document of a page.
 #[derive(Debug, Clone)]
 pub struct Shown {
-    /// The rule whose page shows it.
+    /// The rule of the page.
     pub rule: &'static str,
-    /// What the rule says of it.
+    /// Expected result of the rule.
     pub verdict: Verdict,
-    /// The root document with what a template puts around it.
+    /// The root document, with the text of its template.
     pub text: String,
 }
 
-/// Every single-file example of a bundle's pages that stands without parameters.
+/// Returns every single-file example of a bundle's pages without parameters.
 pub fn documents(bundle: &'static Bundle) -> Vec<Shown> {
     let mut all = Vec::new();
     for (rule, example) in examples(bundle) {
@@ -42,7 +42,7 @@ pub fn documents(bundle: &'static Bundle) -> Vec<Shown> {
     all
 }
 
-/// By rule, the UIDs under which it finds something in its own bad examples.
+/// Returns, for each rule, the UIDs of its findings in its own bad examples.
 pub fn fired(bundle: &'static Bundle) -> BTreeMap<&'static str, BTreeSet<String>> {
     let plan = Plan::new(bundle, |_| true, |_, _| None);
     let mut all: BTreeMap<&'static str, BTreeSet<String>> = BTreeMap::new();
@@ -50,7 +50,7 @@ pub fn fired(bundle: &'static Bundle) -> BTreeMap<&'static str, BTreeSet<String>
         if example.verdict != Verdict::Bad || !example.params.is_empty() {
             continue;
         }
-        // The staged files must outlive what is loaded from them.
+        // The staged files must live longer than the documents loaded from them.
         let Some(staged) = stage(bundle, rule, &example) else {
             continue;
         };
@@ -85,8 +85,8 @@ fn stage(bundle: &'static Bundle, rule: &str, example: &Example) -> Option<Stage
     Staged::new(bundle, example, version).ok()
 }
 
-/// By UID: the checker that addresses it, and whether it finds something under this very UID in its own
-/// bad examples.
+/// Returns, for each UID, its checker, and whether it has a finding under this UID in its own bad
+/// examples.
 pub fn by_uid(bundle: &'static Bundle) -> BTreeMap<&'static str, (&'static str, bool)> {
     let fired = fired(bundle);
     let mut all: BTreeMap<&'static str, (&'static str, bool)> = BTreeMap::new();
@@ -103,8 +103,8 @@ pub fn by_uid(bundle: &'static Bundle) -> BTreeMap<&'static str, (&'static str, 
     all
 }
 
-/// The lines of a list of rules: a UID and, after a tab, why it cannot be checked. Lines that begin
-/// with `#` are comments.
+/// Parses the lines of a list of rules: a UID and, after a tab, the reason why it cannot be
+/// checked. Lines that begin with `#` are comments.
 pub fn listed(list: &'static str) -> Vec<(&'static str, Option<&'static str>)> {
     let lines = list
         .lines()

@@ -1,4 +1,4 @@
-//! From the few lines that a page shows to a document that can be checked.
+//! Builds complete documents from the short examples of a page.
 
 use std::path::Path;
 use std::str::FromStr;
@@ -9,12 +9,12 @@ use super::{Example, ExampleFile};
 use crate::load::{LoadError, Loaded};
 use crate::{AnyRule, Bundle, Version, VersionRange};
 
-/// What a rule is to say about an example.
+/// Expected result of a rule for an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// The rule runs and finds nothing.
     Good,
-    /// The rule finds what the `issues` block says.
+    /// The rule finds the issues of the `issues` block.
     Bad,
     /// The rule does not apply.
     Skipped,
@@ -35,12 +35,13 @@ impl FromStr for Verdict {
     }
 }
 
-/// A minimal document with a hole, so that an example shows only what it is about.
+/// A minimal document with a placeholder, so that an example shows only its subject.
 ///
-/// `{major}` and `{minor}` stand for the version, `{example}`, alone on its line, for the example.
+/// `{major}` and `{minor}` stand for the version. `{example}`, alone on its line, stands for the
+/// example.
 #[derive(Debug, Clone, Copy)]
 pub struct Template {
-    /// Name, for `in=NAME`. The bundle's first template is used when an example names none.
+    /// Name for `in=NAME`. An example without a name uses the bundle's first template.
     pub name: &'static str,
     /// The document.
     pub text: &'static str,
@@ -48,17 +49,18 @@ pub struct Template {
 
 /// An example as a set of files.
 pub(super) struct Staged {
-    /// Names and texts, the root first.
+    /// Names and texts; the root comes first.
     pub files: Vec<(String, String)>,
-    /// Lines of the template before the example.
+    /// Number of lines of the template before the example.
     pub hidden_rows: u64,
-    /// Lines of the example.
+    /// Number of lines of the example.
     pub shown_rows: u64,
-    /// Where the files are, when there are several.
+    /// Directory of the files, if there are several.
     folder: Option<tempfile::TempDir>,
 }
 
-/// The version that an example's template names: its own, else the newest that the rule has.
+/// Returns the version for an example's template: that of the example, else the newest one that the
+/// rule applies to.
 pub(super) fn version_of(
     bundle: &Bundle,
     rule: &dyn AnyRule,
@@ -82,7 +84,8 @@ pub(super) fn version_of(
 
 impl Staged {
     /// Puts an example into its template. A text that begins with `<?xml` or the first template's
-    /// root element is a whole document and goes as it is; other files always do.
+    /// root element is a complete document and stays unchanged. A further file stays unchanged
+    /// unless it names a template.
     pub fn new(bundle: &Bundle, example: &Example, version: Version) -> Result<Staged, String> {
         let Some((ExampleFile { name, text, .. }, others)) = example.files.split_first() else {
             return Err("an example needs a document".to_owned());
@@ -133,7 +136,8 @@ impl Staged {
         }
     }
 
-    /// Paths of the files' own folder, which is another one each time, cut down to their names.
+    /// Returns the text with paths in the temporary directory shortened to file names. That
+    /// directory differs in each run.
     pub fn without_folder(&self, text: &str) -> String {
         match &self.folder {
             None => text.to_owned(),
@@ -142,7 +146,7 @@ impl Staged {
     }
 }
 
-/// Several files need a folder of their own.
+/// Writes the files to a temporary directory.
 fn written(files: &[(String, String)]) -> std::io::Result<tempfile::TempDir> {
     let folder = tempfile::tempdir()?;
     let files: Vec<NamedBytes> = files
@@ -157,7 +161,7 @@ fn written(files: &[(String, String)]) -> std::io::Result<tempfile::TempDir> {
     Ok(folder)
 }
 
-/// `part{1..1200}.xosc` stands for as many files: for examples of what is too much.
+/// Expands `part{1..1200}.xosc` to that many names, for examples that exceed a limit.
 fn many(name: &str) -> impl Iterator<Item = String> {
     let range = name.split_once('{').and_then(|(before, rest)| {
         let (range, after) = rest.split_once('}')?;
@@ -174,10 +178,11 @@ fn many(name: &str) -> impl Iterator<Item = String> {
     names.into_iter()
 }
 
-/// A file: its name and what is in it.
+/// A file: its name and its content.
 type NamedBytes = (String, Vec<u8>);
 
-/// The files of a folder: those called `archive.mosc!member` are packed. An archive may lie in another.
+/// Returns the files of a directory. Files named `archive.mosc!member` are packed into the archive.
+/// An archive may contain another one.
 fn packed(files: &[NamedBytes]) -> std::io::Result<Vec<NamedBytes>> {
     let mut whole: Vec<NamedBytes> = Vec::new();
     let mut archives: Vec<(String, Vec<NamedBytes>)> = Vec::new();
@@ -207,7 +212,7 @@ fn is_whole(bundle: &Bundle, text: &str) -> bool {
     text.starts_with("<?xml") || text.trim_start().starts_with(root)
 }
 
-/// `<OpenDRIVE` of a template, whatever comes before it.
+/// Returns the start of the root tag of a template, such as `<OpenDRIVE`, whatever precedes it.
 fn root_tag(text: &str) -> &str {
     let after = text
         .find("?>")

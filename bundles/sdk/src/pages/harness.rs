@@ -1,4 +1,4 @@
-//! The test of a bundle's pages.
+//! Test of a bundle's pages.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use crate::check::{Listener, Outcome, check};
 use crate::plan::Plan;
 use crate::{AnyRule, Bundle, Checker, Version};
 
-/// Fails the running test when [`check_pages`] has complaints.
+/// Fails the running test if [`check_pages`] returns complaints.
 ///
 /// ```text
 /// #[test]
@@ -23,7 +23,7 @@ use crate::{AnyRule, Bundle, Checker, Version};
 /// ```
 ///
 /// # Panics
-/// With all complaints.
+/// Panics with all complaints.
 #[expect(clippy::panic, reason = "it is an assertion for tests")]
 pub fn assert_pages(bundle: &'static Bundle, rules_dir: &str) {
     let complaints = check_pages(bundle, Path::new(rules_dir));
@@ -40,8 +40,8 @@ pub fn assert_pages(bundle: &'static Bundle, rules_dir: &str) {
 
 /// Compares a bundle's rules, their files and their pages, and runs every example.
 ///
-/// With `QCBUS_BLESS` set, the `issues` blocks are rewritten; with `QCBUS_PAGE=NAME`, only the
-/// examples of the pages whose file name contains NAME run.
+/// If `QCBUS_BLESS` is set, the `issues` blocks are rewritten. With `QCBUS_PAGE=NAME`, only the
+/// examples of pages with NAME in their file name run.
 pub fn check_pages(bundle: &'static Bundle, rules_dir: &Path) -> Vec<String> {
     let mut complaints = of_the_list(bundle);
     let files = match rule_files(rules_dir) {
@@ -65,7 +65,7 @@ pub fn check_pages(bundle: &'static Bundle, rules_dir: &Path) -> Vec<String> {
     complaints
 }
 
-/// Ids, UIDs, ranges and preconditions of the list itself.
+/// Checks the ids, UIDs, ranges and preconditions of the list of rules.
 fn of_the_list(bundle: &'static Bundle) -> Vec<String> {
     let mut complaints = Vec::new();
     let plan = Plan::by_default(bundle);
@@ -91,7 +91,7 @@ fn of_the_list(bundle: &'static Bundle) -> Vec<String> {
         );
         match &plan.entries[index].after {
             Err(error) => complaints.push(format!("`{id}`: {error}")),
-            // Running before is stronger than having no cycle.
+            // This check of the order also excludes cycles.
             Ok(after) => complaints.extend(
                 after
                     .iter()
@@ -108,7 +108,7 @@ fn of_the_list(bundle: &'static Bundle) -> Vec<String> {
     complaints
 }
 
-/// `entity:standard:x.y.z:set.name`.
+/// Checks the form `entity:standard:x.y.z:set.name`.
 fn is_uid(uid: &str) -> bool {
     let parts: Vec<&str> = uid.split(':').collect();
     let plain = |text: &str| !text.is_empty() && !text.contains(char::is_whitespace);
@@ -116,7 +116,7 @@ fn is_uid(uid: &str) -> bool {
         if plain(entity) && plain(standard) && version.parse::<Version>().is_ok() && plain(name))
 }
 
-/// Every `.rs` below the directory that is a rule, that is, not a `mod.rs`.
+/// Returns every file below the directory except `mod.rs`: the rules and their pages.
 fn rule_files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder)? {
@@ -131,8 +131,8 @@ fn rule_files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Pairs pages with rules: each `NAME.rs` has a `NAME.md`, which is the page of one listed rule
-/// whose id ends in NAME.
+/// Pairs pages with rules: each `NAME.rs` has a `NAME.md`. It is the page of one listed rule with
+/// an id that ends in NAME.
 fn pages_of_rules(
     bundle: &'static Bundle,
     files: &[PathBuf],
@@ -289,7 +289,7 @@ impl PageTest<'_> {
         complaints
     }
 
-    /// What the rule finds, or how the example breaks its promise.
+    /// Returns the findings of the rule, or an error if the example does not behave as marked.
     fn example(&self, example: &Example) -> Result<String, String> {
         let version = version_of(self.bundle, self.rule, example)?;
         let staged = Staged::new(self.bundle, example, version)?;
@@ -382,7 +382,7 @@ struct Endings {
 }
 
 impl Endings {
-    /// A page is also a test for every other rule: none may fail on it.
+    /// Fails if any checker ends with an error. A page is also a test for every other rule.
     fn complain_about_errors(&self, checkers: &[Checker]) -> Result<(), String> {
         let mut failed = self
             .ended

@@ -1,8 +1,8 @@
-//! The page of a rule: what people read, and the examples that run as tests.
+//! The page of a rule: text for people, and examples that run as tests.
 //!
-//! A page is Markdown. Its first heading is the title, its first paragraph the summary. Code
-//! blocks marked `xml good`, `xml bad` or `xml skipped` are examples, see [`Example`]; the block
-//! marked `issues` after a bad one says what the rule finds in it.
+//! A page is Markdown. Its first heading is the title, its first paragraph the summary. Code blocks
+//! marked `xml good`, `xml bad` or `xml skipped` are examples, see [`Example`]. The block marked
+//! `issues` after a bad example contains the findings of the rule in it.
 
 mod bless;
 pub mod evidence;

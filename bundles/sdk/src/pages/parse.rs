@@ -1,34 +1,34 @@
-//! Reads a page.
+//! Parser of a page.
 
 use super::example::Verdict;
 
-/// A page, taken apart.
+/// A parsed page.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Page {
     /// The first heading.
     pub title: String,
     /// The first paragraph, on one line.
     pub summary: String,
-    /// The examples in order.
+    /// The examples in order of appearance.
     pub examples: Vec<Example>,
 }
 
-/// An example and what is expected of it.
+/// An example and its expected result.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Example {
-    /// What the rule is to say.
+    /// Expected result of the rule.
     pub verdict: Verdict,
-    /// `in=NAME`: the template that the text is put into.
+    /// `in=NAME`: the template for the text.
     pub template: Option<String>,
-    /// `version=1.7`: the version that the template names.
+    /// `version=1.7`: the version for the template.
     pub version: Option<String>,
     /// `set:NAME=VALUE`: parameters.
     pub params: Vec<(String, String)>,
-    /// The root file and, from following `xml also file=…` blocks, others.
+    /// The root file, and further files from the following `xml also file=…` blocks.
     pub files: Vec<ExampleFile>,
     /// The content of the `issues` block, if there is one.
     pub expected: Option<String>,
-    /// The lines of the page, from 0, that the `issues` block takes or should be put before.
+    /// Lines of the page, from 0, of the `issues` block, or the place to insert it.
     pub expected_lines: std::ops::Range<usize>,
     /// The line of the opening fence, from 1.
     pub line: usize,
@@ -41,26 +41,26 @@ pub struct ExampleFile {
     pub name: Option<String>,
     /// `in=NAME` of a further file.
     pub template: Option<String>,
-    /// What is in it.
+    /// Content of the file.
     pub text: String,
 }
 
-/// Why a text is no page.
+/// Reason why a text is not a valid page.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: {what}")]
 pub struct PageError {
     /// Line, from 1.
     pub line: usize,
-    /// What is wrong, and what would be right.
+    /// Description of the error and of the expected text.
     pub what: String,
 }
 
 impl Page {
-    /// Takes a page apart.
+    /// Parses a page.
     ///
     /// # Errors
-    /// [`PageError`] when the title or the summary is missing, a block is not closed, or the words
-    /// behind the fence of an example are not known.
+    /// [`PageError`] if the title or the summary is missing, a block is not closed, or the words
+    /// after the fence of an example are unknown.
     pub fn parse(text: &str) -> Result<Page, PageError> {
         let mut page = Page::head(text);
         let lines: Vec<&str> = text.lines().collect();
@@ -88,7 +88,8 @@ impl Page {
         }
     }
 
-    /// Title and summary alone, empty when there are none: every start of a bundle needs those of all its rules.
+    /// Returns title and summary only, empty if they are missing. Every start of a bundle needs
+    /// those of all its rules.
     pub fn head(text: &str) -> Page {
         let mut page = Page::default();
         for line in text.lines().map(str::trim) {

@@ -1,4 +1,4 @@
-//! The `issues` block of a page: findings as people read them.
+//! Formats the `issues` block of a page: findings in readable form.
 
 use std::fmt::Write as _;
 
@@ -7,8 +7,8 @@ use qcbus_formats::xqar::{Issue, Level, Location, Locations};
 
 use super::example::Staged;
 
-/// One issue per paragraph: level, place and text on the first line, further places indented.
-/// The UID is only named when it is not `uid`.
+/// Formats one issue per paragraph: level, place and text on the first line, further places
+/// indented. The UID is included only if it differs from `uid`.
 pub(super) fn render(issues: &[Issue], uid: &str, staged: &Staged) -> String {
     let mut text = String::new();
     for issue in issues {
@@ -50,7 +50,7 @@ pub(super) fn render(issues: &[Issue], uid: &str, staged: &Staged) -> String {
     staged.without_folder(&text)
 }
 
-/// The word for a level, as every text output writes it.
+/// Returns the word for a level in all text output.
 pub(crate) fn level_name(level: Level) -> &'static str {
     match level {
         Level::Error => "error",
@@ -59,7 +59,7 @@ pub(crate) fn level_name(level: Level) -> &'static str {
     }
 }
 
-/// Row, column and XPath, then everything else that is known about the place.
+/// Returns row, column and XPath, then all other information about the place.
 fn place(locations: &Locations, staged: &Staged) -> (String, Vec<String>) {
     let (mut words, mut extras) = (Vec::new(), Vec::new());
     for location in &locations.places {

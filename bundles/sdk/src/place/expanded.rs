@@ -1,4 +1,4 @@
-//! From places in an expanded scenario to the files that it was made of.
+//! Maps places in an expanded scenario to its source files.
 
 use qcbus_document::{Attribute, Document, Node};
 use qcbus_formats::xqar::{Location, Locations};
@@ -6,8 +6,8 @@ use qcbus_formats::xqar::{Location, Locations};
 use super::{Place, places_of, shown_at};
 use crate::Subject;
 
-/// What of the root file brought a place of a library into the expanded scenario: the value that was
-/// put there, else the reference to the group.
+/// Returns the place of the root file that brought a place of a library into the expanded scenario:
+/// the inserted value, else the reference to the group.
 pub(super) fn referring(subject: &Subject<'_>, place: &Place<'_>) -> Vec<Location> {
     if let Some(places) = value_given(subject, place) {
         return places;
@@ -16,16 +16,17 @@ pub(super) fn referring(subject: &Subject<'_>, place: &Place<'_>) -> Vec<Locatio
     shown_at(subject, reference.or(subject.written().root()))
 }
 
-/// The element of the root file that brought the group around a node into the expanded scenario.
+/// Returns the element of the root file that brought the group around a node into the expanded
+/// scenario.
 fn reference_to<'d>(subject: &Subject<'d>, node: Node<'_>) -> Option<Node<'d>> {
     let mut around = std::iter::once(node).chain(node.ancestors());
-    // The name of a copied group is written where it is referred to.
+    // The name of a copied group comes from the reference to it.
     let name = around.find_map(|node| value_in_root(node.attribute("name")?))?;
     innermost(subject.written(), name)
 }
 
-/// The reference that a place in a library was copied for, unless the root file itself gives what is
-/// there.
+/// Returns the reference that copied a place from a library. Returns `None` if the value there
+/// comes from the root file itself.
 pub(crate) fn copied_by<'d>(subject: &Subject<'d>, place: &Place<'_>) -> Option<Node<'d>> {
     let node = place.node().filter(|_| subject.is_expanded())?;
     if put_there(subject, place).is_some() || node.position().is_root_file {
@@ -34,7 +35,8 @@ pub(crate) fn copied_by<'d>(subject: &Subject<'d>, place: &Place<'_>) -> Option<
     reference_to(subject, node)
 }
 
-/// Where the root file gives the value that an attribute of a library has in the expanded scenario.
+/// Returns the place in the root file of the value that an attribute of a library has in the
+/// expanded scenario.
 pub(crate) fn put_there(subject: &Subject<'_>, place: &Place<'_>) -> Option<Locations> {
     let is_other = subject.is_expanded() && !matches!(place, Place::Attribute(it) if it.is("name"));
     let places = value_given(subject, place).filter(|_| is_other)?;
@@ -57,8 +59,8 @@ fn value_given(subject: &Subject<'_>, place: &Place<'_>) -> Option<Vec<Location>
     Some(places_of(subject, &attribute.position(), Some(xpath)))
 }
 
-/// The XPath of a place in the file that it is written in: in the expanded scenario groups have other
-/// names and other neighbours.
+/// Returns the XPath of a place in the file that contains it. In the expanded scenario groups have
+/// other names and other neighbours.
 pub(super) fn xpath(subject: &Subject<'_>, place: &Place<'_>) -> Option<String> {
     let node = place.node()?;
     if node.document().content_hash() != subject.root().content_hash() {
@@ -82,7 +84,7 @@ pub(super) fn xpath(subject: &Subject<'_>, place: &Place<'_>) -> Option<String> 
     Some(format!("{}{of_attribute}", there.xpath()))
 }
 
-/// Where the root file has the value of an attribute that a library has.
+/// Returns the offset in the root file of the value of a library's attribute.
 fn value_in_root(attribute: Attribute<'_>) -> Option<u32> {
     let document = attribute.node().document();
     let from = attribute.value_offset();
@@ -90,9 +92,9 @@ fn value_in_root(attribute: Attribute<'_>) -> Option<u32> {
     (is_root(from) && !is_root(attribute.offset())).then_some(from)
 }
 
-/// The innermost element around an offset of a document of one file.
+/// Returns the innermost element around an offset in a document made of one file.
 fn innermost(document: Document<'_>, offset: u32) -> Option<Node<'_>> {
-    // In such a document nodes come in the order of their offsets.
+    // In such a document the nodes are sorted by offset.
     let (mut low, mut high) = (0, document.len());
     while low < high {
         let middle = low + (high - low) / 2;

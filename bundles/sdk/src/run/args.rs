@@ -1,4 +1,4 @@
-//! The arguments of a bundle.
+//! Parsing of the command-line arguments of a bundle.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use lexopt::ValueExt as _;
 use super::{BusOptions, Format, Mode};
 use crate::Permits;
 
-/// What a bundle's arguments are.
+/// Usage text of a bundle.
 pub const USAGE: &str = "\
 usage:
   BUNDLE [--instance NAME | --instance-dir DIR] [--launch N] [--die-with-parent]
@@ -24,16 +24,16 @@ usage:
 exit codes: 0 accepted, 1 rejected, 2 usage, 3 undetermined, 4 no broker, 5 internal error
 ";
 
-/// Why arguments cannot be used.
+/// Reason why arguments cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum UsageError {
-    /// An option that there is not, one without its value, or a value that does not fit.
+    /// An unknown option, an option without its value, or an invalid value.
     #[error("{0}")]
     Argument(String),
-    /// Something that is of no use without something else.
+    /// An option that has no effect without another one.
     #[error("`{0}` needs {1}")]
     Lacks(&'static str, &'static str),
-    /// Two things that exclude each other.
+    /// Two options that exclude each other.
     #[error("`{0}` and `{1}` exclude each other")]
     Conflict(&'static str, &'static str),
 }

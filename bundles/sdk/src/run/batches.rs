@@ -1,32 +1,34 @@
-//! Findings on their way to the broker: in messages of which none is larger than a broker takes.
+//! Batches findings for the broker, so that no message exceeds the size limit of a broker.
 
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::{InfoElement, Issue, Location, Locations};
 use qcbus_messages::CheckerEnd;
 use qcbus_messages::codec::MAX_FROM_PEER;
 
-/// Issues per message: large enough to be cheap, small enough to interleave with other traffic.
+/// Issues per message. It is large enough to be cheap and small enough to interleave with other
+/// traffic.
 const BATCH: usize = 64;
-/// Bytes of the issues of one message. One that is larger is cut and travels alone.
+/// Bytes of the issues of one message. A larger issue is cut and sent alone.
 const BATCH_BYTES: usize = MAX_FROM_PEER / 4;
-/// Bytes that stay of each text of an issue that is cut; a broker keeps no more.
+/// Bytes that remain of each text of a cut issue. A broker keeps no more.
 const TEXT: usize = 8 << 10;
-/// Places that stay of an issue that is cut; a broker keeps no more.
+/// Places that remain of a cut issue. A broker keeps no more.
 const PLACES: usize = 64;
 
-/// The findings in order, in batches.
+/// Returns the findings in order, in batches.
 pub(super) fn batches(mut issues: Vec<Issue>) -> Vec<Vec<Issue>> {
     let large = issues.iter_mut().filter(|it| size(it) > BATCH_BYTES);
     large.for_each(cut);
     by_size(issues, BATCH, size)
 }
 
-/// The ends of checkers in order, in batches.
+/// Returns the ends of checkers in order, in batches.
 pub(super) fn batches_of_ends(ends: Vec<CheckerEnd>) -> Vec<Vec<CheckerEnd>> {
     by_size(ends, usize::MAX, size_of_end)
 }
 
-/// At most so many at once, and as many as fit into a message; one that does not fit is alone.
+/// Splits items into batches, which are limited by number and by message size. An item that exceeds
+/// the size is alone in its batch.
 fn by_size<T>(all: Vec<T>, most: usize, size: fn(&T) -> usize) -> Vec<Vec<T>> {
     let mut batches = Vec::new();
     let (mut batch, mut bytes) = (Vec::new(), 0);
@@ -45,7 +47,7 @@ fn by_size<T>(all: Vec<T>, most: usize, size: fn(&T) -> usize) -> Vec<Vec<T>> {
     batches
 }
 
-/// At least the bytes of an end in a message.
+/// Returns an upper bound of the bytes of an end in a message.
 fn size_of_end(end: &CheckerEnd) -> usize {
     const NUMBERS: usize = 32;
     let ending = match &end.ending {
@@ -63,7 +65,7 @@ fn size_of_end(end: &CheckerEnd) -> usize {
     NUMBERS + ending + params.sum::<usize>() + metadata.sum::<usize>()
 }
 
-/// At least the bytes of an issue in a message.
+/// Returns an upper bound of the bytes of an issue in a message.
 fn size(issue: &Issue) -> usize {
     const NUMBERS: usize = 64;
     let place = |it: &Location| {
@@ -101,7 +103,7 @@ fn tree(element: &InfoElement) -> usize {
     32 + element.name.len() + element.text.len() + attributes + children
 }
 
-/// Leaves of an issue what a broker would keep of it: a text of a file may be as long as the file.
+/// Cuts an issue to the size that a broker keeps. A text from a file may be as long as the file.
 fn cut(issue: &mut Issue) {
     shorten(&mut issue.description);
     shorten(&mut issue.rule_uid);
@@ -109,7 +111,7 @@ fn cut(issue: &mut Issue) {
     issue.locations.truncate(PLACES);
     for it in &mut issue.locations {
         shorten(&mut it.description);
-        // The ways to say where go by the longest text: one is enough.
+        // Each kind of place may contain a very long text, so only one is kept.
         it.places.truncate(1);
         it.places.iter_mut().for_each(shorten_place);
         if let Some(elsewhere) = &mut it.elsewhere {

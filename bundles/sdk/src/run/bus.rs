@@ -1,4 +1,4 @@
-//! A bundle as a daemon on the bus: one loop that talks, threads that check.
+//! Runs a bundle as a daemon on the bus: one loop communicates, and threads check.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::PathBuf;
@@ -27,36 +27,36 @@ use crate::cached::CachedModels;
 use crate::subject::LinkedImage;
 use crate::{Bundle, Outcome, Permits, Plan, UserFiles};
 
-/// How a bundle joins the bus.
+/// Options for joining the bus.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BusOptions {
     /// Name of the instance.
     pub instance: String,
-    /// Its directory, when it is not where the name leads.
+    /// Directory of the instance, if it is not the one that belongs to the name.
     pub instance_dir: Option<PathBuf>,
-    /// Given by the supervisor that started this process.
+    /// Number of the launch, given by the supervisor that started this process.
     pub launch: Option<u64>,
-    /// End when the process that started this one ends.
+    /// Ends this process when its parent ends.
     pub die_with_parent: bool,
-    /// Schemas of the user.
+    /// Directory of the user's schemas.
     pub schema_dir: Option<PathBuf>,
-    /// Do not confine it.
+    /// Disables the sandbox.
     pub no_sandbox: bool,
     /// Threads that check at the same time.
     pub threads: usize,
-    /// What its own program reads while it checks.
+    /// Files that the program of the bundle reads while it checks.
     pub own: OwnFiles,
 }
 
-/// What a bundle's own program reads while it checks, such as the modules of an interpreter.
+/// Files that the program of a bundle reads while it checks, such as the modules of an interpreter.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct OwnFiles {
     /// Files and directories.
     pub reads: Vec<PathBuf>,
-    /// Directories whose entries it sees without reading them.
+    /// Directories whose entries it may list, but not read.
     pub lists: Vec<PathBuf>,
-    /// What its manifest declares is for processes that it has started before it joined: it does without all of
-    /// that itself.
+    /// Whether the permissions of the manifest apply only to processes that it started before it
+    /// joined. The bundle itself then runs without them.
     pub restricted: bool,
 }
 
@@ -75,14 +75,15 @@ impl Default for BusOptions {
     }
 }
 
-/// How many jobs the broker may send ahead: some are checked while the next ones are at hand.
+/// Returns how many jobs the broker may send ahead. The next jobs are then ready while others are
+/// checked.
 fn capacity(threads: usize) -> u16 {
     u16::try_from((2 * threads + 4).clamp(8, 64)).unwrap_or(64)
 }
 
-/// How often a sign of life is given, and missing documents are asked for again.
+/// Interval of heartbeats. Missing documents are requested again at the same interval.
 const HEARTBEAT: Duration = Duration::from_secs(1);
-/// How long a broker may take to tell its configuration after the welcome.
+/// Maximum time from the welcome of a broker to its configuration.
 const CONFIGURED_WITHIN: Duration = Duration::from_secs(2);
 
 pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<&UserFiles>) -> Exit {
@@ -107,7 +108,7 @@ pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<&U
     let hello = hello(bundle, options.launch, threads);
     let own = options.own;
     sandboxed(&instance, &sessions, |stand| {
-        // A bundle is confined before its first thread is started, so the runtime must not start any.
+        // A bundle is confined before its first thread starts, so the runtime must not start any.
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build();
@@ -129,14 +130,15 @@ pub(super) fn run(bundle: &'static Bundle, options: BusOptions, given: Option<&U
     })
 }
 
-/// Asks the system to end this process with its parent. `false`: the parent has gone already.
+/// Asks the system to end this process with its parent. Returns `false` if the parent has already
+/// ended.
 fn follow_parent() -> bool {
     use rustix::process::{Signal, getppid, set_parent_process_death_signal};
     let parent = getppid();
     if let Err(error) = set_parent_process_death_signal(Some(Signal::TERM)) {
         tracing::warn!(%error, "cannot follow the parent process");
     }
-    // It may have died between the two calls: then we have another one by now.
+    // The parent may have died between the two calls. Then this process has another parent now.
     parent.is_some() && getppid() == parent
 }
 
@@ -154,14 +156,14 @@ fn hello(bundle: &Bundle, launch: Option<u64>, threads: usize) -> Hello {
     }
 }
 
-/// A number that no other process has: the hasher's keys are random.
+/// Returns a number that no other process has, because the hasher's keys are random.
 fn incarnation() -> u64 {
     use std::hash::BuildHasher as _;
     std::hash::RandomState::new().hash_one((std::process::id(), std::time::SystemTime::now()))
 }
 
-/// Signals by which a person stops a bundle that he started. One that a supervisor started is
-/// drained by the broker instead, and ends at once at a signal.
+/// Signals by which a person stops a bundle that was started by hand. The broker drains a bundle
+/// that a supervisor started. Such a bundle ends immediately on a signal.
 struct Stops(Vec<tokio::signal::unix::Signal>);
 
 impl Stops {
@@ -169,7 +171,7 @@ impl Stops {
         use tokio::signal::unix::{SignalKind, signal};
         let kinds = [SignalKind::terminate(), SignalKind::interrupt()];
         let kinds = kinds.into_iter().filter(|_| !supervised);
-        // Where the system refuses, the signal ends the process, as it does without us.
+        // If the system refuses a handler, the signal ends the process by default.
         Stops(kinds.filter_map(|kind| signal(kind).ok()).collect())
     }
 
@@ -187,7 +189,7 @@ impl Stops {
     }
 }
 
-/// What a session checks with.
+/// Inputs of a session for checking.
 struct Checking<'a> {
     bundle: &'static Bundle,
     given: Option<UserFiles>,
@@ -207,13 +209,14 @@ async fn serve(
         Err(error @ JoinError::NoBroker { .. }) => {
             return Ended::With(fail(&error.to_string(), Exit::NoBroker));
         }
-        // A broker that had nothing to check has ended before those that it had started were there.
+        // A broker without files to check may end before the bundles that it started have joined.
         Err(JoinError::Refused(reason)) if was_started && reason == IS_STOPPING => {
             return Ended::With(Exit::Accepted);
         }
         Err(error) => return Ended::With(fail(&error.to_string(), Exit::Internal)),
     };
-    // Before the first thread is started: threads that there are already would stay outside.
+    // The sandbox must be set up before the first thread starts. It would not cover threads that
+    // already exist.
     let heard = until_configured(&mut peer).await;
     let named = || files_of(bundle, given.as_ref(), &peer, &ready);
     let sandbox = stand.confine(peer.memory(), named, own);
@@ -273,7 +276,8 @@ async fn serve(
     }
 }
 
-/// What is heard until the configuration is there, which may name files. Nothing can be checked before.
+/// Collects events until the configuration arrives, because it may name files. The bundle can check
+/// nothing before.
 async fn until_configured(peer: &mut Peer) -> Vec<PeerEvent> {
     let mut heard = Vec::new();
     let configured = async {
@@ -284,12 +288,12 @@ async fn until_configured(peer: &mut Peer) -> Vec<PeerEvent> {
             }
         }
     };
-    // A broker without one is not known; should there be, jobs will tell.
+    // A broker always sends a configuration. If one does not, its jobs show this later.
     let _ = tokio::time::timeout(CONFIGURED_WITHIN, configured).await;
     heard
 }
 
-/// Files and directories that the configuration in force names, and those of the user.
+/// Returns the files and directories that the configuration in force names, and those of the user.
 fn files_of(
     bundle: &'static Bundle,
     given: Option<&UserFiles>,
@@ -306,11 +310,12 @@ fn files_of(
     }
 }
 
-/// What is the same for every broker, and made before the first is there: a run of `check` waits for its bundles.
+/// Data that is the same for every broker. It is prepared before the first broker exists, because a
+/// run of `check` waits for its bundles.
 struct Ready {
-    /// What the bundle offers.
+    /// Catalogue of the bundle.
     catalogue: FromPeer,
-    /// What is done unless a configuration says otherwise.
+    /// Plan that applies without a configuration.
     plan: Arc<Plan>,
 }
 
@@ -334,21 +339,23 @@ struct Daemon {
     peer: Peer,
     workers: Workers,
     models: CachedModels,
-    /// Each configuration and what it demands; made once, unless files that it names change.
+    /// Configurations with their plans. A plan is made once, unless files that its configuration
+    /// names change.
     plans: BTreeMap<Digest, (Option<Config>, Arc<Plan>)>,
     waiting: VecDeque<Job>,
-    /// What the threads are at, by the number of the run.
+    /// Jobs that the threads are checking, by the number of the run.
     running: BTreeMap<u64, Running>,
-    /// How many runs there have been.
+    /// Number of runs so far.
     runs: u64,
-    /// The job for which missing documents were asked for since the last heartbeat, for want of another.
+    /// First waiting job, if its missing documents were requested since the last heartbeat because
+    /// no other job was ready.
     asked_for: Option<JobId>,
     draining: bool,
-    /// Told to stop by a person.
+    /// Set when a person has stopped the bundle.
     stopped: bool,
-    /// What it may read, when it is confined.
+    /// Files that it may read, if it is confined.
     sandbox: Option<Sandbox>,
-    /// The configuration names files that this process cannot read any more.
+    /// Set when the configuration names files that this process can no longer read.
     outgrown: bool,
 }
 
@@ -360,7 +367,7 @@ struct Running {
 }
 
 impl Daemon {
-    /// What comes from the bus. `Some`: it is over.
+    /// Handles an event from the bus. Returns `Some` if the session is over.
     fn hear(&mut self, event: PeerEvent) -> Option<Ended> {
         match event {
             PeerEvent::Message(message) => self.obey(message),
@@ -369,7 +376,8 @@ impl Daemon {
             PeerEvent::Document(_) | PeerEvent::Config(_) => {}
             PeerEvent::Closed { reason } => {
                 tracing::info!(reason, "the session has ended");
-                // Told to go, or no broker came back: a supervisor reads the difference.
+                // A supervisor distinguishes a drained bundle from one that no broker came back
+                // for.
                 return Some(match (self.draining, self.peer.has_lost_its_session()) {
                     (true, _) => Ended::With(Exit::Accepted),
                     (false, true) => Ended::Again,
@@ -386,7 +394,8 @@ impl Daemon {
                 self.forget_everything();
                 self.peer.send(&self.ready.catalogue);
             }
-            // The broker does not know yet; `Leaving` tells it that this is left undone.
+            // The broker does not yet know of the stop. `Leaving` tells it that this job is not
+            // done.
             ToPeer::Job(_) if self.stopped => {}
             ToPeer::Job(job) => {
                 self.ask_for_documents(&job);
@@ -402,14 +411,15 @@ impl Daemon {
                 }
             }
             ToPeer::Drain => self.draining = true,
-            // The session ends with these words; `Closed` follows. Results are for reporters.
+            // The broker ends the session after `Refused`, and `Closed` follows. Results are for
+            // reporters.
             ToPeer::Refused { reason } => tracing::error!(reason, "the broker refused"),
             ToPeer::Result(_) | ToPeer::Withdrawn(_) => {}
         }
     }
 
-    /// A person wants it to go: what is being checked is finished, what waits is not begun.
-    /// Asked twice it goes at once.
+    /// Stops the bundle for a person: it finishes running jobs and drops waiting ones. A second
+    /// request ends it immediately.
     fn stop(&mut self) -> Option<Ended> {
         if self.stopped {
             return Some(Ended::With(Exit::Accepted));
@@ -420,12 +430,12 @@ impl Daemon {
         None
     }
 
-    /// Documents that no job is about any more are not kept for the next.
+    /// Drops the cached models of documents that no job needs any more.
     fn keep_nothing(&self) {
         self.models.clear();
     }
 
-    /// A new session: nothing that was asked before counts any more.
+    /// Resets the state for a new session, because earlier requests are no longer valid.
     fn forget_everything(&mut self) {
         self.waiting.clear();
         self.keep_nothing();
@@ -435,7 +445,7 @@ impl Daemon {
     }
 
     fn tick(&mut self) {
-        // The one that has been at work for longest.
+        // This is the job that has been running for the longest time.
         let running = self.running.values().next();
         self.peer.send(&FromPeer::Heartbeat {
             job: running.map(|running| running.job.job),
@@ -444,7 +454,8 @@ impl Daemon {
         self.asked_for = None;
     }
 
-    /// Nothing can be begun: what the first job lacks has got lost on the way, or had to make room here.
+    /// Requests the missing documents of the first job again, because no job can start. They were
+    /// lost on the way or were evicted here.
     fn ask_for_what_the_first_lacks(&mut self) {
         let Some(job) = self.waiting.front() else {
             return;
@@ -472,7 +483,7 @@ impl Daemon {
         }
     }
 
-    /// Hands jobs that are complete to threads, as long as there are idle ones.
+    /// Hands complete jobs to threads, as long as there are idle ones.
     fn start_next(&mut self) {
         while self.running.len() < self.workers.count() && !self.waiting.is_empty() {
             if !self.start_one() {
@@ -482,7 +493,7 @@ impl Daemon {
         }
     }
 
-    /// Hands the first job that is complete to a thread. `false`: there is none.
+    /// Hands the first complete job to a thread. Returns `false` if there is none.
     fn start_one(&mut self) -> bool {
         for index in 0..self.waiting.len() {
             let job = self.waiting.get(index).cloned();
@@ -510,7 +521,7 @@ impl Daemon {
         false
     }
 
-    /// The work of a job, once its configuration and all its documents are here.
+    /// Returns the work of a job if its configuration and all its documents are available.
     fn prepare(&mut self, job: &Job) -> Option<(Arc<Plan>, Work)> {
         let held = |doc| self.peer.document(doc);
         let (root, linked) = job.documents.split_first()?;
@@ -529,7 +540,7 @@ impl Daemon {
             })
         });
         let linked = linked.collect::<Option<_>>()?;
-        // Last: it may look at files.
+        // The plan comes last, because it may access files.
         let plan = self.plan(job.config)?;
         let work = Work {
             run: self.runs + 1,
@@ -599,7 +610,7 @@ impl Daemon {
         self.let_go(run);
     }
 
-    /// The job of a run, if the broker still wants to hear about it.
+    /// Returns the job of a run if it was not cancelled.
     fn counts(&self, run: u64) -> Option<JobId> {
         let running = self.running.get(&run)?;
         let counts = !running.cancelled.load(Ordering::Relaxed);
@@ -632,7 +643,7 @@ impl Daemon {
         }
     }
 
-    /// Nothing could be checked: every demanded checker has failed.
+    /// Reports that nothing could be checked: every demanded checker has failed.
     fn send_failure(&mut self, run: u64, reason: &str) {
         let running = self.running.get(&run);
         let Some((job, plan)) = running.map(|it| (it.job.job, it.plan.clone())) else {
@@ -651,7 +662,7 @@ impl Daemon {
         self.send_ends(job, ends.collect());
     }
 
-    /// The job is over: its documents may go, unless another job waits for them.
+    /// Ends a job and releases its documents, unless another job needs them.
     fn let_go(&mut self, run: u64) {
         if let Some(running) = self.running.remove(&run) {
             self.finished_with(&running.job);

@@ -1,3 +1,3 @@
-//! Exit codes: one list for every way to run, shared with the command line.
+//! Exit codes: one list for all modes, shared with the command line.
 
 pub use qcbus_messages::Exit;

@@ -1,4 +1,4 @@
-//! One file, checked at once, without a broker.
+//! Checks one file at once, without a broker.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write as _};
@@ -19,7 +19,7 @@ use crate::Permits;
 use crate::pages::level_name;
 use crate::{BUILD_DATE, Bundle, Listener, Loaded, Outcome, Plan, UserFiles, check_with};
 
-/// How findings are printed.
+/// Output format of findings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Format {
     /// `file:row:column: level: text [rule]`, one per line.
@@ -91,11 +91,11 @@ pub(super) fn run(
     }
 }
 
-/// What a plan finds in a loaded file, a line each as `bundle run` prints them, from a level on, and the
-/// verdict. What could not be looked at is said in lines of its own.
+/// Returns the findings of a plan in a loaded file from a level on, and the verdict. Each finding
+/// is a line as `bundle run` prints it. Further lines list what could not be checked.
 ///
 /// # Errors
-/// When the image that was built cannot be opened.
+/// If the built image cannot be opened.
 pub fn findings(
     plan: &Plan,
     loaded: &Loaded,
@@ -113,12 +113,12 @@ pub fn findings(
 
 struct Judged {
     pooled: Pooled,
-    /// Why checkers did not complete, by identifier.
+    /// Reasons why checkers did not complete, by identifier.
     reasons: BTreeMap<Text, String>,
     took: Timings,
 }
 
-/// Checks a file and pools what was found, as a broker does without a configuration.
+/// Checks a file and pools the findings, as a broker does without a configuration.
 fn judge(plan: &Plan, loaded: &Loaded, permits: &Permits) -> Result<Judged, crate::LoadError> {
     let (outcome, took) = examine_timed(plan, loaded, permits)?;
     let mut reasons: BTreeMap<Text, String> = outcome
@@ -146,18 +146,19 @@ fn judge(plan: &Plan, loaded: &Loaded, permits: &Permits) -> Result<Judged, crat
     })
 }
 
-/// Everything that the plan's demanded checkers find in a loaded file.
+/// Returns all findings of the plan's demanded checkers in a loaded file.
 ///
 /// # Errors
-/// When the image that was built cannot be opened.
+/// If the built image cannot be opened.
 pub fn examine(plan: &Plan, loaded: &Loaded) -> Result<BundleOutcome, crate::LoadError> {
     examine_timed(plan, loaded, &Permits::new(1)).map(|(outcome, _)| outcome)
 }
 
-/// The same as [`examine`] with as many threads as there are `permits`, and what every checker took.
+/// Does the same as [`examine`] with one thread per permit in `permits`, and also returns the time
+/// of every checker.
 ///
 /// # Errors
-/// When the image that was built cannot be opened.
+/// If the built image cannot be opened.
 pub fn examine_timed(
     plan: &Plan,
     loaded: &Loaded,
@@ -297,7 +298,7 @@ fn row_column(issue: &Issue) -> Option<(u64, u64)> {
         })
 }
 
-/// Results go to stdout; a closed pipe is nobody's business.
+/// Prints results to stdout. A closed pipe is not an error.
 pub(super) fn print(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
@@ -306,7 +307,7 @@ pub(super) fn print(text: &str) -> io::Result<()> {
     }
 }
 
-/// What a person must know goes to stderr, also when nobody has set up logging.
+/// Prints a message for a person to stderr, even if logging is not set up.
 pub(crate) fn complain(text: &str) {
     let _ = io::stderr().lock().write_all(shown::lines(text).as_bytes());
 }

@@ -1,4 +1,5 @@
-//! The three ways in which a bundle runs: on the bus, on one file, as a module of ASAM's framework.
+//! The three modes in which a bundle runs: on the bus, on one file, or as a module of ASAM's
+//! framework.
 
 mod args;
 mod batches;
@@ -23,49 +24,50 @@ pub use timings::Timings;
 
 use crate::{Bundle, Permits, UserFiles};
 
-/// How a bundle is to run.
+/// Mode in which a bundle runs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Mode {
-    /// As a peer on the bus, until the broker lets it go.
+    /// As a peer on the bus, until the broker drains it.
     Bus(BusOptions),
-    /// Check one file and print what was found.
+    /// Checks one file and prints the findings.
     File {
         /// The file.
         path: PathBuf,
-        /// How findings are printed.
+        /// Output format of findings.
         format: Format,
-        /// Whether what every checker took goes to stderr.
+        /// Whether the time of every checker is printed to stderr.
         timings: bool,
-        /// Schemas of the user.
+        /// Directory of the user's schemas.
         schema_dir: Option<PathBuf>,
         /// Threads that check at the same time.
         threads: usize,
     },
-    /// Read ASAM's configuration, check its `InputFile`, write the bundle's own `.xqar`.
+    /// Reads ASAM's configuration, checks its `InputFile` and writes the bundle's own `.xqar`.
     Module {
         /// The configuration.
         config: PathBuf,
-        /// Schemas of the user.
+        /// Directory of the user's schemas.
         schema_dir: Option<PathBuf>,
         /// Threads that check at the same time.
         threads: usize,
     },
-    /// Print the usage.
+    /// Prints the usage.
     Help,
 }
 
 impl Mode {
-    /// Reads the arguments behind the program's (or the bundle's) name; see [`USAGE`].
+    /// Parses the arguments after the name of the program (or of the bundle); see [`USAGE`].
     ///
     /// # Errors
-    /// [`UsageError`] says what does not fit.
+    /// [`UsageError`] names the invalid argument.
     pub fn parse(
         arguments: impl IntoIterator<Item = std::ffi::OsString>,
     ) -> Result<Mode, UsageError> {
         args::parse(arguments.into_iter())
     }
 
-    /// The same with so many threads, whatever was asked for: where a bundle's rules cannot run side by side.
+    /// Returns the same mode with this number of threads, regardless of the arguments. It is for
+    /// bundles with rules that cannot run in parallel.
     #[must_use]
     pub fn with_threads(mut self, count: usize) -> Mode {
         match &mut self {
@@ -76,7 +78,8 @@ impl Mode {
         self
     }
 
-    /// On the bus, what the bundle's program may read besides what every bundle may.
+    /// Sets the files that the bundle's program may read on the bus, besides the files that every
+    /// bundle may read.
     #[must_use]
     pub fn reading(mut self, own: OwnFiles) -> Mode {
         if let Mode::Bus(options) = &mut self {
@@ -86,7 +89,7 @@ impl Mode {
     }
 }
 
-/// Runs a bundle. What was found goes to stdout, everything else to stderr as log events.
+/// Runs a bundle. Findings go to stdout, everything else goes to stderr as log events.
 pub fn run(bundle: &'static Bundle, mode: Mode) -> Exit {
     log_panics();
     match mode {
@@ -114,14 +117,14 @@ pub fn run(bundle: &'static Bundle, mode: Mode) -> Exit {
             module::run(bundle, &config, &Permits::new(threads), given)
         }),
         Mode::Help => {
-            // Whoever asked for it sees that it is not there.
+            // The user sees that the output is missing.
             let _ = file::print(USAGE);
             Exit::Accepted
         }
     }
 }
 
-/// Reads what the user brings before anything else: a schema that is of no use ends the run.
+/// Reads the user's files before anything else. An unusable schema ends the run.
 fn with_files(
     bundle: &Bundle,
     directory: Option<&Path>,
@@ -139,7 +142,7 @@ fn with_files(
     }
 }
 
-/// The whole `main` of a program that is one bundle:
+/// Runs the whole `main` of a program with a single bundle:
 ///
 /// ```text
 /// fn main() -> std::process::ExitCode {
@@ -147,12 +150,12 @@ fn with_files(
 /// }
 /// ```
 ///
-/// Log events go wherever the program has sent them with a `tracing` subscriber.
+/// Log events go to the `tracing` subscriber of the program.
 pub fn main(bundle: &'static Bundle) -> ExitCode {
     run_or_explain(bundle, Mode::parse(std::env::args_os().skip(1))).into()
 }
 
-/// Runs a bundle as its arguments say; says what is wrong with them when they say nothing.
+/// Runs a bundle as its arguments demand. Prints an error if the arguments are invalid.
 pub fn run_or_explain(bundle: &'static Bundle, mode: Result<Mode, UsageError>) -> Exit {
     match mode {
         Ok(mode) => run(bundle, mode),
@@ -163,7 +166,8 @@ pub fn run_or_explain(bundle: &'static Bundle, mode: Result<Mode, UsageError>) -
     }
 }
 
-/// A panic is caught and becomes a checker's error; where it came from belongs into the log.
+/// Writes the location of a panic to the log. The panic itself is caught and becomes a checker's
+/// error.
 fn log_panics() {
     std::panic::set_hook(Box::new(|panic| {
         let place = panic

@@ -1,4 +1,4 @@
-//! As a module of ASAM's quality checker framework: `-c config.xml`.
+//! Runs a bundle as a module of ASAM's quality checker framework: `-c config.xml`.
 
 use std::path::{Path, PathBuf};
 
@@ -11,10 +11,10 @@ use super::Exit;
 use super::file::{complain, examine_timed};
 use crate::{BUILD_DATE, Bundle, Checker, Loaded, Permits, Plan, UserFiles};
 
-/// The bundle's parameters that name its result, the framework's first.
+/// Parameters of the bundle that name its result file. The framework's name is first.
 const RESULT_PARAMS: [&str; 2] = ["strResultFile", "resultFile"];
 
-/// Why a module run fails; reads well after "failed to ".
+/// Reason why a module run fails, as a continuation of "failed to ".
 #[derive(Debug, thiserror::Error)]
 enum ModuleError {
     #[error("read the configuration {}: {source}", to_text(path))]
@@ -38,7 +38,8 @@ enum ModuleError {
     },
 }
 
-/// Exit codes are the framework's: 0 when a result was written, whatever it says.
+/// Runs the module. Exit codes follow the framework: 0 if a result was written, whatever its
+/// content.
 pub(super) fn run(
     bundle: &'static Bundle,
     config: &Path,
@@ -112,8 +113,9 @@ fn module(
     )
 }
 
-/// What a configuration demands of a bundle; without one, whatever is on by default.
-/// Reads the files that it names for rules, unless the command line gave some.
+/// Returns the plan of a bundle under a configuration. Without one, the plan contains everything
+/// that is on by default. Reads the files that the configuration names for rules, unless the
+/// command line gave some.
 pub(super) fn configured(
     bundle: &'static Bundle,
     config: Option<&Config>,
@@ -129,7 +131,8 @@ pub(super) fn configured(
             .runs(checker.facts.default_on)
     };
     let plan = Plan::new(bundle, demanded, |checker, name| {
-        // Asked with an empty default, an empty answer means: not configured.
+        // The request has an empty default, so an empty answer means that the parameter is not
+        // configured.
         let asked = xqar::Param {
             name: name.to_owned(),
             value: String::new(),
@@ -144,7 +147,8 @@ pub(super) fn configured(
     plan.following(config).with_files(given)
 }
 
-/// As ASAM's bundles: the bundle's Param, relative to the current directory; else the bundle's name.
+/// Returns the path of the result, as in ASAM's bundles: the bundle's Param, relative to the
+/// current directory, or else the bundle's name.
 fn result_path(bundle: &Bundle, config: &Config) -> PathBuf {
     let section = config.bundle(bundle.name, bundle.alias);
     let params = section

@@ -1,4 +1,4 @@
-//! Where a bundle stands while it is on the bus: inside its sandbox, if there is one.
+//! The process context of a bundle on the bus, with its sandbox if there is one.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -12,26 +12,27 @@ use super::{Exit, OwnFiles};
 
 /// What follows a session.
 pub(super) enum Ended {
-    /// Nothing.
+    /// The process ends.
     With(Exit),
-    /// Another one, in a fresh process: this one may not do what joining takes.
+    /// Another session in a fresh process, because this process may not join again.
     Again,
 }
 
-/// Where one session takes place.
+/// Context of one session.
 pub(super) struct Stand<'a> {
     pub instance: &'a Instance,
-    /// How many sessions there were before.
+    /// Number of earlier sessions.
     number: u32,
-    /// What its manifest declares. `None`: it is not to be confined.
+    /// Permissions that its manifest declares. `None` if it is not confined.
     may: Option<&'a May>,
-    /// A broker has started it that it ends with.
+    /// Whether a broker started this process and ends it when it ends itself.
     is_bound: bool,
 }
 
 impl Stand<'_> {
-    /// How patient it is. After a session was lost, another broker is waited for; and one that has started this
-    /// process and is there may not have got ready itself.
+    /// Returns the options with the waiting time. After a lost session, the bundle waits for
+    /// another broker. A broker that started this process may not be ready itself, so the time is
+    /// the same.
     pub(super) fn options(&self) -> PeerOptions {
         let usual = PeerOptions::default();
         let patience: Duration = if self.number == 0 && !self.is_bound {
@@ -46,7 +47,8 @@ impl Stand<'_> {
         }
     }
 
-    /// Confines this process, which may then read what `reads` gives and what is its own. `None`: it is not to be confined.
+    /// Confines this process, which may then read only `reads` and its own files. Returns `None` if
+    /// it is not to be confined.
     pub(super) fn confine(
         &self,
         memory: Option<&Path>,
@@ -64,7 +66,8 @@ impl Stand<'_> {
                 may.clone()
             },
         };
-        // Before: what comes in between is taken for something else, and a fresh process reads it.
+        // The identities are recorded before the process is confined. A file that changes in
+        // between counts as another one, and a fresh process reads it.
         let sandbox = Sandbox::around(&sandboxed.reads);
         if let Err(error) = qcbus_confine::confine(&sandboxed) {
             tracing::warn!(%error, "this bundle is not wholly confined");
@@ -73,7 +76,8 @@ impl Stand<'_> {
     }
 }
 
-/// Files and directories that a confined process may read, as they were when it was confined.
+/// Files and directories that a confined process may read, with their identities at the time of
+/// confinement.
 pub(super) struct Sandbox(Vec<(PathBuf, Identity)>);
 
 /// Device and inode.
@@ -85,7 +89,8 @@ impl Sandbox {
         Sandbox(paths.iter().filter_map(known).collect())
     }
 
-    /// Whether something lies at the path now that only a fresh process may read. Looking is never forbidden.
+    /// Returns whether the path now holds a file that only a fresh process may read. `stat` always
+    /// works.
     pub(super) fn keeps_out(&self, path: &Path) -> bool {
         let known = self.0.iter().find(|(known, _)| known == path);
         identity(path).is_some_and(|now| known.is_none_or(|(_, then)| *then != now))
@@ -98,18 +103,18 @@ fn identity(path: &Path) -> Option<Identity> {
     Some((found.dev(), found.ino()))
 }
 
-/// How many sessions there may be, and who ends them.
+/// Number of sessions and the party that ends them.
 pub(super) struct Sessions {
-    /// There is no broker after this one.
+    /// The process serves a single broker only.
     pub only_one: bool,
-    /// A broker ends them, and not a person.
+    /// A broker ends the sessions, not a person.
     pub supervised: bool,
-    /// It is not to be confined.
+    /// The bundle is not confined.
     pub unfenced: bool,
 }
 
-/// Runs sessions: each in a process of its own where bundles are confined and there may be more than one, else all
-/// of them in this one.
+/// Runs sessions. Each has its own process if bundles are confined and there may be more than one
+/// session. Otherwise all run in this process.
 pub(super) fn sandboxed(
     instance: &Instance,
     sessions: &Sessions,
@@ -132,7 +137,7 @@ pub(super) fn sandboxed(
     };
     let once = |may| match session(stand(0, may)) {
         Ended::With(exit) => exit,
-        // It cannot have another one here. A supervisor starts it anew.
+        // This process cannot run another session. A supervisor restarts it.
         Ended::Again => Exit::NoBroker,
     };
     let Some(may) = &orders else {
@@ -141,7 +146,8 @@ pub(super) fn sandboxed(
     if sessions.only_one {
         return once(Some(may));
     }
-    // The process that keeps them outlives the broker; only the first has not been heard yet.
+    // The launcher process outlives the broker. Only the first session still sends its output to
+    // the broker that started it.
     voice.iter().for_each(SendSide::lasts);
     let ended = run_sessions(!sessions.supervised, |number| {
         voice

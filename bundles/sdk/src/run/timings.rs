@@ -1,20 +1,20 @@
-//! How long every checker took, for people who write rules. No result depends on it.
+//! Measures the time of every checker, for authors of rules. No result depends on it.
 
 use std::fmt;
 use std::time::Duration;
 
-/// What the checkers of one run took.
+/// Times of the checkers of one run.
 #[derive(Debug, Clone, Default)]
 pub struct Timings {
-    /// Each checker that was demanded, with the time from its begin to its end. What several of
-    /// them need is found out by the first, and counts as its time.
+    /// Each demanded checker, with the time from its start to its end. The first checker computes
+    /// shared data, and this counts as its time.
     pub checkers: Vec<(String, Duration)>,
-    /// The whole check.
+    /// Time of the whole check.
     pub whole: Duration,
 }
 
 impl Timings {
-    /// All checkers together.
+    /// Returns the sum of the times of all checkers.
     pub fn sum(&self) -> Duration {
         self.checkers.iter().map(|(_, took)| *took).sum()
     }

@@ -1,5 +1,5 @@
-//! The threads that check, so that the loop on the bus stays free to talk: each takes one job after the
-//! other. Those that have none lend a hand to large jobs (`crate::permits`).
+//! The checking threads, which leave the loop on the bus free to communicate. Each thread checks
+//! one job after the other. Idle threads help with large jobs (`crate::permits`).
 
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -18,9 +18,9 @@ use crate::permits::Permits;
 use crate::subject::LinkedImage;
 use crate::{Listener, Outcome, Plan, Subject, check_with};
 
-/// One job, with everything that checking it takes.
+/// One job, with everything that is needed to check it.
 pub(super) struct Work {
-    /// Tells apart two times that the same job is checked.
+    /// Distinguishes two runs of the same job.
     pub run: u64,
     pub kind: FileKind,
     pub plan: Arc<Plan>,
@@ -32,11 +32,11 @@ pub(super) struct Work {
     pub checker: Arc<CheckerAtWork>,
 }
 
-/// Which checker was begun last.
+/// Index of the checker that started last.
 pub(super) struct CheckerAtWork(AtomicU32);
 
 impl CheckerAtWork {
-    /// Its index; `None` before the first one begins.
+    /// Returns the index, or `None` before the first checker starts.
     pub fn get(&self) -> Option<u32> {
         Some(self.0.load(Ordering::Relaxed)).filter(|index| *index != u32::MAX)
     }
@@ -48,15 +48,15 @@ impl Default for CheckerAtWork {
     }
 }
 
-/// What a thread says of a job that is over.
+/// Result of a finished job.
 pub(super) struct Finished {
     pub run: u64,
     pub micros: u64,
-    /// What the checkers found, by their index, and how they ended; or why nothing was checked.
+    /// Findings and ends of the checkers, by their index, or the reason why nothing was checked.
     pub outcome: Result<Vec<(u32, Vec<Issue>, Outcome)>, String>,
 }
 
-/// The threads. They end when this is dropped and all that they were given is done.
+/// The threads. They end when this value is dropped and all their jobs are done.
 pub(super) struct Workers {
     jobs: Sender<Box<Work>>,
     shared: Arc<Shared>,
@@ -73,11 +73,11 @@ struct Shared {
 }
 
 impl Workers {
-    /// As many threads as there are hands, of which the first is started now and the others when there are as many
-    /// jobs.
+    /// Prepares one thread per permit. The first one starts now, and the others start when there
+    /// are as many jobs.
     ///
     /// # Errors
-    /// When no thread can be started.
+    /// If no thread can be started.
     pub fn start(
         permits: usize,
         models: CachedModels,
@@ -100,16 +100,16 @@ impl Workers {
         Ok(workers)
     }
 
-    /// How many jobs are checked at the same time.
+    /// Returns how many jobs are checked at the same time.
     pub fn count(&self) -> usize {
         self.shared.permits.count()
     }
 
-    /// Has a job checked. `false`: there is nobody who could.
+    /// Hands a job to the threads. Returns `false` if no thread is left.
     pub fn check(&mut self, work: Box<Work>) -> bool {
         let busy = self.shared.busy.fetch_add(1, Ordering::Relaxed) + 1;
         if busy > self.threads && self.threads < self.count() {
-            // Where no further thread can be had, those that there are take the job in their turn.
+            // If no further thread can be started, the existing threads check the job later.
             let started = self.one_more();
             let _ = started.inspect_err(|error| tracing::warn!(%error, "cannot start a thread"));
         }
@@ -133,10 +133,11 @@ impl Shared {
                 jobs.recv()
             };
             let Ok(work) = next else { return };
-            // The documents are let go before the broker hears that the job is done, but for those of a
-            // few models.
+            // The documents are released before the broker learns that the job is done. Only those
+            // of a few cached models remain.
             let permit = self.permits.take();
-            // Rules and models may panic, which is theirs. Should anything else, the job has an answer all the same.
+            // Panics of rules and models are caught elsewhere. Any other panic must also lead to an
+            // answer for the job.
             let finished = catch(|| finish(&work, self)).unwrap_or_else(|panic| Finished {
                 run: work.run,
                 micros: 0,
@@ -151,12 +152,12 @@ impl Shared {
     }
 }
 
-/// Does one job.
+/// Checks one job.
 fn finish(work: &Work, shared: &Shared) -> Finished {
     let start = Instant::now();
     let models = shared.models.for_job();
     let outcome = one(work, &models, shared);
-    // What was at hand when a rule or a model panicked is not given to the next job.
+    // Models that were in use when a rule or a model panicked are not passed on to the next job.
     let is_failed = |(_, _, outcome): &(u32, Vec<Issue>, Outcome)| {
         matches!(outcome.ending, Ending::Failed { .. })
     };

@@ -1,9 +1,9 @@
-//! What the tests' bundles have in common.
+//! Common parts of the tests' bundles.
 
 use qcbus_document::FileKind;
 use qcbus_sdk::{Bundle, Version, basic};
 
-/// A bundle for OpenDRIVE without any rule.
+/// A bundle for OpenDRIVE without rules.
 pub const BUNDLE: Bundle = Bundle {
     name: "testBundle",
     alias: "test",

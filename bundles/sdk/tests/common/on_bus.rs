@@ -1,4 +1,5 @@
-//! A broker's end of the bus, for a bundle that is to be tried: one configuration, and jobs of one document.
+//! The broker's end of the bus for a bundle under test: one configuration, and jobs of one
+//! document.
 
 use std::path::Path;
 
@@ -7,10 +8,10 @@ use qcbus_document::FileKind;
 use qcbus_formats::config::Config;
 use qcbus_messages::{Digest, DocId, DocumentRole, Job, JobDocument, JobId, codec};
 
-/// The digest of the configuration, which is none.
+/// Digest that stands for a missing configuration.
 pub const CONFIG: Digest = Digest([7; 32]);
 
-/// A broker's end of the bus.
+/// Starts the broker's end of the bus.
 pub fn host(directory: &Path) -> Host {
     let instance = Instance::at(directory.to_path_buf());
     let mut host = Host::start(&instance, HostOptions::default()).unwrap();
@@ -18,7 +19,8 @@ pub fn host(directory: &Path) -> Host {
     host
 }
 
-/// Publishes the image of a map. Held by the bus's history; a broker would keep it for as long as the job lasts.
+/// Publishes the image of a map. The history of the bus holds it. A broker would hold it until the
+/// job ends.
 pub fn publish(host: &Host, doc: DocId, map: &str) {
     let limits = qcbus_ingest::Limits::default();
     let bytes = map.as_bytes().to_vec();
@@ -29,7 +31,7 @@ pub fn publish(host: &Host, doc: DocId, map: &str) {
     drop(published.unwrap());
 }
 
-/// A job about such a map.
+/// Returns a job for such a map.
 pub fn job(job: JobId, doc: DocId) -> Job {
     let root = JobDocument {
         doc,

@@ -3,7 +3,7 @@
 use qcbus_document::Node;
 use qcbus_sdk::{Model, Subject, Unbuilt};
 
-/// The roads of a file, each of which is a part.
+/// The roads of a file. Each road is a part.
 pub struct Roads<'d>(pub Vec<Node<'d>>);
 
 impl Model for Roads<'static> {

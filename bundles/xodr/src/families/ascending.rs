@@ -1,4 +1,4 @@
-//! Records in ascending order of where they start.
+//! Checks that records are in ascending order of their starts.
 
 use qcbus_document::Node;
 use qcbus_opendrive::MapPart;
@@ -6,7 +6,7 @@ use qcbus_sdk::{Level, Param, Place, Sink};
 
 use super::shown::{beside, number};
 
-/// What still counts as the same place.
+/// Maximum difference between two starts that count as equal.
 pub(crate) const TOLERANCE: Param = Param::number(
     "tolerance",
     1e-6,
@@ -16,29 +16,28 @@ pub(crate) const TOLERANCE: Param = Param::number(
 
 /// A list of equally named records.
 pub(crate) struct List<'m> {
-    /// The attribute that says where a record starts.
+    /// Name of the attribute that gives the start of a record.
     pub start: &'static str,
-    /// The road.
+    /// Id of the road.
     pub road: &'m str,
-    /// What the starts are counted from, in metres along the road.
+    /// Origin of the starts, in metres along the road.
     pub from: Option<f64>,
-    /// The UID of its findings, if it is not the rule's first.
+    /// UID of the findings, unless it is the first UID of the rule.
     pub uid: Option<&'static str>,
 }
 
-/// What it means that a record starts where the one before it does: how severe that is, or
-/// nothing to be said.
+/// Severity of a record that starts where the previous one starts. `None` means no finding.
 pub(crate) type Equal = fn(Node<'_>, Node<'_>) -> Option<Level>;
 
-/// The earlier record never applies.
+/// Severity for records of which the earlier one never applies.
 pub(crate) const VOID: Equal = |_, _| Some(Level::Warning);
 
-/// Some readers take the earlier record for void, others for parallel.
+/// Severity for records that some readers treat as overridden and others as parallel.
 pub(crate) const PARALLEL: Equal = |_, _| Some(Level::Information);
 
 impl List<'_> {
-    /// Reports records that start before the one listed ahead of them, and those that start at
-    /// the same place. Records whose start cannot be read are passed over.
+    /// Reports records that start before the previous record in the list or at the same place.
+    /// Records without a readable start are skipped.
     pub fn check<'a>(
         &self,
         records: impl Iterator<Item = Node<'a>>,
@@ -46,7 +45,7 @@ impl List<'_> {
         found: &mut Sink<'_>,
     ) {
         let start = |node: &Node<'a>| node.f64(self.start).ok().filter(|start| start.is_finite());
-        // Nothing to compare: so it is with nearly all lists.
+        // Nearly all lists have at most one record, so there is nothing to compare.
         let mut records = records.peekable();
         let Some(first) = records.next() else { return };
         if records.peek().is_none() {
@@ -60,7 +59,7 @@ impl List<'_> {
         );
     }
 
-    /// [`List::check`] of records with their starts.
+    /// Does the work of [`List::check`] for records with their starts.
     fn check_starts<'a>(
         &self,
         records: impl Iterator<Item = (Node<'a>, f64)>,
@@ -134,7 +133,7 @@ impl List<'_> {
     }
 }
 
-/// The list of a road's own records, which start at `@s`.
+/// Returns the list of a road's own records, which start at `@s`.
 pub(crate) fn along_road(road: &str) -> List<'_> {
     List {
         start: "s",
@@ -144,7 +143,7 @@ pub(crate) fn along_road(road: &str) -> List<'_> {
     }
 }
 
-/// The children of this name of an element that may be missing.
+/// Returns the children with this name of an element that may be missing.
 pub(crate) fn children<'a>(
     parent: Option<Node<'a>>,
     name: &'static str,
@@ -154,7 +153,7 @@ pub(crate) fn children<'a>(
         .flat_map(move |parent| parent.children_named(name))
 }
 
-/// Checks the records of this name in every lane.
+/// Checks the records with this name in every lane.
 pub(crate) fn lane_records(
     part: MapPart<'_, '_>,
     element: &str,
@@ -164,7 +163,7 @@ pub(crate) fn lane_records(
     lane_records_under(part, element, None, equal, found);
 }
 
-/// [`lane_records`], whose findings bear `uid` if it is given.
+/// Works like [`lane_records`], but gives the findings the UID `uid` if there is one.
 pub(crate) fn lane_records_under(
     part: MapPart<'_, '_>,
     element: &str,
@@ -172,7 +171,7 @@ pub(crate) fn lane_records_under(
     equal: Equal,
     found: &mut Sink<'_>,
 ) {
-    // No lane has two of them if the whole file has not.
+    // If the whole file has fewer than two of these elements, no lane has two.
     let several = |root: Node<'_>| root.document().elements(element).nth(1).is_some();
     if !part.map().root().is_some_and(several) {
         return;

@@ -5,7 +5,7 @@ use qcbus_opendrive::RoadMap;
 
 use crate::families::object_parts::below;
 
-/// A signal and which boards it has.
+/// A signal with its boards.
 #[derive(Clone, Copy)]
 pub(crate) struct Carrier<'a> {
     /// The `<signal>`.
@@ -16,7 +16,7 @@ pub(crate) struct Carrier<'a> {
     pub variable: Option<Node<'a>>,
 }
 
-/// All signals.
+/// Returns all signals with their boards.
 pub(crate) fn carriers<'a>(map: &RoadMap<'a>) -> impl Iterator<Item = Carrier<'a>> + use<'a> {
     below(map, "signal", "signals").map(|node| Carrier {
         node,
@@ -26,7 +26,7 @@ pub(crate) fn carriers<'a>(map: &RoadMap<'a>) -> impl Iterator<Item = Carrier<'a
 }
 
 impl Carrier<'_> {
-    /// Whether the signal says that it is a board of this type.
+    /// Checks whether the type of the signal is this type of board.
     pub fn is_called(&self, kind: &str) -> bool {
         self.node.attr("type") == Some(kind)
     }

@@ -1,10 +1,10 @@
-//! The center lane: what it must not have.
+//! Checks for elements that the center lane must not have.
 
 use qcbus_opendrive::{LaneGroup, MapPart};
 use qcbus_sdk::Sink;
 
-/// Reports children of this name of center lanes. `why` completes "the center lane has an
-/// element `width`, but ".
+/// Reports children with this name of center lanes. `why` completes the text "the center lane has
+/// an element `width`, but ".
 pub(crate) fn has_no(part: MapPart<'_, '_>, element: &str, why: &str, found: &mut Sink<'_>) {
     for lane in part
         .lanes()

@@ -1,24 +1,24 @@
-//! What connections and the lanes of their connecting roads say about each other.
+//! Comparison of connections with the lane links of their connecting roads.
 
 use foldhash::{HashMap, HashSet};
 use qcbus_document::Node;
 use qcbus_opendrive::{Connection, ContactPoint, JunctionType, Road, RoadEnd, RoadMap};
 
-/// The connections of common junctions that lead from one road end to another, of which one says what another
-/// leaves out: some tools write one for each lane.
+/// All connections of common junctions between the same two road ends. They complete each other,
+/// because some tools write one connection for each lane.
 pub(crate) struct Bundle<'a> {
-    /// An end of the incoming road.
+    /// End of the incoming road.
     pub from: RoadEnd,
-    /// An end of the connecting road.
+    /// End of the connecting road.
     pub to: RoadEnd,
     /// The first of the connections.
     pub connection: Connection<'a>,
-    /// Their lane links: from, to.
+    /// The lane links of all these connections: from, to, element.
     pub links: Vec<(i64, i64, Node<'a>)>,
 }
 
-/// The connections of common junctions by the road ends that they join, in document order. Only those whose
-/// connecting road names the incoming one in turn: where the roads do not agree, lanes cannot.
+/// Groups the connections of common junctions by road ends, in document order. It skips connecting
+/// roads without a link back to the incoming road, because then the lanes cannot agree.
 pub(crate) fn bundles<'a>(map: &RoadMap<'a>) -> Vec<Bundle<'a>> {
     let mut places: HashMap<(RoadEnd, RoadEnd), usize> = HashMap::default();
     let mut bundles: Vec<Bundle<'a>> = Vec::new();
@@ -53,13 +53,13 @@ pub(crate) fn bundles<'a>(map: &RoadMap<'a>) -> Vec<Bundle<'a>> {
     bundles
 }
 
-/// What the connections say of connecting roads, to find the ends of which they say nothing.
+/// The entries of connections about connecting roads, for finding road ends without an entry.
 pub(crate) struct Entries<'a> {
-    /// Connecting roads, and at which of their ends a connection begins.
+    /// Connecting roads, each with the end at which a connection begins.
     ends: HashSet<(&'a str, Option<ContactPoint>)>,
-    /// Incoming and connecting roads.
+    /// Pairs of incoming and connecting road.
     roads: HashSet<(&'a str, &'a str)>,
-    /// Connecting roads and their lanes to which a lane link leads.
+    /// Connecting roads, each with a lane that is the target of a lane link.
     lanes: HashSet<(&'a str, i64)>,
 }
 
@@ -85,8 +85,8 @@ impl<'a> Entries<'a> {
         entries
     }
 
-    /// The road around a junction from which a connecting road goes on at an end, while no connection leads from
-    /// there, but one along the connecting road the other way.
+    /// Returns the road end outside the junction from which a connection is missing. The connecting
+    /// road is linked to it at `end`, but only the opposite direction has a connection.
     pub fn missing<'m>(
         &self,
         map: &'m RoadMap<'a>,
@@ -108,7 +108,7 @@ impl<'a> Entries<'a> {
         (incoming.junction().is_none() && !named).then_some((incoming, linked.end))
     }
 
-    /// Whether a lane link leads to a lane of a connecting road.
+    /// Checks whether a lane link leads to this lane of the connecting road.
     pub fn leads_to(&self, road: &Road<'a>, lane: i64) -> bool {
         self.lanes.contains(&(road.id(), lane))
     }

@@ -7,8 +7,8 @@ use qcbus_sdk::{Place, Sink};
 
 use super::on_road::{MAX_PLACES, OnRoad};
 
-/// The connections of a junction that have the same `key`, where there are several; in the order of
-/// the keys.
+/// Returns groups of connections of a junction with the same `key`, in the order of the keys. Only
+/// groups with several connections are included.
 pub(crate) fn repeated<'a, K: Ord>(
     junction: &Junction<'a>,
     key: impl Fn(&Connection<'a>) -> Option<K>,
@@ -23,7 +23,7 @@ pub(crate) fn repeated<'a, K: Ord>(
     groups.into_iter().collect()
 }
 
-/// Reports connections of which there may be one only, in the middle of the road that they lead to.
+/// Reports connections of which only one is allowed, in the middle of their target road.
 pub(crate) fn report_repeated(
     map: &RoadMap<'_>,
     text: String,
@@ -42,11 +42,11 @@ pub(crate) fn report_repeated(
     }
 }
 
-/// Reports connections with `contactPoint="…"` whose connecting road meets another road there than
-/// the incoming one.
+/// Reports connections with `contactPoint="…"` whose connecting road is linked at that end to
+/// another road than the incoming one.
 ///
-/// A connecting road that says nothing about that end is left to the rules about its links, unless
-/// its other end is the one that meets the incoming road.
+/// If a connecting road has no link at that end, the rules about its links report it. The exception
+/// is a road that meets the incoming road at its other end.
 pub(crate) fn contact_point_is_right(map: &RoadMap<'_>, end: ContactPoint, found: &mut Sink<'_>) {
     for (_, connection) in map.connections() {
         if connection.contact_point() != Some(end) || connection.is_virtual() {

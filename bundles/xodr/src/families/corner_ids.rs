@@ -1,4 +1,4 @@
-//! Ids of the corners of outlines.
+//! Checks of the ids of outline corners.
 
 use qcbus_document::Node;
 use qcbus_opendrive::RoadMap;
@@ -6,10 +6,10 @@ use qcbus_sdk::{Place, Sink, Version};
 
 use crate::families::object_parts::{Stands, named, objects, outlines};
 
-/// The first version that puts markings into outlines.
+/// First version in which outlines contain markings.
 const MARKINGS_IN_OUTLINES: Version = Version::new(1, 9);
 
-/// Reports an outline whose first corner of this sort has another id than zero.
+/// Reports outlines whose first corner of this kind has an id other than zero.
 pub(crate) fn first_is_zero(map: &RoadMap<'_>, sort: &str, found: &mut Sink<'_>) {
     for object in objects(map) {
         for outline in outlines(object) {
@@ -29,8 +29,8 @@ pub(crate) fn first_is_zero(map: &RoadMap<'_>, sort: &str, found: &mut Sink<'_>)
     }
 }
 
-/// Reports the first corner of an outline whose id does not follow the one before it. Says
-/// nothing where one of them has no id.
+/// Reports the first corner of an outline whose id does not follow the previous one. It reports
+/// nothing where one of the two corners has no id.
 pub(crate) fn are_sequential(map: &RoadMap<'_>, sort: &'static str, found: &mut Sink<'_>) {
     for object in objects(map) {
         for outline in outlines(object) {
@@ -82,7 +82,7 @@ pub(crate) fn are_mandatory(map: &RoadMap<'_>, sort: &'static str, found: &mut S
     }
 }
 
-/// Markings of the object that refer to corners of its only outline, as before 1.9.
+/// Returns the markings of the object that refer to corners of its only outline, as before 1.9.
 fn refers_to_corners(object: Node<'_>, version: Option<Version>) -> Option<Node<'_>> {
     let is_old = version.is_some_and(|version| version < MARKINGS_IN_OUTLINES);
     let is_only = outlines(object).nth(1).is_none();
@@ -94,7 +94,7 @@ fn refers_to_corners(object: Node<'_>, version: Option<Version>) -> Option<Node<
         .then_some(markings)
 }
 
-/// The id as a number; `None` when it is missing or none.
+/// Returns the id as a number, or `None` if it is missing or not a number.
 fn number_of(corner: Node<'_>) -> Option<i64> {
     corner.i64("id").ok()
 }

@@ -1,4 +1,4 @@
-//! Markings of objects and the outline points that they refer to.
+//! Markings of objects and the outline points to which they refer.
 
 use qcbus_document::Node;
 use qcbus_opendrive::RoadMap;
@@ -6,18 +6,18 @@ use qcbus_opendrive::RoadMap;
 use crate::families::ids::plain;
 use crate::families::object_parts::{corners, objects, outlines};
 
-/// A `<marking>` where it stands.
+/// A `<marking>` with the object and the outline that contain it.
 #[derive(Clone, Copy)]
 pub(crate) struct Marking<'a> {
-    /// The element.
+    /// The `<marking>` element.
     pub node: Node<'a>,
-    /// The object that is marked.
+    /// The marked object.
     pub object: Node<'a>,
-    /// The outline in which it stands; `None` for one of the object.
+    /// The outline that contains the marking, or `None` for a marking of the object.
     pub outline: Option<Node<'a>>,
 }
 
-/// The markings of objects and of their outlines.
+/// Returns the markings of objects and of their outlines.
 pub(crate) fn markings<'a>(map: &RoadMap<'a>) -> impl Iterator<Item = Marking<'a>> + use<'a> {
     objects(map).flat_map(|object| {
         let of_outlines = outlines(object).flat_map(move |outline| {
@@ -43,14 +43,14 @@ fn within(parent: Node<'_>) -> impl Iterator<Item = Node<'_>> {
 }
 
 impl<'a> Marking<'a> {
-    /// The corner references in document order.
+    /// Returns the corner references in document order.
     pub fn references(self) -> impl Iterator<Item = Node<'a>> {
         self.node.children_named("cornerReference")
     }
 
-    /// Its references as positions in its outline, with the outline's points; `None` unless it
-    /// stands in an outline, or in the only outline's object as before 1.9, and all of its
-    /// references can be resolved.
+    /// Returns the references as positions in the outline, with the points of the outline. The
+    /// outline is the one that contains the marking, or the only outline of the object, as before
+    /// 1.9. Returns `None` without such an outline or if a reference cannot be resolved.
     pub fn path(self) -> Option<Path<'a>> {
         let outline = match self.outline {
             Some(outline) => outline,
@@ -73,19 +73,19 @@ impl<'a> Marking<'a> {
     }
 }
 
-/// What a marking follows on its outline.
+/// The path of a marking along its outline.
 pub(crate) struct Path<'a> {
     /// The outline.
     pub outline: Node<'a>,
-    /// Its points.
+    /// The points of the outline.
     pub points: Vec<Node<'a>>,
-    /// Each reference with the position of its point.
+    /// Each corner reference with the position of its point.
     pub steps: Vec<(Node<'a>, usize)>,
 }
 
 impl Path<'_> {
-    /// Whether the outline says that it is closed; `None` when that follows from the object's
-    /// type.
+    /// Checks whether the outline is declared as closed. `None` means that the type of the object
+    /// decides.
     pub fn is_closed(&self) -> Option<bool> {
         match self.outline.attr("closed")?.trim() {
             "true" | "1" => Some(true),

@@ -6,25 +6,25 @@ use qcbus_sdk::{Level, Place, Sink};
 
 use crate::families::object_parts::{below, number};
 
-/// The records of roads and junctions; those of objects have attributes of their own.
+/// Returns the CRG records of roads and junctions. Those of objects have other attributes.
 pub(crate) fn records<'a>(map: &RoadMap<'a>) -> impl Iterator<Item = Node<'a>> + use<'a> {
     below(map, "CRG", "surface").filter(|record| parent(*record).is_some())
 }
 
-/// The road or junction of a record.
+/// Returns the road or junction of a record.
 pub(crate) fn parent(record: Node<'_>) -> Option<Node<'_>> {
     let parent = record.parent()?.parent()?;
     (parent.is("road") || parent.is("junction")).then_some(parent)
 }
 
-/// The record's purpose; elevation when it names none.
+/// Returns the purpose of the record. The default is elevation.
 pub(crate) fn purpose(record: Node<'_>) -> &str {
     record.attr("purpose").unwrap_or("elevation")
 }
 
-/// Reports attributes that a record of this mode or purpose must not have. One that says what
-/// its absence would mean does no harm and is reported as `harmless`. Findings carry `uid`, if it
-/// is not the rule's first.
+/// Reports attributes that a record with this mode or purpose must not have. An attribute with its
+/// default value is harmless and gets the level `harmless`. Findings have the UID `uid`, or the
+/// first UID of the rule.
 pub(crate) fn must_not_have(
     record: Node<'_>,
     attributes: &[(&str, f64)],

@@ -14,17 +14,17 @@ pub(crate) struct Crossing<'m, 'a> {
     pub road: &'m Road<'a>,
 }
 
-/// One end of a crossing road and the lane that it is linked to.
+/// One end of a crossing road and the lane to which it is linked.
 pub(crate) struct Landing<'m, 'a> {
     pub link: CrossPathLaneLink<'a>,
     pub end: ContactPoint,
-    /// The road that is met, and where.
+    /// The crossed road; `s` is the position on it.
     pub other: &'m Road<'a>,
     pub s: f64,
     pub lane: i64,
 }
 
-/// All cross paths whose road exists.
+/// Returns all cross paths whose crossing road exists.
 pub(crate) fn crossings<'m, 'a>(map: &'m RoadMap<'a>) -> impl Iterator<Item = Crossing<'m, 'a>> {
     map.junctions().iter().flat_map(move |junction| {
         junction.cross_paths().filter_map(move |path| {
@@ -39,7 +39,7 @@ pub(crate) fn crossings<'m, 'a>(map: &'m RoadMap<'a>) -> impl Iterator<Item = Cr
 }
 
 impl<'m, 'a> Crossing<'m, 'a> {
-    /// The landings whose link is complete.
+    /// Returns the landings whose link is complete.
     pub fn landings(&self, map: &'m RoadMap<'a>) -> impl Iterator<Item = Landing<'m, 'a>> {
         ContactPoint::BOTH.into_iter().filter_map(|end| {
             let link = self.path.lane_link(end)?;
@@ -53,7 +53,7 @@ impl<'m, 'a> Crossing<'m, 'a> {
         })
     }
 
-    /// The middle of a lane at an end of the crossing road.
+    /// Returns the middle of a lane at an end of the crossing road.
     pub fn middle(&self, end: ContactPoint, lane: i64) -> Option<Point> {
         let side = Side::of_lane_id(lane)?;
         let section = self.road.permanent()?.end_section(self.road, side, end)?;
@@ -64,7 +64,7 @@ impl<'m, 'a> Crossing<'m, 'a> {
         Point::finite(0.5 * (inner.x + outer.x), 0.5 * (inner.y + outer.y))
     }
 
-    /// Both corners of the crossing road at one of its ends.
+    /// Returns both corners of the crossing road at one of its ends.
     pub fn corners(&self, end: ContactPoint) -> Option<[Point; 2]> {
         let pose = self.road.end_pose(end)?;
         let corner = |side: Side| {
@@ -84,8 +84,8 @@ impl<'m, 'a> Crossing<'m, 'a> {
 }
 
 impl Landing<'_, '_> {
-    /// s and t of a point near the landing on the road that is met. The road is followed from
-    /// `@s` to the foot of the perpendicular in a few steps.
+    /// Returns s and t on the crossed road for a point near the landing. It moves along the road
+    /// from `@s` to the foot of the perpendicular in a few steps.
     pub fn project(&self, point: Point) -> Option<(f64, f64)> {
         let length = self.other.length().filter(|length| *length >= 0.0)?;
         let mut s = self.s;
@@ -100,7 +100,7 @@ impl Landing<'_, '_> {
         Some((s, left))
     }
 
-    /// The extent in t of the linked lane at s, lesser first.
+    /// Returns the extent in t of the linked lane at s, smaller value first.
     pub fn span(&self, s: f64) -> Option<[f64; 2]> {
         let side = Side::of_lane_id(self.lane)?;
         let end = self.other.length()?;

@@ -1,4 +1,4 @@
-//! Parametric curves whose length is not the one that their geometry says (OpenDRIVE 1.9, 9.6).
+//! Checks the length of parametric curves against their geometry (OpenDRIVE 1.9, 9.6).
 
 use qcbus_opendrive::geometry::{ParamPoly3, ParamRange};
 use qcbus_opendrive::{Geometry, MapPart, Road};
@@ -6,7 +6,7 @@ use qcbus_sdk::{Param, Place, Sink};
 
 use super::on_road::OnRoad;
 
-/// How far both lengths may differ.
+/// Maximum difference between the two lengths.
 pub(crate) const LENGTH_TOLERANCE: Param = Param::number(
     "length_tolerance",
     0.001,
@@ -14,8 +14,8 @@ pub(crate) const LENGTH_TOLERANCE: Param = Param::number(
     "largest difference between the curve's length and `@length` that is accepted",
 );
 
-/// Reports curves of this range whose parameter does not run as far as `@pRange` says: integrated
-/// over the range, the curve is not `@length` long.
+/// Reports curves with this explicit `@pRange` whose length over the parameter range is not
+/// `@length`.
 pub(crate) fn range_fits(part: MapPart<'_, '_>, range: ParamRange, found: &mut Sink<'_>) {
     for_each_mismatch(part, found, |curve, mismatch, found| {
         if curve.range != range
@@ -43,8 +43,8 @@ pub(crate) fn range_fits(part: MapPart<'_, '_>, range: ParamRange, found: &mut S
     });
 }
 
-/// Reports curves with a normalized parameter, said or by default, whose length is not `@length`.
-/// Those with `arcLength` are said to have the wrong range instead.
+/// Reports curves with a normalized parameter, explicit or by default, whose length is not
+/// `@length`. Curves with `arcLength` are reported for their wrong range instead.
 pub(crate) fn length_matches(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
     for_each_mismatch(part, found, |curve, mismatch, found| {
         if curve.range == ParamRange::Normalized {
@@ -92,7 +92,7 @@ fn for_each_mismatch<'d>(
     }
 }
 
-/// The other range's name, if the curve has the right length over that one.
+/// Returns the name of the other range if the curve has the right length over that range.
 fn other_range(
     curve: &ParamPoly3,
     mismatch: &Mismatch<'_, '_>,

@@ -1,5 +1,5 @@
-//! Lanes of a direct junction that share their space: two that begin in one lane, or end in one (OpenDRIVE
-//! 1.9, 12.6).
+//! Lanes of a direct junction that share their space, because they begin or end in the same lane
+//! (OpenDRIVE 1.9, 12.6).
 
 use std::collections::BTreeMap;
 
@@ -11,23 +11,23 @@ use qcbus_opendrive::{
 
 use super::strips::{Patch, area, common, strip};
 
-/// What holds where `overlapZone` is missing, in metres.
+/// Default of `overlapZone`, in metres.
 pub(crate) const DEFAULT_ZONE: f64 = 100.0;
 
-/// How far beyond the overlap zone lanes are followed, and in which steps, in metres.
+/// Distance to follow lanes beyond the overlap zone, in metres; the step follows.
 const BEYOND: f64 = 100.0;
 const STEP: f64 = 1.0;
 const SHRINK: f64 = 0.05;
 
-/// Pieces that are farther apart along their lanes than this many do not meet.
+/// Maximum distance of two pieces along their lanes. Pieces farther apart do not meet.
 const WINDOW: usize = 12;
 
-/// More lanes than this do not begin in one.
+/// Maximum number of lanes that begin in one lane.
 const MOST: usize = 4;
 
-/// A lane that shares its space with another one of the junction.
+/// A lane that shares its space with another lane of the junction.
 pub(crate) struct Arm<'m, 'a> {
-    /// The `<laneLink>` to it.
+    /// The `<laneLink>` that leads to the lane.
     pub link: Node<'a>,
     pub lane: LaneRef<'m, 'a>,
     /// The end of its road at the junction.
@@ -35,28 +35,28 @@ pub(crate) struct Arm<'m, 'a> {
     course: Vec<Course<'m, 'a>>,
 }
 
-/// Two such lanes.
+/// Two lanes that share their space.
 pub(crate) struct SharedSpace<'m, 'a> {
     pub arms: [Arm<'m, 'a>; 2],
-    /// How far along either one they share their space, in metres from the junction.
+    /// Length of the shared space along each lane, in metres from the junction.
     pub lengths: [f64; 2],
-    /// Places that both cover, with s and t on either road.
+    /// Places that both lanes cover, as s and t on each road.
     pub places: Vec<[(f64, f64); 2]>,
 }
 
-/// A lane within one lane section, with its pieces.
+/// The part of a lane within one lane section, with its pieces.
 struct Course<'m, 'a> {
     lane: LaneRef<'m, 'a>,
     patches: Vec<Patch>,
 }
 
-/// All pairs of lanes that share their space at direct junctions.
+/// Returns all pairs of lanes that share their space at direct junctions.
 pub(crate) fn shared_spaces<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<SharedSpace<'m, 'a>> {
     let direct = |joint: &&LaneJoint<'_>| {
         let junction = joint.junction.and_then(|at| map.junctions().get(at));
         junction.is_some_and(|one| one.kind() == Some(JunctionType::Direct))
     };
-    // By the lane that they begin or end in: the lanes with their links.
+    // Key: the lane end in which the lanes begin or end. Value: these lanes with their links.
     let mut groups: BTreeMap<LaneEnd, Vec<(LaneEnd, Node<'a>)>> = BTreeMap::new();
     for joint in map.junction_joints().iter().filter(direct) {
         for (one, other) in [(joint.from, joint.to), (joint.to, joint.from)] {
@@ -83,7 +83,7 @@ pub(crate) fn shared_spaces<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<SharedSpace<'m,
     all
 }
 
-/// The overlap zone that a lane link states.
+/// Returns the overlap zone of a lane link.
 pub(crate) fn zone(link: Node<'_>) -> Option<f64> {
     link.f64("overlapZone").ok().filter(|zone| zone.is_finite())
 }
@@ -99,7 +99,7 @@ fn arm<'m, 'a>(map: &'m RoadMap<'a>, (end, link): (LaneEnd, Node<'a>)) -> Option
     })
 }
 
-/// Follows a lane away from the junction, over lane sections as long as exactly one lane goes on.
+/// Follows a lane away from the junction while exactly one lane continues it.
 fn course<'m, 'a>(lane: LaneRef<'m, 'a>, end: ContactPoint, reach: f64) -> Vec<Course<'m, 'a>> {
     let mut all = Vec::new();
     let (mut next, mut left) = (Some(lane), reach);
@@ -163,7 +163,7 @@ fn shared_space<'m, 'a>(arms: [Arm<'m, 'a>; 2]) -> Option<SharedSpace<'m, 'a>> {
             }
             places.extend(place(one, other, &shape));
         }
-        // What meets again farther on is no matter of this junction.
+        // Lanes that meet again farther on do not concern this junction.
         if !any && at > 1 {
             break;
         }
@@ -189,7 +189,7 @@ impl<'m, 'a> Arm<'m, 'a> {
         self.lane.at.road
     }
 
-    /// The height of the lane's surface at (s, t) of its road.
+    /// Returns the height of the lane's surface at (s, t) of its road.
     pub fn height(&self, (s, t): (f64, f64)) -> Option<f64> {
         let holds = |course: &&Course<'_, '_>| {
             let range = course.lane.at.s().zip(course.lane.length());

@@ -1,14 +1,14 @@
-//! Which lanes are for driving.
+//! Classification of lanes as drivable.
 
 use qcbus_opendrive::LaneRef;
 
 use super::routes::is_route;
 
-/// Whether a lane is one that vehicles drive on, as annex D.1 lists them, deprecated types included: those along
-/// which routes lead, and those that are driven on now and then.
+/// Checks whether vehicles drive on a lane according to annex D.1, deprecated types included. These
+/// are the lanes of routes and the lanes on which vehicles drive occasionally.
 pub(crate) fn is_drivable(lane: LaneRef<'_, '_>) -> bool {
     match lane.kind() {
-        // Only where bicycles share the lane with others.
+        // A biking lane is drivable only if bicycles share it with other traffic.
         Some("biking") => lane.advisory().is_some_and(|advisory| advisory != "none"),
         Some("border" | "stop" | "restricted") => true,
         _ => is_route(lane),

@@ -1,21 +1,21 @@
-//! Borders of lanes as polynomials over s, to find extremes without sampling (OpenDRIVE 1.9, 11.5,
-//! 11.7).
+//! Borders of lanes as polynomials over s, for finding extremes without sampling (OpenDRIVE 1.9,
+//! 11.5, 11.7).
 
 use qcbus_opendrive::geometry::{Cubic, Minimum};
 use qcbus_opendrive::{Profile, SectionRef, Side};
 
-/// A stretch over which a value is one cubic polynomial in the distance from `from`.
+/// A stretch on which a value is one cubic polynomial in the distance from `from`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Piece {
-    /// s where it starts, in metres.
+    /// s of the start, in metres.
     pub from: f64,
-    /// s where it ends.
+    /// s of the end, in metres.
     pub to: f64,
     pub cubic: Cubic,
 }
 
 impl Piece {
-    /// The lowest value, with its s.
+    /// Returns the lowest value with its s.
     pub fn minimum(&self) -> Option<Minimum> {
         let low = self.cubic.minimum(0.0, self.to - self.from)?;
         Some(Minimum {
@@ -24,7 +24,7 @@ impl Piece {
         })
     }
 
-    /// The highest value, with its s.
+    /// Returns the highest value with its s.
     pub fn maximum(&self) -> Option<Minimum> {
         let high = self.cubic.maximum(0.0, self.to - self.from)?;
         Some(Minimum {
@@ -33,7 +33,7 @@ impl Piece {
         })
     }
 
-    /// The value of greatest magnitude, with its s.
+    /// Returns the value with the greatest magnitude, with its s.
     pub fn farthest(&self) -> Option<Minimum> {
         let (low, high) = (self.minimum()?, self.maximum()?);
         Some(if low.value.abs() > high.value.abs() {
@@ -43,7 +43,7 @@ impl Piece {
         })
     }
 
-    /// The same polynomial seen from `from`, up to `to`.
+    /// Returns the same polynomial from `from` to `to`.
     fn cut(&self, from: f64, to: f64) -> Piece {
         Piece {
             from,
@@ -53,7 +53,7 @@ impl Piece {
     }
 }
 
-/// The sum of two polynomials.
+/// Returns the sum of two polynomials.
 pub(crate) fn sum(one: Cubic, other: Cubic) -> Cubic {
     Cubic::new(
         one.a + other.a,
@@ -63,8 +63,8 @@ pub(crate) fn sum(one: Cubic, other: Cubic) -> Cubic {
     )
 }
 
-/// t of the outer border of the `count`-th lane of a side, counted from the center: with 0 that of
-/// the center lane. Stretches where a lane has no width or border are left out.
+/// Returns t of the outer border of the `count`-th lane of a side, counted from the center, which
+/// is 0. Stretches where a lane has no width or border are left out.
 pub(crate) fn border(section: SectionRef<'_, '_>, side: Side, count: usize) -> Vec<Piece> {
     let (Some(start), Some(end)) = (section.s(), section.end(side)) else {
         return Vec::new();
@@ -73,8 +73,8 @@ pub(crate) fn border(section: SectionRef<'_, '_>, side: Side, count: usize) -> V
         return Vec::new();
     }
     let lanes: Vec<_> = section.side(side).take(count).collect();
-    // Each profile with the place from which its records count, its sign, and whether it is zero
-    // where it says nothing.
+    // Each profile has the origin of its records, its sign, and a flag. The flag tells whether the
+    // value is zero where the profile has no record.
     let mut parts: Vec<(&Profile<'_>, f64, f64, bool)> = Vec::new();
     if section.has_widths(side) || count == 0 {
         parts.push((section.layer.offset(), 0.0, 1.0, true));
@@ -113,7 +113,7 @@ pub(crate) fn border(section: SectionRef<'_, '_>, side: Side, count: usize) -> V
     pieces.collect()
 }
 
-/// Two lists of pieces in ascending order, combined where both say something.
+/// Combines two lists of pieces in ascending order, on the stretches that both cover.
 pub(crate) fn combine(
     ones: &[Piece],
     others: &[Piece],

@@ -2,7 +2,7 @@
 
 use qcbus_opendrive::{RoadMap, Signal};
 
-/// The id of the gantry that a signal says it is mounted on.
+/// Returns the id of the gantry to which a signal refers as its mount.
 pub(crate) fn gantry_of<'a>(map: &RoadMap<'a>, signal: &Signal<'a>) -> Option<&'a str> {
     let objects = signal
         .references()

@@ -1,14 +1,14 @@
-//! How bad it is that two things do not meet, from what is missing and the version. The table is in
-//! `docs/gaps.md`.
+//! Severity of gaps, steps and kinks, by size and version. The table is in `docs/gaps.md`.
 //!
-//! Every rule about a gap, a step or a kink says something from its own tolerance on. What is above that
-//! and below `…_error_from` is a warning: no simulator minds. From there on it is an error where the
-//! standard demands that things meet, and one less in files of older versions. What nobody can drive over
-//! as it is written, a lane that goes on metres beside itself, is an error in every version.
+//! Every rule about a gap, a step or a kink reports above its own tolerance. Values below
+//! `…_error_from` are warnings, because simulators tolerate them. From there on they are errors
+//! where the standard requires that things meet. In files of older versions the level is one lower.
+//! A lane that continues metres beside its end cannot be driven on. This is an error in every
+//! version.
 
 use qcbus_sdk::{Finding, Level, Param, Sink};
 
-/// Gaps in the plan view.
+/// Limits for gaps in the plan view.
 pub(crate) const GAP_ERROR_FROM: Param = Param::number(
     "gap_error_from",
     0.1,
@@ -22,7 +22,7 @@ pub(crate) const GAP_BROKEN_FROM: Param = Param::number(
     "from this distance on, what should meet does not at all, which is an error in every version",
 );
 
-/// Steps in height.
+/// Limits for steps in height.
 pub(crate) const STEP_ERROR_FROM: Param = Param::number(
     "step_error_from",
     0.1,
@@ -36,7 +36,7 @@ pub(crate) const STEP_BROKEN_FROM: Param = Param::number(
     "steps from this height on are errors in every version",
 );
 
-/// Changes of direction, in plan view and crossfall.
+/// Limit for changes of direction, in plan view and crossfall.
 pub(crate) const KINK_ERROR_FROM: Param = Param::number(
     "kink_error_from",
     0.2,
@@ -44,32 +44,32 @@ pub(crate) const KINK_ERROR_FROM: Param = Param::number(
     "kinks from this angle on are errors where the standard demands that there are none",
 );
 
-/// How bad a misfit is.
+/// Severity of a misfit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Misfit {
-    /// More than the tolerance, and less than anybody minds.
+    /// Above the tolerance, but harmless.
     Slight,
-    /// An error where the standard demands that there is none.
+    /// An error where the standard requires a continuous transition.
     Plain,
     /// An error in every version.
     Broken,
 }
 
 impl Misfit {
-    /// A gap in the plan view. `widest` is the worst that is there; `whole` is how far apart the two things
-    /// lie as a whole, when the worst may be no more than a corner of it.
+    /// Classifies a gap in the plan view. `widest` is the largest gap. `whole` is the distance
+    /// between the two things as a whole, because the largest gap may affect only a corner.
     pub fn gap(widest: f64, whole: f64, found: &Sink<'_>) -> Misfit {
         let from = [&GAP_ERROR_FROM, &GAP_BROKEN_FROM].map(|param| found.number(param));
         Misfit::of(widest, whole, from)
     }
 
-    /// A step in height.
+    /// Classifies a step in height.
     pub fn step(height: f64, found: &Sink<'_>) -> Misfit {
         let from = [&STEP_ERROR_FROM, &STEP_BROKEN_FROM].map(|param| found.number(param));
         Misfit::of(height, height, from)
     }
 
-    /// A kink. It can be driven somehow: no angle is an error in versions that allow it.
+    /// Classifies a kink. Every kink can be driven, so older versions allow any angle.
     pub fn kink(angle: f64, found: &Sink<'_>) -> Misfit {
         let from = [found.number(&KINK_ERROR_FROM), f64::INFINITY];
         Misfit::of(angle, angle, from)
@@ -85,7 +85,7 @@ impl Misfit {
         }
     }
 
-    /// Gives a finding the level that is due.
+    /// Sets the level of a finding according to the misfit.
     pub fn put<'s, 'd>(self, finding: Finding<'s, 'd>) -> Finding<'s, 'd> {
         match self {
             Misfit::Broken => finding.in_every_version(Level::Error),

@@ -1,11 +1,11 @@
-//! In which form a `geoReference` is written. The standard asks for a PROJ string; what PROJ reads besides, such as
-//! well-known text and codes of EPSG, is found in maps as well and does no harm where PROJ itself reads the map.
+//! Checks the form of a `geoReference`. The standard requires a PROJ string. Other forms, such as
+//! well-known text and EPSG codes, are harmless where PROJ itself reads the map.
 
 use qcbus_sdk::Level;
 
 use super::proj_string::{self, Flaw};
 
-/// The names with which well-known text begins; the last ones give degrees, no plane.
+/// Names at the start of well-known text. The last ones give degrees, not a plane.
 const WKT: &[&str] = &[
     "PROJCS",
     "PROJCRS",
@@ -27,13 +27,13 @@ const WKT_IN_DEGREES: &[&str] = &[
     "GEOCCS",
 ];
 
-/// Those who give codes for reference systems that PROJ knows.
+/// Authorities for codes of reference systems that PROJ knows.
 const AUTHORITIES: &[&str] = &["EPSG", "ESRI", "IGNF", "IAU_2015", "NKG", "OGC"];
 
-/// Codes of EPSG for coordinates in degrees: WGS 84, with height, ETRS89, NAD83.
+/// EPSG codes for coordinates in degrees: WGS 84, with height, ETRS89, NAD83.
 const DEGREES: &[u32] = &[4326, 4979, 4258, 4269];
 
-/// What is wrong with the text of a `geoReference` that is not empty.
+/// Returns the faults in the text of a `geoReference` that is not empty.
 pub(crate) fn flaws(text: &str) -> Vec<Flaw> {
     if text.starts_with("<![CDATA[") {
         return vec![warning(format!(
@@ -81,7 +81,7 @@ fn wkt(text: &str) -> Option<Flaw> {
     })
 }
 
-/// A code of a system, such as `EPSG:25832`, which `+init=` takes as well.
+/// Checks a code of a reference system, such as `EPSG:25832`, which `+init=` accepts as well.
 pub(crate) fn code(text: &str) -> Option<Flaw> {
     let lower = text.to_ascii_lowercase();
     if lower.starts_with("urn:ogc:def:crs:") || lower.contains("opengis.net/def/crs/") {
@@ -129,7 +129,7 @@ fn warning(text: String) -> Flaw {
     }
 }
 
-/// The beginning of a long text.
+/// Returns the beginning of a long text.
 fn short(text: &str) -> String {
     let mut letters = text.chars();
     let start: String = letters.by_ref().take(40).collect();

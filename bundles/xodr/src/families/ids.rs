@@ -1,9 +1,9 @@
-//! What has an id, and what refers to it.
+//! Elements with an id and the references to them.
 
 use qcbus_document::{Document, Node};
 use qcbus_opendrive::is_user_data;
 
-/// A kind of element that carries an id.
+/// A kind of element that has an id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Class {
     Road,
@@ -27,22 +27,22 @@ pub(crate) enum Class {
     Vertex,
 }
 
-/// Where the ids of a class must be unique.
+/// Scope in which the ids of a class must be unique.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Scope {
-    /// In the whole file.
+    /// The whole file.
     File,
-    /// Within the nearest ancestor of this name.
+    /// The nearest ancestor with this name.
     Within(&'static str),
 }
 
-/// How elements of a class are recognised: elements of these names below one of these parents.
+/// Elements of a class: elements with these names below one of these parents.
 pub(crate) struct Kind {
     pub class: Class,
-    /// For texts: `road`, `signal`.
+    /// Name for texts: `road`, `signal`.
     pub name: &'static str,
     pub elements: &'static [&'static str],
-    /// Elements of the same name elsewhere are references or something else. Empty: anywhere.
+    /// Allowed parents; empty means any. Elsewhere, the name is a reference or something else.
     pub parents: &'static [&'static str],
     pub scope: Scope,
 }
@@ -63,7 +63,7 @@ const fn kind(
     }
 }
 
-/// Every class. Lanes are not among them: their numbers have rules of their own.
+/// All classes. Lanes are not included, because separate rules check their numbers.
 pub(crate) const KINDS: &[Kind] = &[
     kind(Class::Road, "road", &["road"], &["OpenDRIVE"], Scope::File),
     kind(
@@ -80,7 +80,7 @@ pub(crate) const KINDS: &[Kind] = &[
         &["OpenDRIVE"],
         Scope::File,
     ),
-    // A `controller` of a junction refers to one.
+    // A `controller` of a junction is a reference to one.
     kind(
         Class::Controller,
         "controller",
@@ -195,8 +195,8 @@ pub(crate) const KINDS: &[Kind] = &[
     ),
 ];
 
-/// A number as it is: outlines and their points have whole numbers for ids, of which `0` and `00`
-/// are the same.
+/// Returns a whole number without leading zeros. Outlines and their points have whole numbers as
+/// ids, so `0` and `00` are the same.
 pub(crate) fn plain(id: &str) -> &str {
     let id = id.trim();
     if id.is_empty() || !id.bytes().all(|byte| byte.is_ascii_digit()) {
@@ -207,7 +207,7 @@ pub(crate) fn plain(id: &str) -> &str {
 }
 
 impl Kind {
-    /// The kind of a class.
+    /// Returns the kind of a class.
     pub fn of(class: Class) -> &'static Kind {
         KINDS
             .iter()
@@ -215,7 +215,7 @@ impl Kind {
             .unwrap_or(&KINDS[0])
     }
 
-    /// The elements of this kind in document order, those without an id included.
+    /// Returns the elements of this kind in document order, including those without an id.
     pub fn nodes<'d>(&self, document: &Document<'d>) -> Vec<Node<'d>> {
         let mut nodes: Vec<Node<'d>> = self
             .elements
@@ -233,7 +233,7 @@ impl Kind {
         nodes
     }
 
-    /// The element within which a node's id must be unique; `None` for the whole file.
+    /// Returns the element within which a node's id must be unique, or `None` for the whole file.
     pub fn home<'d>(&self, node: Node<'d>) -> Option<Node<'d>> {
         match self.scope {
             Scope::File => None,

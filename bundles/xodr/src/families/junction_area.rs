@@ -1,5 +1,5 @@
-//! The boundary of a junction as a ring of points, and its reference line (OpenDRIVE 1.9, 12.9 to
-//! 12.11).
+//! Boundary of a junction as a closed ring of points, and reference line of a junction (OpenDRIVE
+//! 1.9, 12.9 to 12.11).
 
 use qcbus_opendrive::geometry::{Placed, Point};
 use qcbus_opendrive::{
@@ -9,7 +9,7 @@ use qcbus_opendrive::{
 /// Distance between samples along a border, in metres.
 const SPACING: f64 = 1.0;
 
-/// No more samples than this are taken along one segment.
+/// Maximum number of samples along one segment.
 const MOST_SAMPLES: f64 = 64.0;
 
 /// A segment of a boundary with the points along it.
@@ -28,7 +28,7 @@ impl Stretch<'_> {
     }
 }
 
-/// The boundary of a junction; `None` without one, or when a segment cannot be evaluated.
+/// Returns the boundary of a junction, or `None` without one or if a segment is invalid.
 pub(crate) fn boundary<'a>(map: &RoadMap<'a>, junction: &Junction<'a>) -> Option<Vec<Stretch<'a>>> {
     let segments = junction.boundary()?.segments();
     let mut stretches = segments
@@ -41,7 +41,7 @@ pub(crate) fn boundary<'a>(map: &RoadMap<'a>, junction: &Junction<'a>) -> Option
     (!stretches.is_empty()).then_some(stretches)
 }
 
-/// The points of a boundary in order. Gaps are bridged by straight lines.
+/// Returns the points of a boundary in order. Straight lines bridge gaps.
 pub(crate) fn ring(stretches: &[Stretch<'_>]) -> Vec<Point> {
     stretches
         .iter()
@@ -49,9 +49,9 @@ pub(crate) fn ring(stretches: &[Stretch<'_>]) -> Vec<Point> {
         .collect()
 }
 
-/// Twice the signed area of a ring, positive when it runs counter-clockwise.
+/// Returns twice the signed area of a ring, positive if it runs counter-clockwise.
 pub(crate) fn doubled_area(ring: &[Point]) -> f64 {
-    // Relative to the first point, so that far from the origin no digits are lost.
+    // Coordinates relative to the first point lose no digits far from the origin.
     let Some(base) = ring.first() else { return 0.0 };
     super::polygons::sides(ring)
         .map(|(a, b)| (a.x - base.x) * (b.y - base.y) - (b.x - base.x) * (a.y - base.y))
@@ -82,7 +82,7 @@ fn along_lane(road: &Road<'_>, segment: BoundarySegment<'_>) -> Option<Vec<Point
         .collect()
 }
 
-/// The outer border of a lane, or the center lane's line.
+/// Returns a point on the outer border of a lane, or on the line of the center lane.
 fn outer_border(road: &Road<'_>, id: i64, s: f64) -> Option<Point> {
     let side = Side::of_lane_id(id).unwrap_or(Side::Right);
     let end = road.length()?;
@@ -103,8 +103,8 @@ fn outer_border(road: &Road<'_>, id: i64, s: f64) -> Option<Point> {
     Some(lane.border(Edge::Outer, ds)?.point.plan())
 }
 
-/// Straight across the end of a road, over all lanes from the first to the second one; without
-/// lanes from edge to edge.
+/// Returns the straight line across the end of a road, over all lanes from the first to the second
+/// one. Without given lanes it runs from edge to edge.
 fn across(road: &Road<'_>, segment: BoundarySegment<'_>) -> Option<Vec<Point>> {
     let end = segment.contact_point()?;
     let s = road.end_s(end)?;
@@ -115,8 +115,8 @@ fn across(road: &Road<'_>, segment: BoundarySegment<'_>) -> Option<Vec<Point>> {
     };
     let from = segment.joint_lane_start().or_else(|| last(Side::Right))?;
     let to = segment.joint_lane_end().or_else(|| last(Side::Left))?;
-    // With both lanes on one side, the nearer one is crossed from its inner border on, which is
-    // the outer border of its inner neighbour.
+    // If both lanes are on one side, the line starts at the inner border of the nearer lane. That
+    // is the outer border of its inner neighbour.
     let same_side = from != 0 && from.signum() == to.signum();
     let nearer = |id: i64, other: i64| {
         if same_side && id.unsigned_abs() <= other.unsigned_abs() {
@@ -132,7 +132,7 @@ fn across(road: &Road<'_>, segment: BoundarySegment<'_>) -> Option<Vec<Point>> {
     ])
 }
 
-/// In which direction a joint without lanes, or across a single one, runs, only its neighbours tell.
+/// Sets the direction of joints without lanes or with a single one from their neighbours.
 fn turn_joints(stretches: &mut [Stretch<'_>]) {
     for at in 0..stretches.len() {
         let segment = stretches[at].segment;
@@ -154,7 +154,7 @@ fn turn_joints(stretches: &mut [Stretch<'_>]) {
     }
 }
 
-/// The line of a junction's reference line, if it is one line.
+/// Returns the reference line of a junction if it is a single line.
 pub(crate) fn reference_line(junction: &Junction<'_>) -> Option<Placed> {
     match junction.plan_view().geometries() {
         [only] if only.kind() == Some(qcbus_opendrive::ShapeKind::Line) => only.placed(),
@@ -162,7 +162,7 @@ pub(crate) fn reference_line(junction: &Junction<'_>) -> Option<Placed> {
     }
 }
 
-/// s and t of a point beside a straight line.
+/// Returns s and t of a point beside a straight line.
 pub(crate) fn beside(line: &Placed, point: Point) -> (f64, f64) {
     let (sin, cos) = line.hdg.sin_cos();
     let (dx, dy) = (point.x - line.origin.x, point.y - line.origin.y);

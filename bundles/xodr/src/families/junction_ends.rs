@@ -1,18 +1,18 @@
-//! Which road ends meet at a junction, and which of them it connects.
+//! Road ends that meet at a junction, and the pairs that the junction connects.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use qcbus_opendrive::{Junction, JunctionType, RoadEnd, RoadMap};
 
-/// The pairs of road ends that a junction connects, whichever way they are written.
+/// The pairs of road ends that a junction connects, in either order.
 pub(crate) struct Meeting {
     pairs: BTreeSet<(RoadEnd, RoadEnd)>,
 }
 
 impl Meeting {
-    /// Reads the connections of a common or direct junction. `None` when one of them cannot be
-    /// followed from the incoming road to the road on the other side; then nobody knows what the
-    /// junction is for.
+    /// Reads the connections of a common or direct junction. Returns `None` if one of them cannot
+    /// be followed from the incoming road to the road on the other side. Then the purpose of the
+    /// junction is unknown.
     pub fn of<'a>(map: &RoadMap<'a>, junction: &Junction<'a>) -> Option<Meeting> {
         let mut pairs = BTreeSet::new();
         for connection in junction.connections() {
@@ -31,12 +31,12 @@ impl Meeting {
         Some(Meeting { pairs })
     }
 
-    /// The pairs, without repetition.
+    /// Returns the pairs without repetition.
     pub fn pairs(&self) -> impl Iterator<Item = (RoadEnd, RoadEnd)> {
         self.pairs.iter().copied()
     }
 
-    /// Each road end with those that it is connected to.
+    /// Returns each road end with the road ends to which it is connected.
     pub fn partners(&self) -> BTreeMap<RoadEnd, BTreeSet<RoadEnd>> {
         let mut partners: BTreeMap<RoadEnd, BTreeSet<RoadEnd>> = BTreeMap::new();
         for (one, other) in self.pairs() {
@@ -47,8 +47,8 @@ impl Meeting {
     }
 }
 
-/// The road end that a connecting road leads to when it is entered at `entry`. `None` when it has
-/// no link there, or one that stays within the junction.
+/// Returns the road end to which a connecting road leads from `entry`. Returns `None` if it has no
+/// link there or the link stays within the junction.
 fn beyond(map: &RoadMap<'_>, junction: &Junction<'_>, entry: RoadEnd) -> Option<RoadEnd> {
     let connecting = map.road_at(entry.road)?;
     let far = map.linked_end(connecting, entry.end.other())?.to;
@@ -56,7 +56,7 @@ fn beyond(map: &RoadMap<'_>, junction: &Junction<'_>, entry: RoadEnd) -> Option<
     (!stays).then_some(far)
 }
 
-/// A road end for a text: `road 5 (start)`, the id in backticks.
+/// Returns a road end as text: `road 5 (start)`, with the id in backticks.
 pub(crate) fn name(map: &RoadMap<'_>, end: RoadEnd) -> String {
     let id = map.road_at(end.road).map_or("?", |road| road.id());
     format!("road `{id}` ({})", end.end)

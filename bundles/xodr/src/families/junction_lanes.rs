@@ -1,4 +1,4 @@
-//! What junctions do with the lanes around them.
+//! Use of the surrounding lanes by junctions.
 
 use foldhash::HashSet;
 use qcbus_opendrive::{
@@ -8,13 +8,13 @@ use qcbus_opendrive::{
 
 use super::routes::{is_route, lanes_at};
 
-/// Which lanes around junctions are taken up, or led to.
+/// Lanes around junctions that are used by a connection.
 pub(crate) struct Used<'a> {
     /// The lane ends from or to which a lane of a junction leads.
     lanes: HashSet<LaneEnd>,
-    /// Junctions and the roads of which a connection takes up all lanes, because it has no lane links.
+    /// Junctions and roads with all lanes in use, because a connection has no lane links.
     whole: HashSet<(usize, &'a str)>,
-    /// The road ends to which lanes of connecting roads lead that do not say to which lane.
+    /// Road ends at which lanes of connecting roads end without a link to a lane.
     open: HashSet<RoadEnd>,
 }
 
@@ -25,7 +25,7 @@ impl<'a> Used<'a> {
             whole: HashSet::default(),
             open: HashSet::default(),
         };
-        // Of the roads of junctions nobody asks.
+        // Only lanes of roads outside junctions are looked up later.
         let roads = map.roads().iter();
         let outside: Vec<bool> = roads.map(|road| road.junction().is_none()).collect();
         let is_outside = |end: &LaneEnd| {
@@ -57,7 +57,7 @@ impl<'a> Used<'a> {
         used
     }
 
-    /// Takes up the lanes that lane links name as `from`. Where they lead may not exist, which is said elsewhere.
+    /// Adds the lanes in `from` of lane links. Another rule reports a target that does not exist.
     fn take_up(
         &mut self,
         map: &RoadMap<'a>,
@@ -66,7 +66,7 @@ impl<'a> Used<'a> {
     ) {
         let target = connection.target_road().and_then(|id| map.road(id));
         let touches = map.ends_at(junction, road);
-        // With both ends at the junction, the road that follows tells which is meant.
+        // If both ends touch the junction, the target road determines which end is meant.
         if touches == [true, true] && target.is_some() {
             return;
         }
@@ -83,12 +83,12 @@ impl<'a> Used<'a> {
         }
     }
 
-    /// Whether a connection takes up all lanes of a road, or leads to all.
+    /// Checks whether a connection uses all lanes of a road or leads to all of them.
     pub fn is_whole(&self, junction: &Junction<'a>, road: &Road<'a>) -> bool {
         self.whole.contains(&(junction.index(), road.id()))
     }
 
-    /// Whether nobody knows which lanes of a road end the junction leads to.
+    /// Checks whether it is unknown to which lanes of a road end the junction leads.
     pub fn is_open(&self, end: RoadEnd) -> bool {
         self.open.contains(&end)
     }
@@ -99,13 +99,13 @@ impl<'a> Used<'a> {
     }
 }
 
-/// Whether a lane leads out of a connecting road there and does not say where to.
+/// Checks whether a lane leads out of a connecting road at this end without a link to a lane.
 fn is_open(road: &Road<'_>, end: ContactPoint) -> bool {
     let mut lanes = lanes_at(road, end).filter(|lane| is_route(*lane));
     lanes.any(|lane| Traffic::of(lane).may_run_towards(end) && lane.links(end).next().is_none())
 }
 
-/// The ends of roads outside of junctions that are linked to a junction which cuts roads.
+/// Returns the ends of roads outside junctions that are linked to a common or direct junction.
 pub(crate) fn arms<'m, 'a>(
     map: &'m RoadMap<'a>,
 ) -> impl Iterator<Item = (&'m Road<'a>, ContactPoint, &'m Junction<'a>)> {

@@ -1,10 +1,10 @@
-//! Whether linked lanes touch (OpenDRIVE 1.9, annex D.1.2).
+//! Checks whether linked lanes touch (OpenDRIVE 1.9, annex D.1.2).
 //!
-//! A lane may be linked to several that lie side by side, and several to one. So not lanes are
-//! compared, but groups of lanes that the links of one boundary hang together: where the left edge of
-//! the group on one side ends, that of the group on the other side must begin, and likewise the right
-//! edge. Edges are told apart by t, which also does for a lane that changes its side of the center. A
-//! link between lanes that have no width in common is wrong by itself and forms no group.
+//! A lane may be linked to several adjacent lanes, and several to one. Therefore groups of lanes
+//! are compared: all lanes that the links of one boundary connect. The left edge on one side must
+//! end where the left edge on the other side begins; the same holds for the right edge. Edges are
+//! identified by t, even for a lane that changes its side of the center. A link between lanes
+//! without common width is wrong and forms no group.
 
 use foldhash::{HashMap, HashSet};
 use qcbus_opendrive::geometry::Point3;
@@ -12,20 +12,20 @@ use qcbus_opendrive::{ContactPoint, Edge, LaneEnd, LaneJoint, LaneRef, RoadMap};
 
 use super::driving::is_drivable;
 
-/// Two drivable lanes that are linked and whose edges miss each other.
+/// Two linked drivable lanes whose edges do not meet.
 pub(crate) struct LaneGap<'m, 'a> {
     pub from: LaneRef<'m, 'a>,
     pub to: LaneRef<'m, 'a>,
-    /// One statement that links the groups.
+    /// One of the links that connect the groups.
     pub joint: LaneJoint<'a>,
-    /// How far apart they lie as a whole, in metres: no more than a corner may be missing elsewhere.
+    /// Distance between the groups as a whole, in metres. It is small if only a corner is missing.
     pub whole: f64,
-    /// The distances in metres at the edges that miss each other, and the point in between.
+    /// Distances in metres at the edges that do not meet, each with the point in between.
     pub edges: Vec<(f64, Point3)>,
 }
 
-/// The gaps between linked drivable lanes that are wider than `limit`, in metres in the plan view.
-/// Lanes that are not wider than `zero` where they meet do not take part.
+/// Returns the gaps between linked drivable lanes that are wider than `limit`, in metres in the
+/// plan view. Lanes whose width at the contact is at most `zero` are ignored.
 pub(crate) fn lane_gaps<'m, 'a>(
     map: &'m RoadMap<'a>,
     limit: f64,
@@ -55,8 +55,7 @@ pub(crate) fn lane_gaps<'m, 'a>(
     gaps
 }
 
-/// A lane at the place where it meets another: t and place of its edges, the one with the lesser t
-/// first.
+/// A lane where it meets another one: t and point of its edges, smaller t first.
 #[derive(Clone, Copy)]
 struct Side<'m, 'a> {
     lane: LaneRef<'m, 'a>,
@@ -73,7 +72,7 @@ impl<'m, 'a> Side<'m, 'a> {
     }
 }
 
-/// A statement that two lanes touch, with where they really are.
+/// A link between two lanes with the actual positions of the lanes.
 #[derive(Clone, Copy)]
 struct Touch<'m, 'a> {
     joint: &'m LaneJoint<'a>,
@@ -94,14 +93,14 @@ impl<'m, 'a> Touch<'m, 'a> {
         [self.joint.from, self.joint.to]
     }
 
-    /// The two ends in an order that does not depend on which of them states it.
+    /// Returns the two ends in an order that is independent of the direction of the link.
     fn in_order(&self) -> [LaneEnd; 2] {
         let mut ends = self.lane_ends();
         ends.sort();
         ends
     }
 
-    /// Whether the lanes have some width in common, looking along the first one.
+    /// Checks whether the lanes have some width in common, measured across the first one.
     fn overlaps(&self, limit: f64) -> bool {
         let [(_, right), (_, left)] = self.from.edges;
         let width = right.plan().distance(left.plan());
@@ -120,11 +119,11 @@ fn section(at: LaneEnd) -> (u32, u32, u32, ContactPoint) {
     (at.lane.road, at.lane.layer, at.lane.section, at.end)
 }
 
-/// Splits the joints of a boundary into groups that have no lane in common.
+/// Splits the joints of a boundary into groups without common lanes.
 fn hanging_together<'m, 'a: 'm>(
     touches: impl Iterator<Item = Touch<'m, 'a>>,
 ) -> Vec<Vec<Touch<'m, 'a>>> {
-    // Group of each lane end; merging renames the smaller number, so that chains stay short.
+    // Group of each lane end. A merge renames the smaller group to keep the cost low.
     let mut group_of: HashMap<LaneEnd, usize> = HashMap::default();
     let mut groups: Vec<Vec<Touch<'m, 'a>>> = Vec::new();
     for touch in touches {
@@ -159,10 +158,10 @@ fn hanging_together<'m, 'a: 'm>(
     groups
 }
 
-/// An edge of a group: the lane that has it, its t and its place.
+/// An edge of a group: its lane, its t and its point.
 type GroupEdge<'m, 'a> = (LaneRef<'m, 'a>, f64, Point3);
 
-/// The edges of one side of a group with the least and the greatest t.
+/// Returns the edges with the smallest and the largest t on one side of a group.
 fn edges<'m, 'a>(sides: impl Iterator<Item = Side<'m, 'a>>) -> Option<[GroupEdge<'m, 'a>; 2]> {
     let all = sides.flat_map(|side| side.edges.map(|(t, point)| (side.lane, t, point)));
     let mut extremes: Option<[GroupEdge<'m, 'a>; 2]> = None;
@@ -224,8 +223,8 @@ fn gaps_of<'m, 'a>(group: &[Touch<'m, 'a>], limit: f64, overlap: bool) -> Vec<La
     gaps
 }
 
-/// How far two groups lie apart as a whole: their middles, and where they have some width in common also
-/// either edge. Where one is only wider than the other, an edge or the middle may be where it should.
+/// Returns the distance between two groups: of their middles or, if they overlap, of an edge if
+/// that is less. If only the widths differ, an edge or the middle may be right.
 fn apart(here: &[GroupEdge<'_, '_>; 2], there: &[GroupEdge<'_, '_>; 2], overlap: bool) -> f64 {
     let [(.., a), (.., b)] = here;
     let [(.., c), (.., d)] = there;

@@ -1,9 +1,9 @@
-//! How the lanes of a section are numbered.
+//! Numbering of the lanes of a section.
 
 use qcbus_opendrive::{LaneRef, SectionRef, Side};
 
-/// The lanes of a side whose number has the side's sign, from the smallest distance to the
-/// largest; lanes with another or no number have rules of their own.
+/// Returns the lanes of a side whose number has the sign of the side, from the center outwards.
+/// Separate rules check lanes with another number or without one.
 pub(crate) fn outward<'m, 'a>(
     section: SectionRef<'m, 'a>,
     side: Side,
@@ -17,7 +17,7 @@ pub(crate) fn outward<'m, 'a>(
     lanes
 }
 
-/// The number of the lane at a distance from the center, as text.
+/// Returns the number of the lane at a distance from the center, as text.
 pub(crate) fn number(side: Side, distance: u64) -> String {
     match side {
         Side::Left => distance.to_string(),
@@ -25,7 +25,7 @@ pub(crate) fn number(side: Side, distance: u64) -> String {
     }
 }
 
-/// `left` or `right`.
+/// Returns `left` or `right`.
 pub(crate) fn word(side: Side) -> &'static str {
     match side {
         Side::Left => "left",

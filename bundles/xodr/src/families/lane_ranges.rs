@@ -1,4 +1,4 @@
-//! Lane validity: the lanes for which an object, a signal or a structure holds.
+//! Lane validity: the lanes to which an object, a signal or a structure applies.
 
 use qcbus_document::Node;
 use qcbus_opendrive::{LayerKind, Road, RoadMap, SectionRef, Side, TrafficRule, Validity};
@@ -6,7 +6,7 @@ use qcbus_sdk::{Level, Place, Sink};
 
 use crate::families::object_parts::{Stands, below, named, number, owner};
 
-/// Reports ranges below elements of one of these names that begin with the higher lane.
+/// Reports validities below these elements that begin with the higher lane.
 pub(crate) fn lower_comes_first(map: &RoadMap<'_>, parents: &[&'static str], found: &mut Sink<'_>) {
     for validity in parents.iter().flat_map(|name| below(map, "validity", name)) {
         let range = Validity::of(validity);
@@ -26,8 +26,8 @@ pub(crate) fn lower_comes_first(map: &RoadMap<'_>, parents: &[&'static str], fou
     }
 }
 
-/// On roads with one of the traffic rules, reports ranges on the side for which the orientation
-/// of the element does not stand. `holders` are the elements that can have validities.
+/// Reports ranges on the side that does not match the orientation of the element. It only checks
+/// roads with these traffic rules. `holders` are the elements that can have validities.
 pub(crate) fn fit_orientation(
     map: &RoadMap<'_>,
     holders: &[&'static str],
@@ -106,7 +106,7 @@ fn check<'a>(
     }
 }
 
-/// The side on which traffic of an orientation drives; `None` for both.
+/// Returns the side of the traffic for an orientation, or `None` for both sides.
 fn side_of(orientation: &str, rule: TrafficRule) -> Option<Side> {
     match (orientation, rule) {
         ("+", TrafficRule::RightHand) | ("-", TrafficRule::LeftHand) => Some(Side::Right),
@@ -115,7 +115,7 @@ fn side_of(orientation: &str, rule: TrafficRule) -> Option<Side> {
     }
 }
 
-/// Whether the lanes of the range on the other side exist and may all be driven against the
+/// Checks whether the range has lanes on the other side and all of them may be driven against the
 /// usual direction.
 fn are_all_two_way<'a>(
     road: &Road<'a>,
@@ -143,12 +143,12 @@ fn are_all_two_way<'a>(
     all && any
 }
 
-/// Whether the road has lanes on a side where the element stands; true where that is unknown.
+/// Checks whether the road has lanes on a side at the element. The default is true.
 fn has_lanes<'a>(road: &Road<'a>, range: Validity<'a>, place: Node<'a>, side: Side) -> bool {
     section_of(road, range, place, side).is_none_or(|section| section.side(side).next().is_some())
 }
 
-/// The lane section that holds for a side where the element stands.
+/// Returns the lane section for a side at the position of the element.
 fn section_of<'m, 'a>(
     road: &'m Road<'a>,
     range: Validity<'a>,

@@ -7,12 +7,12 @@ use qcbus_opendrive::{
 };
 use qcbus_sdk::Sink;
 
-/// Reports numbers in the links of lanes that lead to no lane. Where it is not known what lies
-/// there, because a road does not exist or is not linked, nothing is said: that is reported elsewhere.
+/// Reports numbers in lane links that refer to no lane. It reports nothing if the target is unknown
+/// because a road does not exist or is not linked. Other rules report that.
 pub(crate) fn of_lanes(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
     let map = part.map();
     for road in part.roads() {
-        // Links that lead to a lane are known, which are most; the others are looked at.
+        // Most links lead to a known lane and need no further check.
         let is_known = among(map.joints_of(road));
         for lane in road.sections().flat_map(SectionRef::lanes) {
             for end in ContactPoint::BOTH {
@@ -25,8 +25,8 @@ pub(crate) fn of_lanes(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The same for the lane links of junctions: `from` must be a lane of the incoming road, `to` one of
-/// the connecting or linked road.
+/// Reports the same for the lane links of junctions. `from` must be a lane of the incoming road,
+/// `to` a lane of the connecting or linked road.
 pub(crate) fn of_junctions(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let is_known = among(map.junction_joints());
     for (junction, connection) in map.connections() {
@@ -40,14 +40,14 @@ pub(crate) fn of_junctions(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether a link is one of those that lead to a lane.
+/// Returns a function that checks whether a link is one of those that lead to a lane.
 fn among(joints: &[LaneJoint<'_>]) -> impl Fn(Node<'_>) -> bool {
     let mut known: Vec<u32> = joints.iter().map(|one| one.node.index()).collect();
     known.sort_unstable();
     move |link| known.binary_search(&link.index()).is_ok()
 }
 
-/// The lane sections of which one must have the lane that a link of a lane names.
+/// Returns the lane sections, one of which must have the lane that a lane link names.
 fn candidates<'m, 'a>(
     map: &'m RoadMap<'a>,
     lane: LaneRef<'m, 'a>,
@@ -57,7 +57,7 @@ fn candidates<'m, 'a>(
     if let Some((section, _)) = map.linked_section(lane, end, link.id(), link.layer()) {
         return vec![section];
     }
-    // Roads of virtual junctions are linked to a place within the main road.
+    // Roads of virtual junctions are linked to a position inside the main road.
     let is_last = lane.is_at_road_end(end);
     let road_link = lane.at.road.link(end).filter(|_| is_last);
     let within = road_link.and_then(|link| Some((map.road(link.road_id()?)?, link.element_s()?)));
@@ -67,7 +67,7 @@ fn candidates<'m, 'a>(
     })
 }
 
-/// The lane section of the connecting or linked road in which a lane link ends.
+/// Returns the lane section of the connecting or linked road in which a lane link ends.
 fn target<'m, 'a>(
     map: &'m RoadMap<'a>,
     connection: Connection<'a>,
@@ -78,8 +78,8 @@ fn target<'m, 'a>(
     end_section(road, link.to(), link.to_layer(), end)
 }
 
-/// The lane sections of the incoming road in which a lane link may begin: the one that lies at the
-/// junction, all along a virtual one on its main road.
+/// Returns the lane sections of the incoming road in which a lane link may begin: the one at the
+/// junction, or on the main road of a virtual junction all along it.
 fn incoming<'m, 'a>(
     map: &'m RoadMap<'a>,
     junction: &Junction<'a>,
@@ -120,8 +120,8 @@ fn end_section<'m, 'a>(
     road.layer(layer)?.end_section(road, side, end)
 }
 
-/// The lane sections that hold for a side somewhere from the one s to the other, those that begin or
-/// end there included.
+/// Returns the lane sections of a side between two values of s, including those that begin or end
+/// there.
 fn sections_between<'m, 'a>(
     road: &'m Road<'a>,
     layer: LayerKind,
@@ -141,7 +141,7 @@ fn sections_between<'m, 'a>(
     layer.sections(road).filter(meets).collect()
 }
 
-/// Reports a lane number that none of the sections has; says nothing where there are none.
+/// Reports a lane number that none of the sections has, unless there are no sections.
 fn demand_lane(
     link: Node<'_>,
     attribute: &str,
@@ -151,7 +151,7 @@ fn demand_lane(
     let (Some(id), Some(section)) = (link.attr(attribute), sections.first()) else {
         return;
     };
-    // Lane ids are whole numbers: `-1` and ` -01` are one lane.
+    // Lane ids are whole numbers, so `-1` and ` -01` are the same lane.
     let number = id.trim().parse::<i64>().ok();
     let is_it = |lane: LaneRef<'_, '_>| {
         lane.id_text() == Some(id) || (number.is_some() && lane.id() == number)
@@ -160,7 +160,7 @@ fn demand_lane(
         .iter()
         .flat_map(|section| section.lanes())
         .peekable();
-    // A section without any lane is another rule's business, with all that leads there.
+    // Another rule reports sections without lanes and the links to them.
     if lanes.peek().is_none() || lanes.any(is_it) {
         return;
     }

@@ -1,17 +1,16 @@
-//! Whether the two sides of a road link agree.
+//! Checks that the two sides of a road link agree.
 
 use foldhash::HashSet;
 use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadLink, RoadMap};
 
-/// Whether a road belongs to a virtual junction. Such junctions cut no road, so that the roads
-/// around them need not know them.
+/// Checks whether a road belongs to a virtual junction. Such junctions do not split roads, so the
+/// surrounding roads need no link to them.
 pub(crate) fn in_virtual_junction(map: &RoadMap<'_>, road: &Road<'_>) -> bool {
     let junction = road.junction().and_then(|id| map.junction(id));
     junction.is_some_and(|junction| junction.kind() == Some(JunctionType::Virtual))
 }
 
-/// Whether the link at the other side leads back: to the road itself, or to the junction to
-/// which the road belongs.
+/// Checks whether the link on the other side leads back to the road itself or to its junction.
 pub(crate) fn agrees(
     map: &RoadMap<'_>,
     (road, end): (&Road<'_>, ContactPoint),
@@ -33,12 +32,12 @@ pub(crate) fn agrees(
     road.junction() == Some(junction) || map.junctions_with_id(junction).any(uses)
 }
 
-/// Which roads the junctions say anything about: the junction's place, the road's id, and the end
-/// of the road if it is named.
+/// Roads that the junctions mention: index of the junction, id of the road, and end of the road if
+/// given.
 pub(crate) struct Known<'a>(HashSet<(usize, &'a str, Option<ContactPoint>)>);
 
 impl<'a> Known<'a> {
-    /// Looks at the connections and cross paths of all junctions.
+    /// Collects the roads of the connections and cross paths of all junctions.
     pub fn by(map: &RoadMap<'a>) -> Known<'a> {
         let mut known = HashSet::default();
         for junction in map.junctions() {
@@ -60,7 +59,8 @@ impl<'a> Known<'a> {
         Known(known)
     }
 
-    /// Whether the junction knows this end of a road. Virtual junctions and crossings need not.
+    /// Checks whether a junction mentions this road end, as virtual junctions and crossings need
+    /// not.
     pub fn contains(&self, junction: &Junction<'a>, road: &Road<'a>, end: ContactPoint) -> bool {
         let cuts = matches!(
             junction.kind(),

@@ -1,12 +1,12 @@
-//! The mouths of roads, the lines across their ends, and how far two of them lie apart.
+//! Mouths of roads, which are the lines across their ends, and the distance between two mouths.
 //!
-//! Reference lines of roads that meet need not: that of a connecting road may begin beside the one of the
-//! incoming road. But where the mouths do not even touch, the roads do not meet.
+//! The reference lines of two roads that meet may lie apart: a connecting road may begin beside the
+//! reference line of the incoming road. If the mouths do not touch, the roads do not meet.
 
 use qcbus_opendrive::geometry::Point;
 use qcbus_opendrive::{ContactPoint, Road, RoadEnd, RoadMap, Side, Station};
 
-/// The line across an end of a road, from its rightmost lane's edge to its leftmost lane's, in the plan view.
+/// The line across an end of a road in the plan view, from the rightmost to the leftmost lane edge.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Mouth {
     right: Point,
@@ -27,12 +27,12 @@ impl Mouth {
         })
     }
 
-    /// The mouth of a road end of the map.
+    /// Returns the mouth of a road end of the map.
     pub fn at(map: &RoadMap<'_>, at: RoadEnd) -> Option<Mouth> {
         Mouth::of(map.road_at(at.road)?, at.end)
     }
 
-    /// How far apart two mouths lie, in metres; 0 where they cross.
+    /// Returns the distance between two mouths in metres, or 0 if they cross.
     pub fn distance(self, other: Mouth) -> f64 {
         if self.splits(other) && other.splits(self) {
             return 0.0;
@@ -46,7 +46,7 @@ impl Mouth {
         ends.into_iter().fold(f64::INFINITY, f64::min)
     }
 
-    /// How far away a point lies from the line.
+    /// Returns the distance of a point from the line.
     fn from(self, point: Point) -> f64 {
         let (x, y) = (self.left.x - self.right.x, self.left.y - self.right.y);
         let along = x * (point.x - self.right.x) + y * (point.y - self.right.y);
@@ -59,7 +59,7 @@ impl Mouth {
         })
     }
 
-    /// Whether the ends of the other mouth lie on different sides of this one.
+    /// Checks whether the ends of the other mouth lie on different sides of this one.
     fn splits(self, other: Mouth) -> bool {
         let side = |point: Point| {
             (self.left.x - self.right.x) * (point.y - self.right.y)
@@ -69,13 +69,13 @@ impl Mouth {
     }
 }
 
-/// How far apart two road ends lie, in metres.
+/// Returns the distance between the mouths of two road ends, in metres.
 pub(crate) fn apart(map: &RoadMap<'_>, one: RoadEnd, other: RoadEnd) -> Option<f64> {
     Some(Mouth::at(map, one)?.distance(Mouth::at(map, other)?))
 }
 
-/// Where the lanes of a side end, counted from the reference line. `None` for roads without lanes, of which
-/// nobody knows how wide they are, and where a lane's width is unknown.
+/// Returns t of the outermost lane edge of a side, or of the center lane if the side is empty.
+/// Returns `None` without a lane section or with an unknown lane width.
 fn edge(road: &Road<'_>, side: Side, end: ContactPoint) -> Option<f64> {
     let section = road.permanent()?.end_section(road, side, end)?;
     let ds = match end {

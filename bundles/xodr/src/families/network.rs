@@ -1,27 +1,27 @@
-//! Which roads hang together.
+//! Connected parts of the road network.
 
 use foldhash::HashMap;
 use qcbus_opendrive::{ContactPoint, Road, RoadMap};
 
 use super::routes::is_route;
 
-/// The roads of a map, joined where the file says in whatever way that they belong together.
+/// The roads of a map, joined wherever the file relates them in any way.
 pub(crate) struct Parts {
     above: Vec<usize>,
 }
 
-/// Roads that hang together.
+/// A set of connected roads.
 pub(crate) struct Piece {
-    /// The first of its roads that has a lane for vehicles, by its place in the map.
+    /// Index in the map of its first road with a lane for vehicles.
     pub first: usize,
-    /// How many roads with such lanes there are.
+    /// Number of roads with such lanes.
     pub roads: usize,
-    /// Their length in all, in metres.
+    /// Total length of these roads in metres.
     pub length: f64,
 }
 
 impl Parts {
-    /// Joins what roads and junctions name.
+    /// Joins the roads and junctions that refer to each other.
     pub fn of(map: &RoadMap<'_>) -> Parts {
         let roads = map.roads().len();
         let junctions = map.junctions().len();
@@ -68,7 +68,7 @@ impl Parts {
         parts
     }
 
-    /// The root of a set, which is brought nearer on the way.
+    /// Returns the root of a set and shortens the path to it.
     fn root(&mut self, mut at: usize) -> usize {
         while let Some(above) = self.above.get(at).copied().filter(|above| *above != at) {
             let further = self.above.get(above).copied().unwrap_or(above);
@@ -88,7 +88,7 @@ impl Parts {
         }
     }
 
-    /// The pieces that have lanes for vehicles, by their first road.
+    /// Returns the pieces with lanes for vehicles, in the order of their first roads.
     pub fn pieces(mut self, map: &RoadMap<'_>) -> Vec<Piece> {
         let mut places: HashMap<usize, usize> = HashMap::default();
         let mut pieces: Vec<Piece> = Vec::new();

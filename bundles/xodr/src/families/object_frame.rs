@@ -1,4 +1,4 @@
-//! Objects in their own coordinates: u, v and z from the origin (OpenDRIVE 1.9, 13.1 to 13.3).
+//! Objects in local coordinates: u, v and z from the origin (OpenDRIVE 1.9, 13.1 to 13.3).
 
 use qcbus_document::Node;
 use qcbus_opendrive::{Corner, CornerKind, Object, ObjectPoint, Outline, Polyline, Road};
@@ -14,20 +14,20 @@ pub(crate) const TOLERANCE: Param = Param::number(
     "how much larger than the bounding volume the object may be",
 );
 
-/// From how many times the size, and from how many metres more, an object is out of all proportion.
+/// Factor of the size, and difference in metres, beyond which an object is far too large.
 const GROSS_SHARE: f64 = 3.0;
 const GROSS: f64 = 100.0;
 
-/// A point of an object in u, v and z of the object, in metres.
+/// A point of an object in the local coordinates u, v and z, in metres.
 #[derive(Clone, Copy)]
 pub(crate) struct LocalPoint<'a> {
     pub node: Node<'a>,
     pub at: [f64; 3],
-    /// How far what the point stands for reaches around it, in metres.
+    /// Radius of the thing around the point, in metres.
     pub reach: f64,
 }
 
-/// Turns points in road coordinates into those of an object.
+/// Conversion of points from road coordinates to the coordinates of an object.
 pub(crate) struct ObjectFrame<'m, 'a> {
     road: &'m Road<'a>,
     x: f64,
@@ -58,7 +58,7 @@ impl<'m, 'a> ObjectFrame<'m, 'a> {
         })
     }
 
-    /// A point in s, t and dz; `None` when the object is tilted.
+    /// Converts a point in s, t and dz. Returns `None` if the object is tilted.
     fn of_road(&self, point: &ObjectPoint<'a>) -> Option<[f64; 3]> {
         let s = point.s().filter(|_| self.upright)?;
         let place = self.road.pose(s)?.beside(point.t()?)?;
@@ -71,7 +71,7 @@ impl<'m, 'a> ObjectFrame<'m, 'a> {
         ])
     }
 
-    /// A corner of an outline.
+    /// Converts a corner of an outline.
     pub fn corner(&self, corner: &Corner<'a>) -> Option<[f64; 3]> {
         match corner.kind {
             CornerKind::Road => self.of_road(&corner.point),
@@ -79,7 +79,7 @@ impl<'m, 'a> ObjectFrame<'m, 'a> {
         }
     }
 
-    /// The corners of an outline, at the bottom and at the top.
+    /// Returns the corners of an outline at the bottom and at the top.
     pub fn corners(&self, outline: &Outline<'a>) -> Vec<LocalPoint<'a>> {
         let bottoms = outline.corners().filter_map(|corner| {
             let height = corner.point.height().unwrap_or(0.0);
@@ -96,7 +96,7 @@ impl<'m, 'a> ObjectFrame<'m, 'a> {
         both.collect()
     }
 
-    /// The vertices of a skeleton's polyline; with what they stand for when `around` is set.
+    /// Returns the vertices of a skeleton's polyline, with their radius if `around` is set.
     pub fn vertices(&self, polyline: &Polyline<'a>, around: bool) -> Vec<LocalPoint<'a>> {
         let of_road = polyline
             .road_vertices()
@@ -123,9 +123,9 @@ fn local(point: &ObjectPoint<'_>) -> Option<[f64; 3]> {
     Some([point.u()?, point.v()?, point.z()?])
 }
 
-/// Reports an object whose points need more room than its bounding volume has. Where in the volume
-/// the origin lies is not said in the standard, whose own examples put it in the middle or at a
-/// corner; so what is compared are extents, wherever the volume may be.
+/// Reports an object whose points need more space than its bounding volume. The standard does not
+/// define the origin in the volume. Its examples put it in the middle or at a corner. Therefore
+/// only extents are compared.
 pub(crate) fn report_too_large(
     road: &Road<'_>,
     object: &Object<'_>,
@@ -149,7 +149,7 @@ pub(crate) fn report_too_large(
                 .iter()
                 .max_by(|one, other| farthest(one).total_cmp(&farthest(other)))?;
             let extent = farthest(&high) - nearest(&low);
-            // The one that is farther from the origin is more likely to be wrong.
+            // The point farther from the origin is more likely to be wrong.
             let far = if low.at[axis].abs() > high.at[axis].abs() {
                 low
             } else {
@@ -178,14 +178,14 @@ pub(crate) fn report_too_large(
         .issue(node, text)
         .on(road, object.s().unwrap_or(0.0), object.t().unwrap_or(0.0))
         .at(object.node(), "the object");
-    // Several times as large and by far is no matter of a version; a level is lowered for older ones.
+    // Levels are lowered for older versions, but such a large excess is an error in every version.
     if older && extent > GROSS_SHARE * size && extent - size > GROSS {
         finding.level(Level::Error);
     }
 }
 
-/// Reports points that lie outside of the bounding volume although they would fit into it: farther from the
-/// origin than the volume is large, so that no volume around the origin has both.
+/// Reports points outside the bounding volume that would fit into it elsewhere. They are farther
+/// from the origin than the volume is large, so no volume can contain both.
 fn report_away(
     road: &Road<'_>,
     object: &Object<'_>,
@@ -226,7 +226,7 @@ fn report_away(
         .at(object.node(), "the object");
 }
 
-/// The axes with the attribute that gives the size along each.
+/// The axes with the attribute for the size along each axis.
 const AXES: [(&str, &str); 3] = [("u", "length"), ("v", "width"), ("z", "height")];
 
 fn size_of(

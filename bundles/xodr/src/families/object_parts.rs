@@ -1,18 +1,18 @@
-//! Objects of roads and junctions, and what they are made of (OpenDRIVE 1.9, chapter 13).
+//! Objects of roads and junctions, and their parts (OpenDRIVE 1.9, chapter 13).
 
 use qcbus_document::Node;
 use qcbus_opendrive::{RoadMap, is_user_data};
 use qcbus_sdk::{Finding, Sink};
 
-/// The points of an outline.
+/// Elements that are points of an outline.
 pub(crate) const CORNERS: [&str; 3] = ["cornerRoad", "cornerLocal", "curveLocal"];
 
-/// The objects of all roads and junctions in document order.
+/// Returns the objects of all roads and junctions in document order.
 pub(crate) fn objects<'a>(map: &RoadMap<'a>) -> impl Iterator<Item = Node<'a>> + use<'a> {
     below(map, "object", "objects")
 }
 
-/// The elements of one name that lie directly within elements of another, outside of user data.
+/// Returns elements by name and by name of their direct parent, outside user data.
 pub(crate) fn below<'a>(
     map: &RoadMap<'a>,
     name: &'static str,
@@ -24,12 +24,12 @@ pub(crate) fn below<'a>(
         .filter(move |node| stands_below(*node, parent))
 }
 
-/// Whether an element lies directly within one of this name, outside of user data.
+/// Checks whether an element is a direct child of an element with this name, outside user data.
 pub(crate) fn stands_below(node: Node<'_>, parent: &str) -> bool {
     node.parent().is_some_and(|above| above.is(parent)) && !is_user_data(node)
 }
 
-/// The outlines of an object: within `<outlines>`, or directly within it as before 1.5.
+/// Returns the outlines of an object: in `<outlines>`, or directly in it as before 1.5.
 pub(crate) fn outlines(object: Node<'_>) -> impl Iterator<Item = Node<'_>> {
     object
         .children_named("outlines")
@@ -37,50 +37,50 @@ pub(crate) fn outlines(object: Node<'_>) -> impl Iterator<Item = Node<'_>> {
         .chain(object.children_named("outline"))
 }
 
-/// Whether an object has an outline.
+/// Checks whether an object has an outline.
 pub(crate) fn has_outline(object: Node<'_>) -> bool {
     outlines(object).next().is_some()
 }
 
-/// The corners and curves of an outline in document order.
+/// Returns the corners and curves of an outline in document order.
 pub(crate) fn corners(outline: Node<'_>) -> impl Iterator<Item = Node<'_>> {
     outline
         .children()
         .filter(|child| CORNERS.contains(&child.name()))
 }
 
-/// The polylines of all skeletons.
+/// Returns the polylines of all skeletons.
 pub(crate) fn polylines<'a>(map: &RoadMap<'a>) -> impl Iterator<Item = Node<'a>> + use<'a> {
     objects(map)
         .flat_map(|object| object.children_named("skeleton"))
         .flat_map(|skeleton| skeleton.children_named("polyline"))
 }
 
-/// A finite number.
+/// Returns the attribute as a finite number.
 pub(crate) fn number(node: Node<'_>, attribute: &str) -> Option<f64> {
     node.f64(attribute).ok().filter(|value| value.is_finite())
 }
 
-/// Whether the file is of an older version than this.
+/// Checks whether the file has an older version than this.
 pub(crate) fn is_before(found: &Sink<'_>, edition: (u16, u16)) -> bool {
     let version = found.version();
     version.is_some_and(|version| (version.major, version.minor) < edition)
 }
 
-/// Whether the schema of the file's version is one of those of the versions `from` to `to`, by which a fact
-/// is reported already.
+/// Checks whether the schema of the file's version already reports a fact, which holds for the
+/// versions `from` to `to`.
 pub(crate) fn is_by_schema(found: &Sink<'_>, from: (u16, u16), to: (u16, u16)) -> bool {
     let version = found.version();
     version.is_some_and(|version| (from..=to).contains(&(version.major, version.minor)))
 }
 
-/// Whether a text attribute is missing or blank.
+/// Checks whether a text attribute is missing or blank.
 pub(crate) fn is_blank(node: Node<'_>, attribute: &str) -> bool {
     node.attr(attribute)
         .is_none_or(|text| text.trim().is_empty())
 }
 
-/// An element by name and id: ``object `7` ``.
+/// Returns an element as name and id: ``object `7` ``.
 pub(crate) fn named(node: Node<'_>) -> String {
     match node.attr("id") {
         Some(id) => format!("{} `{id}`", node.name()),
@@ -88,7 +88,7 @@ pub(crate) fn named(node: Node<'_>) -> String {
     }
 }
 
-/// Names in backticks, as a list in a sentence.
+/// Returns names in backticks, as a list in a sentence.
 pub(crate) fn listed(names: &[&str]) -> String {
     let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
     match quoted.as_slice() {
@@ -98,10 +98,10 @@ pub(crate) fn listed(names: &[&str]) -> String {
     }
 }
 
-/// Adds where on its road an element stands.
+/// Adds the position of an element on its road to a finding.
 pub(crate) trait Stands {
-    /// At the element's own `@s` and `@t`, raised by `@zOffset`, a bridge or tunnel where it
-    /// begins; says nothing where one of them is missing or the element belongs to no road.
+    /// Adds the position at `@s` and `@t`, raised by `@zOffset`, or the start of a bridge or
+    /// tunnel. Adds nothing if one of them or the road is missing.
     fn stands<'a>(self, map: &RoadMap<'a>, node: Node<'a>) -> Self;
 }
 
@@ -124,7 +124,7 @@ impl Stands for Finding<'_, '_> {
     }
 }
 
-/// The object, structure, signal or reference that an element is part of.
+/// Returns the object, structure, signal or reference that contains an element.
 pub(crate) fn owner(node: Node<'_>) -> Node<'_> {
     const OWNERS: [&str; 6] = [
         "object",

@@ -1,21 +1,21 @@
-//! Where a finding lies on its road, and how texts name roads and lanes.
+//! Position of a finding on its road, and names of roads and lanes in texts.
 
 use qcbus_opendrive::{ContactPoint, LaneRef, LayerKind, Road, Station};
 use qcbus_sdk::Finding;
 
-/// How many further places of one kind a finding names at most; more help nobody, and a hostile file
-/// could make them cost a lot.
+/// Maximum number of further places of one kind in a finding. More are not helpful, and a hostile
+/// file could make them expensive.
 pub(crate) const MAX_PLACES: usize = 16;
 
-/// Adds road coordinates and, where the map can be evaluated there, the point in space.
+/// Adds road coordinates and, if the map can be evaluated there, the point in space.
 pub(crate) trait OnRoad {
-    /// At (s, t) of a road, in metres.
+    /// Places the finding at (s, t) of a road, in metres.
     fn on(self, road: &Road<'_>, s: f64, t: f64) -> Self;
-    /// At an end of a road's reference line.
+    /// Places the finding at an end of a road's reference line.
     fn at_end(self, road: &Road<'_>, end: ContactPoint) -> Self;
-    /// In the middle of a lane, `ds` metres from the start of its section.
+    /// Places the finding in the middle of a lane, `ds` metres from the start of its section.
     fn in_lane(self, lane: LaneRef<'_, '_>, ds: impl Into<Station>) -> Self;
-    /// In the middle of a lane, at an end of its section.
+    /// Places the finding in the middle of a lane, at an end of its section.
     fn at_lane_end(self, lane: LaneRef<'_, '_>, end: ContactPoint) -> Self;
 }
 
@@ -64,8 +64,8 @@ impl OnRoad for Finding<'_, '_> {
     }
 }
 
-/// ``lane `-1` of road `5` ``, with the section where the layer has several, and with the layer where it is not
-/// the one that every road has.
+/// Returns ``lane `-1` of road `5` ``. It adds the section if the layer has several, and the layer
+/// if it is not the permanent one.
 pub(crate) fn lane_name(lane: LaneRef<'_, '_>) -> String {
     let section = if lane.at.layer.section_count() > 1 {
         format!(" in lane section {} of", lane.at.index() + 1)

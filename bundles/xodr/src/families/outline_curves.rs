@@ -1,4 +1,4 @@
-//! Outlines made of curves (OpenDRIVE 1.9, 13.2.3).
+//! Outlines that consist of curves (OpenDRIVE 1.9, 13.2.3).
 
 use qcbus_opendrive::geometry::{Curve, ParamPoly3, ParamRange, Placed, Point};
 use qcbus_opendrive::{CurveLocal, Object, Outline, Road, RoadMap};
@@ -13,7 +13,7 @@ pub(crate) const LENGTH_TOLERANCE: Param = Param::number(
     "largest difference between the curve's length and `length` that is accepted",
 );
 
-/// Every outline that is made of curves.
+/// Returns every outline that consists of curves.
 pub(crate) fn curved_outlines<'m, 'a>(
     map: &'m RoadMap<'a>,
 ) -> impl Iterator<Item = (&'m Road<'a>, Object<'a>, Outline<'a>)> {
@@ -25,12 +25,12 @@ pub(crate) fn curved_outlines<'m, 'a>(
     })
 }
 
-/// Where a curve starts, in u and v.
+/// Returns the start of a curve in u and v.
 pub(crate) fn start(curve: &CurveLocal<'_>) -> Option<Point> {
     Point::finite(curve.u()?, curve.v()?)
 }
 
-/// How far a curve's end lies from its start, in metres: it does not depend on `@hdg`.
+/// Returns the distance from start to end of a curve in metres, independent of `@hdg`.
 pub(crate) fn chord(curve: &CurveLocal<'_>) -> Option<f64> {
     let length = curve.length();
     match curve.curve()? {
@@ -45,7 +45,7 @@ pub(crate) fn chord(curve: &CurveLocal<'_>) -> Option<f64> {
     }
 }
 
-/// Where a curve ends, by its heading.
+/// Returns the end of a curve, computed from its heading.
 pub(crate) fn end(curve: &CurveLocal<'_>) -> Option<Point> {
     let shape = curve.curve()?;
     let length = match &shape {
@@ -68,7 +68,7 @@ fn last_parameter(poly: &ParamPoly3, length: Option<f64>) -> Option<f64> {
     }
 }
 
-/// Calls `each` with every parametric curve that has a length.
+/// Calls `each` for every parametric curve of an outline.
 pub(crate) fn for_each_poly<'d>(
     map: &RoadMap<'_>,
     found: &mut Sink<'d>,
@@ -83,8 +83,8 @@ pub(crate) fn for_each_poly<'d>(
     }
 }
 
-/// Reports curves of this range that only have the length they claim when the parameter runs over
-/// the other one.
+/// Reports curves with this range that have the given length only over the other range. It also
+/// reports curves with `arcLength` and without a length.
 pub(crate) fn range_fits(map: &RoadMap<'_>, range: ParamRange, found: &mut Sink<'_>) {
     for_each_poly(map, found, |road, object, curve, poly, found| {
         let (Some((_, node)), true) = (curve.shape(), poly.range == range) else {

@@ -1,7 +1,7 @@
-//! Which roads cover the same ground (OpenDRIVE 1.9, 10.1).
+//! Roads that cover the same ground (OpenDRIVE 1.9, 10.1).
 //!
-//! Roads are cut into pieces a few metres long: quadrangles as wide as the lanes for vehicles.
-//! A grid tells which pieces may overlap; the work is bounded, whatever the map says.
+//! Roads are cut into pieces of a few metres: quadrangles with the width of the lanes for vehicles.
+//! A grid finds pieces that may overlap. The work is limited for every map.
 
 use std::collections::hash_map::Entry;
 
@@ -11,21 +11,21 @@ use qcbus_opendrive::{LaneLayer, LaneRef, Road, RoadMap, SectionRef, Side, Stati
 
 use super::driving::is_drivable;
 
-/// Length of a piece, in metres; more on maps with more than [`MOST_PIECES`] of them.
+/// Length of a piece in metres. It is larger on maps with more than [`MOST_PIECES`] pieces.
 const STEP: f64 = 5.0;
 const MOST_PIECES: f64 = 400_000.0;
 
-/// Heights that differ from the clearance by less, in metres, keep it.
+/// Tolerance of the clearance in metres. Smaller differences count as sufficient clearance.
 const SAME: f64 = 1e-6;
 
-/// Size of a cell of the grid, in metres, and the greatest number of cells that a piece may touch.
+/// Size of a grid cell in metres, and maximum number of cells of one piece.
 const CELL: f64 = 10.0;
 const MOST_CELLS: f64 = 400.0;
 
 /// A piece of a road.
 pub(crate) struct Slice {
     pub road: usize,
-    /// Where it begins and ends, in metres.
+    /// s of the start and of the end, in metres.
     pub from: f64,
     pub to: f64,
     pub width: f64,
@@ -34,7 +34,7 @@ pub(crate) struct Slice {
     bounds: Bounds,
 }
 
-/// The rectangle around a piece: the least and the greatest x, then y.
+/// Bounding rectangle of a piece: minimum and maximum of x, then of y.
 #[derive(Clone, Copy)]
 struct Bounds([f64; 2], [f64; 2]);
 
@@ -54,28 +54,28 @@ impl Bounds {
     }
 }
 
-/// A place where two roads cover the same ground, named by the two pieces that share most of it.
+/// A place where two roads cover the same ground, with the two pieces that overlap most.
 pub(crate) struct Overlap<'p> {
     pub one: &'p Slice,
     pub other: &'p Slice,
-    /// In square metres, of the whole place.
+    /// Area of the whole place in square metres.
     pub area: f64,
-    /// A point that both cover.
+    /// A point in both pieces.
     pub point: Point,
     pub z: f64,
 }
 
-/// What counts as an overlap.
+/// Limits that define an overlap.
 pub(crate) struct Limits {
-    /// Least area, in square metres.
+    /// Minimum area in square metres.
     pub area: f64,
-    /// By how much either edge is moved inward, in metres.
+    /// Distance in metres by which each edge is moved inward.
     pub shrink: f64,
-    /// Roads that are so far apart in height, in metres, lie over each other.
+    /// Vertical clearance in metres. Roads with at least this distance in height do not overlap.
     pub clearance: f64,
 }
 
-/// The pieces of all roads.
+/// Returns the pieces of all roads.
 pub(crate) fn slices(map: &RoadMap<'_>, limits: &Limits) -> Vec<Slice> {
     let lengths = map.roads().iter().filter_map(Road::length);
     let total: f64 = lengths.filter(|length| *length > 0.0).sum();
@@ -104,14 +104,14 @@ pub(crate) fn slices(map: &RoadMap<'_>, limits: &Limits) -> Vec<Slice> {
     slices
 }
 
-/// Whether vehicles travel along a lane: on those of annex D but hard shoulders, edges and the like,
-/// which neighbouring roads share at times.
+/// Checks whether vehicles travel along a lane. These are the lanes of annex D except hard
+/// shoulders, edges and the like, which neighbouring roads sometimes share.
 fn is_travelled(lane: LaneRef<'_, '_>) -> bool {
     let aside = matches!(lane.kind(), Some("border" | "stop" | "restricted"));
     is_drivable(lane) && !aside
 }
 
-/// Which lanes of a section are for vehicles, left and right, outward up to the last that is.
+/// Returns which lanes of a section are for vehicles, left and right, up to the outermost one.
 fn travelled(section: SectionRef<'_, '_>) -> [Vec<bool>; 2] {
     Side::BOTH.map(|side| {
         let mut lanes: Vec<bool> = section.side(side).map(is_travelled).collect();
@@ -125,8 +125,8 @@ fn travelled(section: SectionRef<'_, '_>) -> [Vec<bool>; 2] {
     })
 }
 
-/// The left and the right end of the lanes for vehicles at s, and the elevation. `lanes` are those
-/// of each section of the layer.
+/// Returns the left and the right end of the lanes for vehicles at s, and the elevation. `lanes`
+/// contains the entries for each section of the layer.
 fn edge<'a>(
     road: &Road<'a>,
     layer: &LaneLayer<'a>,
@@ -180,7 +180,7 @@ fn slice(
         corners,
         bounds: Bounds::of(&corners),
     };
-    // Where a border turns back the corners are not in order, and nothing can be said.
+    // If a border turns back, the corners are not in order and the piece cannot be compared.
     let convex = (0..4).all(|at| {
         let [a, b, c] = [0, 1, 2].map(|next| corners[(at + next) % 4]);
         turn(a, b, c) > 0.0
@@ -188,14 +188,14 @@ fn slice(
     convex.then_some(slice)
 }
 
-/// Twice the signed area of a triangle.
+/// Returns twice the signed area of a triangle.
 pub(crate) fn turn(a: Point, b: Point, c: Point) -> f64 {
     (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y)
 }
 
-/// Calls `found` with the places where two roads, or two parts of one, cover the same ground: one for each
-/// pair and place, if two pieces that `wanted` accepts share more than the least area there. The pieces
-/// are those that share most, the area is that of the whole place.
+/// Calls `found` for each place where two roads, or two parts of one road, cover the same ground. A
+/// place counts if two pieces that `wanted` accepts share more than the minimum area. The result
+/// contains the two pieces that overlap most and the area of the whole place.
 pub(crate) fn overlaps<'p>(
     slices: &'p [Slice],
     limits: &Limits,
@@ -204,7 +204,7 @@ pub(crate) fn overlaps<'p>(
 ) {
     let mut cells = Cells::default();
     let mut spots = Spots::default();
-    // Enough for every map that is one; pieces heaped up at one place are not compared for ever.
+    // The budget suffices for every real map and limits the work on stacked pieces.
     let mut budget = 10_000_000 + 100 * slices.len();
     'all: for (one, at) in slices.iter().zip(0_u32..) {
         for cell in cells_of(one) {
@@ -216,7 +216,7 @@ pub(crate) fn overlaps<'p>(
                 }
                 let level = (one.z - other.z).abs() < limits.clearance - SAME;
                 let near = level && one.bounds.meets(&other.bounds);
-                // Pieces that share several cells are met in the first of them only.
+                // Pieces that share several cells are compared only in the first of them.
                 if near && first_common(one, other) == cell && wanted(other, one) {
                     budget = budget.saturating_sub(COMPARED);
                     if let Some((area, point)) = common(one, other) {
@@ -229,10 +229,10 @@ pub(crate) fn overlaps<'p>(
     spots.tell(limits, found);
 }
 
-/// How many pairs of pieces may be met in the time in which one is compared.
+/// Cost of a comparison of two pieces, relative to a lookup of a pair.
 const COMPARED: usize = 8;
 
-/// The first cell that two pieces share whose rectangles meet.
+/// Returns the first common cell of two pieces whose rectangles meet.
 fn first_common(one: &Slice, other: &Slice) -> (i64, i64) {
     let first = |one: [f64; 2], other: [f64; 2]| (one[0].max(other[0]) / CELL).floor() as i64;
     (
@@ -241,25 +241,25 @@ fn first_common(one: &Slice, other: &Slice) -> (i64, i64) {
     )
 }
 
-/// By this much more two pieces must share to stand for their place: of equals it is the first.
+/// Factor by which a larger shared area replaces the pieces of a place. Equal areas do not.
 const MUCH_MORE: f64 = 1.01;
 
-/// More places than this are not told apart for one pair of roads.
+/// Maximum number of places that are distinguished for one pair of roads.
 const MOST_SPOTS: usize = 16;
 
-/// Places where roads cover the same ground, in the order in which they were found.
+/// Places where roads cover the same ground, in the order of discovery.
 #[derive(Default)]
 struct Spots<'p> {
     spots: Vec<Spot<'p>>,
-    /// Those of each pair of roads.
+    /// Indices of the places of each pair of roads.
     of_pair: HashMap<(usize, usize), Vec<usize>>,
 }
 
 struct Spot<'p> {
     main: Overlap<'p>,
-    /// The greatest area that two pieces share.
+    /// The largest area that two pieces share.
     most: f64,
-    /// How far the place goes along the one road and the other.
+    /// Extent of the place along the first and the second road.
     ranges: [[f64; 2]; 2],
 }
 
@@ -318,24 +318,24 @@ impl<'p> Spots<'p> {
     }
 }
 
-/// Whether two stretches of a road lie next to each other, but for one piece.
+/// Checks whether two stretches of a road are at most one piece apart.
 fn touch(one: [f64; 2], other: [f64; 2]) -> bool {
     let piece = other[1] - other[0];
     one[0] <= other[1] + piece && other[0] <= one[1] + piece
 }
 
-/// Which pieces touch which cell, in the order in which they were put there. All lists share their
-/// memory: there are as many cells as pieces.
+/// The pieces in each cell, in the order of insertion. All lists share one allocation, because
+/// there are as many cells as pieces.
 #[derive(Default)]
 struct Cells {
-    /// The first and the last entry of each cell.
+    /// Indices of the first and the last entry of each cell.
     ends: HashMap<(i64, i64), (u32, u32)>,
-    /// Pieces, each with the next entry of its cell.
+    /// Pieces, each with the index of the next entry of its cell.
     entries: Vec<(u32, Option<u32>)>,
 }
 
 impl Cells {
-    /// Puts a piece into a cell; those that were there before.
+    /// Puts a piece into a cell and returns the earlier pieces of this cell.
     fn put(&mut self, cell: (i64, i64), piece: u32) -> impl Iterator<Item = u32> {
         let place = u32::try_from(self.entries.len()).unwrap_or(u32::MAX);
         self.entries.push((piece, None));
@@ -362,7 +362,7 @@ impl Cells {
     }
 }
 
-/// The cells that a piece touches; none when it is too large to be a piece of a road.
+/// Returns the cells that a piece touches, or none if the piece is too large for a road.
 fn cells_of(slice: &Slice) -> impl Iterator<Item = (i64, i64)> + use<> {
     let Bounds(x, y) = slice.bounds;
     let [left, right] = x.map(|x| (x / CELL).floor());
@@ -377,7 +377,7 @@ fn cells_of(slice: &Slice) -> impl Iterator<Item = (i64, i64)> + use<> {
     rows.into_iter().flatten().flat_map(cells)
 }
 
-/// The area that two pieces have in common, and its middle.
+/// Returns the common area of two pieces and its middle.
 fn common(one: &Slice, other: &Slice) -> Option<(f64, Point)> {
     let mut shape = one.corners.to_vec();
     for at in 0..4 {
@@ -400,7 +400,7 @@ fn common(one: &Slice, other: &Slice) -> Option<(f64, Point)> {
     ))
 }
 
-/// What of a convex polygon lies to the left of a line.
+/// Returns the part of a convex polygon to the left of a line.
 pub(crate) fn cut(shape: &[Point], a: Point, b: Point) -> Vec<Point> {
     let mut kept = Vec::with_capacity(shape.len() + 2);
     for (one, next) in super::polygons::sides(shape) {

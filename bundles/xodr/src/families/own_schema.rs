@@ -1,12 +1,12 @@
-//! What the schema of a file's own version says already. It is asked late, for it takes a walk through the
-//! document: only files with something odd have anything to ask.
+//! Facts that the schema of the file's own version already reports. Only files with something
+//! unusual evaluate it, because it requires a walk through the document.
 
 use std::cell::OnceCell;
 
 use qcbus_document::{Attribute, Document, FileKind, Node};
 use qcbus_schema::{Typing, version_of};
 
-/// The types of a document by the schema of the version that its header names.
+/// Types of a document according to the schema of the version in its header.
 pub(crate) struct OwnSchema<'d> {
     document: Document<'d>,
     typing: OnceCell<Option<Typing>>,
@@ -20,13 +20,13 @@ impl<'d> OwnSchema<'d> {
         }
     }
 
-    /// Whether it lists the words of an attribute, and so reports others.
+    /// Checks whether the schema lists the words of an attribute and therefore reports other words.
     pub fn lists(&self, attribute: Attribute<'_>) -> bool {
         let value = self.typing().and_then(|typing| typing.value(attribute));
         value.is_some_and(|value| value.words().is_some())
     }
 
-    /// Whether it demands an attribute, and so reports that it is missing.
+    /// Checks whether the schema requires an attribute and therefore reports that it is missing.
     pub fn demands(&self, node: Node<'_>, attribute: &str) -> bool {
         let typing = self.typing();
         typing.is_some_and(|typing| typing.demands(node, attribute))

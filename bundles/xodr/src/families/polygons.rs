@@ -1,8 +1,8 @@
-//! Plane polygons.
+//! Functions for plane polygons.
 
 use qcbus_opendrive::geometry::Point;
 
-/// How far a point lies from a line between two others, in metres.
+/// Returns the distance of a point from the line between two others, in metres.
 pub(crate) fn distance_to_line(point: Point, one: Point, other: Point) -> f64 {
     let (dx, dy) = (other.x - one.x, other.y - one.y);
     let squared = dx * dx + dy * dy;
@@ -18,20 +18,20 @@ pub(crate) fn distance_to_line(point: Point, one: Point, other: Point) -> f64 {
     point.distance(foot)
 }
 
-/// The sides of a polygon, the last point being joined to the first.
+/// Returns the sides of a polygon. The last side joins the last point to the first.
 pub(crate) fn sides(polygon: &[Point]) -> impl Iterator<Item = (Point, Point)> {
     let next = polygon.iter().cycle().skip(1);
     polygon.iter().copied().zip(next.copied())
 }
 
-/// How far a point lies from the boundary of a polygon, in metres.
+/// Returns the distance of a point from the boundary of a polygon, in metres.
 pub(crate) fn distance_to_boundary(point: Point, polygon: &[Point]) -> f64 {
     sides(polygon)
         .map(|(one, other)| distance_to_line(point, one, other))
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Whether a point lies inside a polygon, by the number of sides that a ray crosses.
+/// Checks whether a point lies inside a polygon, by the number of sides that a ray crosses.
 pub(crate) fn contains(polygon: &[Point], point: Point) -> bool {
     let crosses = |one: Point, other: Point| {
         (one.y > point.y) != (other.y > point.y)

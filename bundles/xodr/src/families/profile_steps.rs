@@ -1,4 +1,4 @@
-//! Steps in elevation and lateral profile (OpenDRIVE 1.9, 10.5, annex D.1.4).
+//! Checks for steps in elevation and lateral profile (OpenDRIVE 1.9, 10.5, annex D.1.4).
 
 use std::collections::BTreeSet;
 
@@ -11,7 +11,7 @@ use super::on_road::OnRoad;
 use super::shown::number;
 use super::touching::STEP;
 
-/// The starts of all records but the first, with their elements.
+/// Returns the starts of all records except the first, with their elements.
 fn breaks<'p, 'a>(profile: &'p Profile<'a>) -> impl Iterator<Item = (f64, Node<'a>)> + use<'p, 'a> {
     let inner = profile.in_order().skip(1);
     inner.filter_map(|record| Some((record.start()?, record.node())))
@@ -39,7 +39,7 @@ pub(crate) fn elevation(road: &Road<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Reports steps of superelevation and cross section surface, as far out as there are lanes.
+/// Reports steps of superelevation and cross section surface within the width of the lanes.
 pub(crate) fn lateral(road: &Road<'_>, found: &mut Sink<'_>) {
     let lateral = road.lateral();
     let roll = &lateral.superelevation;
@@ -59,7 +59,7 @@ pub(crate) fn lateral(road: &Road<'_>, found: &mut Sink<'_>) {
         .flat_map(|strip| strip.coefficients.iter().chain([&strip.width]));
     let mut seen = BTreeSet::new();
     for (s, node) in of_strips.chain([&surface.t_offset]).flat_map(breaks) {
-        // Several components may have a record at the same place; one of them stands for all.
+        // Several components may have a record at the same place. One check covers all of them.
         if seen.insert(s.to_bits()) {
             let step =
                 |t: f64| Some(surface.height(s, t)? - surface.height(Station::before(s), t)?);
@@ -84,7 +84,7 @@ fn report(
     let [Some(left), Some(right)] = edges else {
         return;
     };
-    // Halfway as well: a surface may be bent.
+    // The points halfway are checked as well, because a surface may be curved.
     let places = [left, right, 0.5 * left, 0.5 * right, 0.5 * (left + right)];
     let steps = places.into_iter().filter_map(|t| Some((t, step(t)?.abs())));
     let worst = steps.max_by(|one, other| one.1.total_cmp(&other.1));

@@ -1,8 +1,8 @@
-//! The names that PROJ knows, <https://proj.org>: its operations, ellipsoids, datums, prime meridians and units, as its
-//! sources list them up to PROJ 9 (`pj_list.h`, `ellps.cpp`, `datums.cpp`, `units.cpp`), and its most common
-//! parameters. They are compared as PROJ does it, with case.
+//! Names that PROJ knows, <https://proj.org>: operations, ellipsoids, datums, prime meridians and
+//! units in its sources up to PROJ 9 (`pj_list.h`, `ellps.cpp`, `datums.cpp`, `units.cpp`), and
+//! common parameters. As in PROJ, case matters.
 
-/// What `+proj=` may name.
+/// Valid names for `+proj=`.
 pub(crate) const OPERATIONS: &str = "\
     adams_hemi adams_ws1 adams_ws2 aea aeqd affine airocean airy aitoff alsk apian august axisswap bacon bertin1953 \
     bipc boggs bonne calcofi cart cass cc ccon cea chamb col_urban collg comill crast defmodel deformation denoy \
@@ -17,28 +17,28 @@ pub(crate) const OPERATIONS: &str = "\
     vandg4 vertoffset vgridshift vitk1 wag1 wag2 wag3 wag4 wag5 wag6 wag7 webmerc weren wink1 wink2 wintri \
     xyzgridshift";
 
-/// What `+ellps=` may name.
+/// Valid names for `+ellps=`.
 pub(crate) const ELLIPSOIDS: &str = "\
     APL4.9 CPM danish GRS67 GRS80 GSK2011 IAU76 MERIT NWL9D PZ90 SEasia SGS85 WGS60 WGS66 WGS72 WGS84 airy andrae \
     aust_SA bess_nam bessel clrk66 clrk80 clrk80ign delmbr engelis evrst30 evrst48 evrst56 evrst69 evrstSS fschr60 \
     fschr60m fschr68 helmert hough intl kaula krass lerch mod_airy mprts new_intl plessis sphere walbeck";
 
-/// What `+datum=` may name.
+/// Valid names for `+datum=`.
 pub(crate) const DATUMS: &str =
     "WGS84 GGRS87 NAD83 NAD27 potsdam carthage hermannskogel ire65 nzgd49 OSGB36";
 
-/// What `+pm=` may name beside a number.
+/// Valid names for `+pm=`. Numbers are valid as well.
 pub(crate) const MERIDIANS: &str = "\
     greenwich lisbon paris bogota madrid rome bern jakarta ferro brussels stockholm athens oslo copenhagen";
 
-/// What `+units=` and `+vunits=` may name.
+/// Valid names for `+units=` and `+vunits=`.
 pub(crate) const UNITS: &str = "\
     m km dm cm mm kmi in ft yd mi fath ch link us-in us-ft us-yd us-ch us-mi ind-yd ind-ft ind-ch";
 
-/// Operations whose result is not in metres on a plane: degrees, or coordinates from the Earth's centre.
+/// Operations that do not give metres on a plane: degrees, or coordinates from the Earth's centre.
 pub(crate) const NO_PROJECTIONS: &str = "longlat lonlat latlong latlon geocent cart noop";
 
-/// The parameters that are angles, with the greatest value [°].
+/// Parameters that are angles, with their maximum value [°].
 pub(crate) const ANGLES: &[(&str, f64)] = &[
     ("lat_0", 90.0),
     ("lat_1", 90.0),
@@ -54,7 +54,7 @@ pub(crate) const ANGLES: &[(&str, f64)] = &[
     ("gamma", 360.0),
 ];
 
-/// The parameters that are numbers; whether they must be greater than zero.
+/// Parameters that are numbers. The flag tells whether the number must be greater than zero.
 pub(crate) const NUMBERS: &[(&str, bool)] = &[
     ("x_0", false),
     ("y_0", false),
@@ -68,7 +68,7 @@ pub(crate) const NUMBERS: &[(&str, bool)] = &[
     ("to_meter", true),
 ];
 
-/// The parameters that name something, and what.
+/// Parameters that take a name, with the kind of name and the valid names.
 pub(crate) const CHOICES: &[(&str, &str, &str)] = &[
     ("proj", "projection", OPERATIONS),
     ("ellps", "ellipsoid", ELLIPSOIDS),
@@ -77,15 +77,15 @@ pub(crate) const CHOICES: &[(&str, &str, &str)] = &[
     ("vunits", "unit of length", UNITS),
 ];
 
-/// Projections onto a cone, which one or two latitudes define.
+/// Projections onto a cone, defined by one or two latitudes.
 pub(crate) const CONES: &[&str] = &["lcc", "aea", "eqdc"];
 
-/// The names of a list.
+/// Returns the names of a list.
 pub(crate) fn names(list: &'static str) -> impl Iterator<Item = &'static str> {
     list.split_whitespace()
 }
 
-/// The parameters that need a value.
+/// Returns the parameters that need a value.
 pub(crate) fn keys() -> impl Iterator<Item = &'static str> {
     let angles = ANGLES.iter().map(|(key, _)| *key);
     let numbers = NUMBERS.iter().map(|(key, _)| *key);

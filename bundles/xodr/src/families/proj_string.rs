@@ -1,5 +1,5 @@
-//! What is wrong with a PROJ string. PROJ itself stays silent about much of it: it ignores names that it does not
-//! know, and takes defaults for what is missing.
+//! Checks of a PROJ string. PROJ itself does not report many faults: it ignores unknown names and
+//! uses defaults for missing values.
 
 use qcbus_schema::closest;
 use qcbus_sdk::Level;
@@ -8,13 +8,13 @@ use super::georeference::code;
 use super::proj_names::{ANGLES, CHOICES, CONES, MERIDIANS, NO_PROJECTIONS, NUMBERS, keys, names};
 use super::proj_values::{degrees, number};
 
-/// One thing that is wrong, in words.
+/// One fault with its level and text.
 pub(crate) struct Flaw {
     pub(crate) level: Level,
     pub(crate) text: String,
 }
 
-/// A string has a dozen words; of a longer one than this no more is looked at, and of words no more than so many bytes.
+/// Maximum numbers of checked words, where a dozen is usual, and of bytes per word.
 const MOST_WORDS: usize = 200;
 const LONGEST_WORD: usize = 100;
 
@@ -24,7 +24,7 @@ struct Word<'t> {
     value: Option<&'t str>,
 }
 
-/// Whether a text means to be a PROJ string.
+/// Checks whether a text is intended as a PROJ string.
 pub(crate) fn is_one(text: &str) -> bool {
     joined(text).split_whitespace().any(|word| {
         let name = word.trim_start_matches('+');
@@ -32,7 +32,7 @@ pub(crate) fn is_one(text: &str) -> bool {
     })
 }
 
-/// All that is wrong with it.
+/// Returns all faults of the string.
 pub(crate) fn flaws(text: &str) -> Vec<Flaw> {
     let text = joined(text);
     let words = text.split_whitespace().take(MOST_WORDS);
@@ -55,7 +55,7 @@ pub(crate) fn flaws(text: &str) -> Vec<Flaw> {
         );
     }
     for word in &words {
-        // The steps of a pipeline have parameters of their own.
+        // The steps of a pipeline have their own parameters.
         if (!is_pipeline || word.key == "proj")
             && let Some(text) = flaw(word)
         {
@@ -86,7 +86,7 @@ pub(crate) fn flaws(text: &str) -> Vec<Flaw> {
     flaws
 }
 
-/// The string without blanks around `=`, which PROJ allows; a value that is missing stays missing.
+/// Returns the string without blanks around `=`, as PROJ allows. Missing values stay missing.
 fn joined(text: &str) -> String {
     let mut all = String::with_capacity(text.len());
     for (index, part) in text.split('=').map(str::trim).enumerate() {
@@ -160,7 +160,7 @@ fn flaw(word: &Word<'_>) -> Option<String> {
     misspelt(key)
 }
 
-/// Scales far from 1 and units other than metres: the coordinates of a map are metres.
+/// Reports scales far from 1 and units other than metres, the unit of map coordinates.
 fn scale(key: &str, value: &str, number: f64) -> Option<String> {
     match key {
         "k" | "k_0" if !(0.5..=2.0).contains(&number) => Some(format!(
@@ -194,7 +194,7 @@ fn unknown(key: &str, value: &str, what: &str, list: &'static str) -> Option<Str
     ))
 }
 
-/// `+lat_0`, `+lat_0=` and `+lat_048`.
+/// Reports a missing value or `=`: `+lat_0`, `+lat_0=` and `+lat_048`.
 fn without_value(word: &Word<'_>) -> Option<String> {
     let key = word.key;
     let run_together = |name: &&str| {
@@ -204,13 +204,13 @@ fn without_value(word: &Word<'_>) -> Option<String> {
     if let Some(name) = keys().find(|name| *name == key) {
         return Some(format!("`+{name}` has no value; write `+{name}=…`"));
     }
-    // Such as `lat_048`; what begins with `k` or `a` may be anything.
+    // This finds words such as `lat_048`. Words that begin with `k` or `a` are ambiguous.
     let name = keys().filter(|name| name.len() > 2).find(run_together)?;
     let rest = key.strip_prefix(name)?;
     Some(format!("`+{key}` lacks the `=`; write `+{name}={rest}`"))
 }
 
-/// `+lat0` and `+Lon_0`, which PROJ ignores without a word.
+/// Reports misspelt names such as `+lat0` and `+Lon_0`, which PROJ ignores silently.
 fn misspelt(key: &str) -> Option<String> {
     let plain = |name: &str| name.replace(['_', '-'], "").to_ascii_lowercase();
     let meant = keys().find(|name| name.len() > 1 && plain(name) == plain(key) && *name != key)?;
@@ -236,11 +236,11 @@ fn warn_of_zone(zone: Option<&str>, longitude: Option<&str>, warn: &mut impl FnM
     }
 }
 
-/// One parameter with two values: PROJ takes the first.
+/// Warns of a parameter with two different values. PROJ takes the first one.
 fn twice(words: &[Word<'_>], warn: &mut impl FnMut(String)) {
     for (index, word) in words.iter().enumerate() {
         let mut before = words.iter().take(index);
-        // Two projections are a finding of their own.
+        // Two projections have a separate finding.
         if let Some(value) = word.value
             && word.key != "proj"
             && keys().any(|key| key == word.key)

@@ -1,11 +1,11 @@
-//! Numbers and angles as PROJ reads them.
+//! Parsing of numbers and angles as in PROJ.
 
-/// A finite number.
+/// Parses a finite number.
 pub(crate) fn number(text: &str) -> Option<f64> {
     text.parse().ok().filter(|number: &f64| number.is_finite())
 }
 
-/// Degrees as PROJ writes them: `11.5`, `-12d30'15.5"`, `9E`, `0.2r` (radians).
+/// Parses degrees in the notation of PROJ: `11.5`, `-12d30'15.5"`, `9E`, `0.2r` (radians).
 pub(crate) fn degrees(text: &str) -> Option<f64> {
     if let Some(degrees) = number(text) {
         return Some(degrees);

@@ -2,7 +2,7 @@
 
 use qcbus_opendrive::{LaneRef, RoadMap};
 
-/// The lanes of type `tram` and `rail`, with their type.
+/// Returns the lanes of type `tram` and `rail`, with their type.
 pub(crate) fn rail_lanes<'m, 'a>(
     map: &'m RoadMap<'a>,
 ) -> impl Iterator<Item = (LaneRef<'m, 'a>, &'a str)> {

@@ -1,19 +1,19 @@
-//! Records that say what already holds (OpenDRIVE 1.9, annex D.2).
+//! Records that repeat a value that already applies (OpenDRIVE 1.9, annex D.2).
 
 use qcbus_opendrive::geometry::{Cubic, heading_difference};
 use qcbus_opendrive::{Geometry, PlanView, Profile, Record, ShapeKind};
 
-/// A record with the one before it, which says the same.
+/// A record and the record before it with the same value.
 pub(crate) struct Repeated<'p, 'a> {
     pub first: &'p Record<'a>,
     pub second: &'p Record<'a>,
-    /// Where the second one holds.
+    /// Start of the stretch on which the second record applies.
     pub from: f64,
     pub to: f64,
 }
 
-/// Pairs of neighbouring records of which the second changes nothing: continued, the first one stays
-/// within `tolerance` of it until it ends. `end` is where the profile ends.
+/// Returns pairs of neighbouring records without any change: the continued first record stays
+/// within `tolerance` of the second one until its end. `end` is the end of the profile.
 pub(crate) fn in_profile<'p, 'a>(
     profile: &'p Profile<'a>,
     end: f64,
@@ -41,8 +41,8 @@ pub(crate) fn in_profile<'p, 'a>(
     pairs.collect()
 }
 
-/// Whether a difference stays within `tolerance` over a length. A record that never holds, because
-/// the profile ends or the next one starts there, says the same if its polynomial is the same.
+/// Checks whether a difference stays within `tolerance` over a length. A record without length
+/// counts as equal if its polynomial is the same. It ends with the profile or the next record.
 fn is_nothing(difference: &Cubic, length: f64, tolerance: f64) -> bool {
     if length <= 0.0 {
         let Cubic { a, b, c, d } = difference;
@@ -54,8 +54,8 @@ fn is_nothing(difference: &Cubic, length: f64, tolerance: f64) -> bool {
     extremes.is_some_and(|(least, most)| least.value >= -tolerance && most.value <= tolerance)
 }
 
-/// Pairs of neighbouring lines that are one line: they touch within `gap` metres and their headings
-/// differ by `turn` radians at most.
+/// Returns pairs of neighbouring lines that form one line. They touch within `gap` metres, and
+/// their headings differ by at most `turn` radians.
 pub(crate) fn in_lines<'p, 'a>(
     plan_view: &'p PlanView<'a>,
     gap: f64,

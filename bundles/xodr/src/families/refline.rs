@@ -1,4 +1,4 @@
-//! Where the geometries of a reference line meet (OpenDRIVE 1.9, 9.2).
+//! Contacts between the geometries of a reference line (OpenDRIVE 1.9, 9.2).
 
 use qcbus_opendrive::geometry::{Cubic, ParamPoly3};
 use qcbus_opendrive::{Geometry, Road, ShapeKind};
@@ -7,7 +7,7 @@ use qcbus_sdk::{Finding, Sink};
 use super::gap_levels::Misfit;
 use super::on_road::OnRoad;
 
-/// Each geometry with the next one, in ascending order of s.
+/// Returns each geometry with the next one, in ascending order of s.
 pub(crate) fn joints<'m, 'a>(
     road: &'m Road<'a>,
 ) -> impl Iterator<Item = (&'m Geometry<'a>, &'m Geometry<'a>)> {
@@ -15,13 +15,13 @@ pub(crate) fn joints<'m, 'a>(
     line.in_order().zip(line.in_order().skip(1))
 }
 
-/// The name of a geometry's shape, for texts.
+/// Returns the name of a geometry's shape, for texts.
 pub(crate) fn shape_name(geometry: &Geometry<'_>) -> &'static str {
     geometry.kind().map_or("no shape", ShapeKind::as_str)
 }
 
-/// Reports geometries that do not begin where the one before them ends, but more than `limit` metres away.
-/// `complete` may add to a finding.
+/// Reports geometries that begin more than `limit` metres from the end of the previous one.
+/// `complete` may extend a finding.
 pub(crate) fn report_gaps<'d>(
     road: &Road<'_>,
     limit: f64,
@@ -56,7 +56,7 @@ pub(crate) fn report_gaps<'d>(
     }
 }
 
-/// The parameter at which both coordinates of a parametric curve stand still.
+/// Returns the parameter at which both coordinates of a parametric curve have zero speed.
 pub(crate) fn standstill(geometry: &Geometry<'_>) -> Option<f64> {
     let curve = geometry.param_poly3()?;
     let last = curve.last_parameter(geometry.length()?);

@@ -1,4 +1,4 @@
-//! What stands at roads: signals and objects, and where they stand.
+//! Signals and objects along roads, and their positions.
 
 use std::cell::OnceCell;
 
@@ -8,20 +8,20 @@ use qcbus_opendrive::{LaneRef, Road, RoadMap, Side};
 
 use super::object_parts::number;
 
-/// The signals and objects of a road, references left out, in document order.
+/// Returns the objects and then the signals of a road, without references.
 pub(crate) fn things<'a>(road: &Road<'a>) -> impl Iterator<Item = Node<'a>> + use<'a> {
     let objects = road.objects().map(|object| object.node());
     let signals = road.signals().map(|signal| signal.node());
     objects.chain(signals)
 }
 
-/// A lane with how far a place within it lies from the nearer of its borders, in metres.
+/// A lane, with the distance of a point within it from the nearer border, in metres.
 pub(crate) struct Spot<'m, 'a> {
     pub lane: LaneRef<'m, 'a>,
     pub depth: f64,
 }
 
-/// The permanent lane at a place of a road.
+/// Returns the permanent lane at a position of a road.
 pub(crate) fn lane_at<'m, 'a>(road: &'m Road<'a>, s: f64, t: f64) -> Option<Spot<'m, 'a>> {
     let layer = road.permanent()?;
     [Side::Right, Side::Left].into_iter().find_map(|side| {
@@ -38,7 +38,7 @@ pub(crate) fn lane_at<'m, 'a>(road: &'m Road<'a>, s: f64, t: f64) -> Option<Spot
     })
 }
 
-/// t of the rightmost and the leftmost border of a road.
+/// Returns t of the rightmost and the leftmost border of a road.
 pub(crate) fn edges_at(road: &Road<'_>, s: f64) -> Option<[f64; 2]> {
     let layer = road.permanent()?;
     let edge = |side| {
@@ -49,24 +49,24 @@ pub(crate) fn edges_at(road: &Road<'_>, s: f64) -> Option<[f64; 2]> {
     Some([right.min(left), right.max(left)])
 }
 
-/// How far t lies beside the lanes of a road, in metres; beside the reference line where they are unknown.
+/// Returns the distance of t from the lanes, or else from the reference line, in metres.
 pub(crate) fn beside(road: &Road<'_>, s: f64, t: f64) -> f64 {
     let [right, left] = edges_at(road, s).unwrap_or([0.0, 0.0]);
     (t - left).max(right - t).max(0.0)
 }
 
-/// Whether roads pass near a place. The roads are laid out when it is asked for the first time.
+/// Cells that contain roads, for finding roads near a position. They are built on first use.
 pub(crate) struct NearRoads {
     /// A quarter of the reach, in metres.
     cell: f64,
     cells: OnceCell<HashSet<(i64, i64)>>,
 }
 
-/// No more places of a map are laid out than this, so that absurd lengths cost nothing.
+/// Maximum number of road positions in the index. It limits the cost of absurd lengths.
 const MOST_PLACES: f64 = 1e6;
 
 impl NearRoads {
-    /// For distances of `reach` metres.
+    /// Creates an index for distances of `reach` metres.
     pub fn new(reach: f64) -> NearRoads {
         NearRoads {
             cell: 0.25 * reach.max(1.0),
@@ -74,7 +74,7 @@ impl NearRoads {
         }
     }
 
-    /// Whether a road may pass within the reach of a place beside this one. Sure when it says no.
+    /// Checks whether a road may pass within the reach of a position. A "no" is reliable.
     pub fn any(&self, map: &RoadMap<'_>, road: &Road<'_>, s: f64, t: f64) -> Option<bool> {
         let place = road.pose(s)?.beside(t)?;
         let cells = self.cells.get_or_init(|| self.lay_out(map));
@@ -112,35 +112,35 @@ impl NearRoads {
     }
 }
 
-/// Whether an object or signal stands where its own attributes say: what is repeated does not, nor
-/// what has a position of its own.
+/// Checks whether an object or signal stands at the position in its own attributes. This is false
+/// for repeated ones and for those with a separate position element.
 pub(crate) fn stands_itself(node: Node<'_>) -> bool {
     let elsewhere = ["repeat", "positionRoad", "positionInertial"];
     !elsewhere.iter().any(|name| node.child(name).is_some())
 }
 
-/// `@s` and `@t` on the road.
+/// Returns `@s` and `@t` if the position is on the road.
 pub(crate) fn place(node: Node<'_>, road: &Road<'_>) -> Option<(f64, f64)> {
     let (s, t) = number(node, "s").zip(number(node, "t"))?;
     let length = road.length()?;
     (0.0..=length).contains(&s).then_some((s, t))
 }
 
-/// How an object is repeated along a road.
+/// Repetition of an object along a road.
 pub(crate) struct Row {
-    /// Where the row begins, and where it ends.
+    /// Start and end of the row, as s and t.
     pub ends: [(f64, f64); 2],
-    /// The distance of single copies; none for what goes on without gaps.
+    /// Distance between single copies, or `None` if the row has no gaps.
     pub distance: Option<f64>,
-    /// Whether it goes straight from end to end rather than along the road.
+    /// Whether the row is straight from end to end instead of following the road.
     pub is_straight: bool,
 }
 
-/// Copies of a row that are looked at.
+/// Maximum number of copies of a row that are checked.
 const MOST_COPIES: f64 = 100.0;
 
 impl Row {
-    /// The row of a `<repeat>` as far as it lies on the road.
+    /// Returns the row of a `<repeat>` if it lies on the road.
     pub fn of(repeat: Node<'_>, road: &Road<'_>) -> Option<Row> {
         let object = repeat.parent()?;
         let (s, length) = number(repeat, "s").zip(number(repeat, "length"))?;
@@ -155,7 +155,7 @@ impl Row {
         })
     }
 
-    /// Where copies stand; of very many, some.
+    /// Returns the positions of the copies. From a very long row it returns a sample.
     pub fn copies(&self) -> impl Iterator<Item = (f64, f64)> + use<> {
         let [(s, from), (end, to)] = self.ends;
         let length = end - s;
@@ -173,7 +173,7 @@ impl Row {
     }
 }
 
-/// t of the rightmost and the leftmost border of the lanes of a road that are of some kinds.
+/// Returns t of the rightmost and the leftmost border of the lanes of these types.
 pub(crate) fn lanes_at(road: &Road<'_>, s: f64, kinds: &[&str]) -> Option<[f64; 2]> {
     let layer = road.permanent()?;
     let mut range: Option<[f64; 2]> = None;

@@ -1,9 +1,9 @@
-//! Lanes that routes lead along, and where they enter and leave roads and junctions.
+//! Lanes for routes, and their entries to and exits from roads and junctions.
 
 use qcbus_opendrive::{ContactPoint, LaneRef, Road, Side};
 use qcbus_sdk::Param;
 
-/// Narrower lanes lead nobody anywhere.
+/// Minimum width of a lane for a route.
 pub(crate) const NARROW: Param = Param::number(
     "narrow",
     1.0,
@@ -11,8 +11,8 @@ pub(crate) const NARROW: Param = Param::number(
     "a lane that is narrower than this is taken to begin or end there",
 );
 
-/// Whether a lane is there for vehicles to get along. Narrower than what vehicles may drive on: nobody plans a
-/// route along a border.
+/// Checks whether a lane is intended for through traffic of vehicles. This is stricter than being
+/// drivable: routes do not use a border, for example.
 pub(crate) fn is_route(lane: LaneRef<'_, '_>) -> bool {
     matches!(
         lane.kind(),
@@ -35,7 +35,7 @@ pub(crate) fn is_route(lane: LaneRef<'_, '_>) -> bool {
     )
 }
 
-/// The lanes at an end of a road, those of the permanent layer.
+/// Returns the lanes of the permanent layer at an end of a road.
 pub(crate) fn lanes_at<'m, 'a>(
     road: &'m Road<'a>,
     end: ContactPoint,
@@ -47,7 +47,7 @@ pub(crate) fn lanes_at<'m, 'a>(
     sections.flatten()
 }
 
-/// The lanes at an end of a road along which routes lead: those of some width.
+/// Returns the lanes for routes at an end of a road that are wide enough.
 pub(crate) fn routes_at<'m, 'a>(
     road: &'m Road<'a>,
     end: ContactPoint,
@@ -58,7 +58,7 @@ pub(crate) fn routes_at<'m, 'a>(
         .filter(move |lane| is_wide(*lane, end, narrow))
 }
 
-/// Whether a lane is that wide at an end of its section.
+/// Checks whether a lane has at least this width at an end of its section.
 pub(crate) fn is_wide(lane: LaneRef<'_, '_>, end: ContactPoint, narrow: f64) -> bool {
     lane.width_at(end).is_some_and(|it| it >= narrow)
 }

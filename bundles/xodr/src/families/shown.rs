@@ -1,18 +1,18 @@
-//! Numbers in texts: as few digits as tell what they are.
+//! Numbers in texts, with as few digits as necessary.
 
-/// Decimals that are shown at most; what needs more is shown with an exponent.
+/// Maximum number of decimals. Numbers that need more are shown with an exponent.
 const MOST_DECIMALS: usize = 6;
 
-/// From here on a number is shown with an exponent.
+/// Magnitude from which a number is shown with an exponent.
 const LARGE: f64 = 1e9;
 
-/// A length, a width, a place: to the micrometre, without zeros behind it.
+/// Formats a length, a width or a position to the micrometre, without trailing zeros.
 pub(crate) fn number(value: f64) -> String {
     rounded(value, MOST_DECIMALS).unwrap_or_else(|| with_exponent(value))
 }
 
-/// A number beside the limit that it misses: millimetres, or as many digits more as it takes to see
-/// that the two differ.
+/// Formats a number beside its limit: in millimetres, or with as many more digits as necessary to
+/// show the difference.
 pub(crate) fn beside(value: f64, limit: f64) -> String {
     let differs = |text: &String| text.parse() != Ok(limit) && number(limit) != *text;
     (3..=MOST_DECIMALS)
@@ -20,7 +20,7 @@ pub(crate) fn beside(value: f64, limit: f64) -> String {
         .find(differs)
         .unwrap_or_else(|| {
             if (value - limit).abs() < 0.5 * limit.abs() {
-                // Nearly the limit: no rounding would tell.
+                // The value is close to the limit, so rounding would hide the difference.
                 format!("{value}")
             } else {
                 with_exponent(value)
@@ -28,7 +28,7 @@ pub(crate) fn beside(value: f64, limit: f64) -> String {
         })
 }
 
-/// With so many decimals at most, unless that would make nothing or a row of digits of it.
+/// Rounds to at most this number of decimals, or returns `None` for zero or too many digits.
 fn rounded(value: f64, decimals: usize) -> Option<String> {
     if value.abs() >= LARGE {
         return None;

@@ -1,20 +1,20 @@
-//! What a simulator does not have. Such rules run only where they are asked for.
+//! Elements that a simulator does not support. These rules run only on request.
 
 use qcbus_document::Node;
 use qcbus_opendrive::{RoadMap, is_user_data};
 use qcbus_sdk::Sink;
 
-/// Elements that a simulator reads otherwise than the standard, or not at all.
+/// Elements that a simulator ignores or reads differently from the standard.
 pub(crate) struct Gap {
-    /// The name of the element.
+    /// Name of the elements.
     pub(crate) element: &'static str,
-    /// Which of that name it is about.
+    /// Filter for the elements with this name.
     pub(crate) is_meant: fn(Node<'_>) -> bool,
-    /// What they are, and what the simulator does with them.
+    /// Description of the elements and of the behaviour of the simulator.
     pub(crate) text: &'static str,
 }
 
-/// Says the gaps that a map runs into: the first place of each, and how many more there are.
+/// Reports the gaps in a map: the first place of each and the number of further places.
 pub(crate) fn report(map: &RoadMap<'_>, gaps: &[Gap], found: &mut Sink<'_>) {
     let Some(root) = map.root() else { return };
     for gap in gaps {
@@ -25,7 +25,7 @@ pub(crate) fn report(map: &RoadMap<'_>, gaps: &[Gap], found: &mut Sink<'_>) {
     }
 }
 
-/// How many more there are.
+/// Returns a text with the number of further places.
 pub(crate) fn further(count: usize) -> String {
     match count {
         0 => String::new(),
@@ -34,12 +34,12 @@ pub(crate) fn further(count: usize) -> String {
     }
 }
 
-/// Every one of its name.
+/// Accepts every element with the name.
 pub(crate) fn any(_: Node<'_>) -> bool {
     true
 }
 
-/// A `border` of a lane that has no `width`, which would win.
+/// Accepts the first `border` of a lane without `width`, because `width` takes precedence.
 pub(crate) fn lane_border(border: Node<'_>) -> bool {
     let lane = border.parent().filter(|lane| lane.is("lane"));
     lane.is_some_and(|lane| lane.child("width").is_none() && lane.child("border") == Some(border))

@@ -1,4 +1,4 @@
-//! Strips of ground along roads, cut into quadrangles, and what two of them have in common.
+//! Strips of ground along roads, cut into quadrangles, and the common area of two quadrangles.
 
 use qcbus_opendrive::geometry::Point;
 use qcbus_opendrive::{Road, Side, Station};
@@ -6,26 +6,26 @@ use qcbus_opendrive::{Road, Side, Station};
 use super::driving::is_drivable;
 use super::overlap::{cut, turn};
 
-/// More quadrangles than this are not made of one strip.
+/// Maximum number of quadrangles of one strip.
 const MOST: f64 = 1024.0;
 
 /// A quadrangle of a strip, between two cross sections of its road.
 #[derive(Debug, Clone)]
 pub(crate) struct Patch {
-    /// s of the cross sections, in metres, the first one first along the strip.
+    /// s of the two cross sections in metres, in the direction of the strip.
     pub from: f64,
     pub to: f64,
     /// t of the right and the left edge at both cross sections.
     edges: [(f64, f64); 2],
-    /// Counter-clockwise.
+    /// The corners, counter-clockwise.
     pub corners: [Point; 4],
 }
 
-/// t of the right and the left edge of a strip; `None` where there is no strip.
+/// t of the right and the left edge of a strip. `None` means that there is no strip.
 type Edges = (f64, f64);
 
-/// The strip over `range`, in steps of about `step` metres; it runs backwards when the range does. Either
-/// edge is moved inward by `shrink`. Without its parts that are not quadrangles.
+/// Returns the strip over `range` in steps of about `step` metres, backwards if the range is. Each
+/// edge moves inward by `shrink`. Parts that are not convex quadrangles are left out.
 pub(crate) fn strip(
     road: &Road<'_>,
     range: [f64; 2],
@@ -45,7 +45,7 @@ pub(crate) fn strip(
         let pose = road.pose(station)?;
         (left - right > 0.05).then_some(((right, left), pose.beside(right)?, pose.beside(left)?))
     };
-    // Where s descends, what ends at a station comes first.
+    // If s descends, the section that ends at a station comes first.
     let sides = |s: f64| [Station::at(s), Station::before(s)];
     let (first, last) = if from < to { (0, 1) } else { (1, 0) };
     let patches = (0..count as usize).filter_map(|index| {
@@ -73,7 +73,7 @@ pub(crate) fn strip(
 }
 
 impl Patch {
-    /// s and t of a point within the quadrangle.
+    /// Returns s and t of a point within the quadrangle.
     pub fn road_coordinates(&self, point: Point) -> (f64, f64) {
         let [a, b, c, d] = self.corners;
         let distance = |one: Point, other: Point| {
@@ -94,7 +94,7 @@ impl Patch {
         let across = ((point.x - right.x) * (left.x - right.x)
             + (point.y - right.y) * (left.y - right.y))
             / (width * width);
-        // `share` counts along s, the cross sections along the strip.
+        // `share` is measured along s, but the cross sections follow the strip.
         let along = if self.from <= self.to {
             share
         } else {
@@ -110,7 +110,7 @@ impl Patch {
     }
 }
 
-/// What two convex polygons, both counter-clockwise, have in common; `None` when they do not overlap.
+/// Returns the intersection of two convex counter-clockwise polygons, or `None` if empty.
 pub(crate) fn common(one: &[Point], other: &[Point]) -> Option<Vec<Point>> {
     let range = |shape: &[Point], part: fn(&Point) -> f64| {
         let values = shape.iter().map(part);
@@ -134,26 +134,26 @@ pub(crate) fn common(one: &[Point], other: &[Point]) -> Option<Vec<Point>> {
     Some(shape)
 }
 
-/// The area of a convex polygon in square metres.
+/// Returns the area of a convex polygon in square metres.
 pub(crate) fn area(shape: &[Point]) -> f64 {
     0.5 * super::junction_area::doubled_area(shape).abs()
 }
 
-/// The middle of a polygon's corners.
+/// Returns the middle of a polygon's corners.
 pub(crate) fn middle(shape: &[Point]) -> Option<Point> {
     let count = shape.len() as f64;
     let sum = |part: fn(&Point) -> f64| shape.iter().map(part).sum::<f64>() / count;
     Point::finite(sum(|point| point.x), sum(|point| point.y))
 }
 
-/// Lanes of other traffic than that of vehicles, by its type.
+/// Types of lanes for traffic other than vehicles.
 const TRAFFIC: [&str; 6] = ["rail", "tram", "biking", "walking", "sidewalk", "curb"];
 const ON_FOOT: [&str; 3] = ["walking", "sidewalk", "curb"];
-/// Drivable, but nobody travels there.
+/// Drivable types of lanes without regular traffic.
 const ASIDE: [&str; 3] = ["border", "stop", "restricted"];
 
-/// t of the right and the left end of a road's lanes with traffic at a station. Footways count where there is
-/// no other traffic.
+/// Returns t of the right and the left end of a road's lanes with traffic at a station. Footways
+/// count only where there is no other traffic.
 pub(crate) fn traffic_edges(road: &Road<'_>, station: Station) -> Option<Edges> {
     let mut extents: [Option<Edges>; 2] = [None; 2];
     for side in Side::BOTH {

@@ -1,11 +1,11 @@
-//! Where the boxes of objects with a surface lie on the ground (OpenDRIVE 1.9, 13.1, 13.4, 13.13).
+//! Ground boxes of objects with a surface (OpenDRIVE 1.9, 13.1, 13.4, 13.13).
 
 use qcbus_opendrive::geometry::Point;
 use qcbus_opendrive::{Object, Repeat, Road, RoadMap};
 
 use super::object_parts::number;
 
-/// More copies than this are not laid out of one object, or of all objects together.
+/// Maximum numbers of copies of one object, and of boxes of all objects together.
 const MOST_COPIES: f64 = 1000.0;
 const MOST: usize = 50_000;
 
@@ -13,16 +13,16 @@ const MOST: usize = 50_000;
 pub(crate) struct SurfaceBox<'m, 'a> {
     pub road: &'m Road<'a>,
     pub object: Object<'a>,
-    /// Its middle in the coordinates of the road, in metres.
+    /// s and t of its middle on the road, in metres.
     pub s: f64,
     pub t: f64,
     /// The corners of its base, counter-clockwise.
     pub corners: [Point; 4],
-    /// From its lowest to its highest point.
+    /// Height of its lowest and of its highest point.
     pub heights: [f64; 2],
 }
 
-/// The boxes of all objects with a surface, copies included.
+/// Returns the boxes of all objects with a surface, copies included.
 pub(crate) fn surface_boxes<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<SurfaceBox<'m, 'a>> {
     let mut boxes = Vec::new();
     for (road, object) in map.objects() {
@@ -44,8 +44,8 @@ pub(crate) fn surface_boxes<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<SurfaceBox<'m, 
     boxes
 }
 
-/// The copies that a `<repeat>` makes. What repeats without a distance is one long thing, which a surface
-/// must not be.
+/// Returns the copies that a `<repeat>` creates. A repeat without a distance is one long object,
+/// which must not have a surface.
 fn copies<'m, 'a>(
     road: &'m Road<'a>,
     object: Object<'a>,
@@ -125,7 +125,7 @@ fn surface_box<'m, 'a>(
 }
 
 impl SurfaceBox<'_, '_> {
-    /// The greatest and the least x of its corners.
+    /// Returns the smallest and the largest x of its corners.
     pub fn extent(&self) -> [f64; 2] {
         let values = self.corners.iter().map(|corner| corner.x);
         let low = values.clone().fold(f64::INFINITY, f64::min);

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use qcbus_opendrive::{Road, RoadMap, Switch};
 
-/// All switches with the road on which they are defined, by id; the first of those that share one.
+/// Returns all switches by id with their road. For a shared id it returns the first one.
 pub(crate) fn by_id<'m, 'a>(map: &'m RoadMap<'a>) -> HashMap<&'a str, (&'m Road<'a>, Switch<'a>)> {
     let mut all = HashMap::new();
     for road in map.roads() {

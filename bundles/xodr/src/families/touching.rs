@@ -1,4 +1,4 @@
-//! How well linked lanes continue each other (OpenDRIVE 1.9, annex D.1).
+//! Continuity of linked lanes (OpenDRIVE 1.9, annex D.1).
 
 use std::f64::consts::PI;
 
@@ -31,26 +31,26 @@ pub(crate) const STEP: Param = Param::number(
     "largest difference in height that is accepted",
 );
 
-/// Up to which width, in metres, a lane has none where it touches another. Edges of such lanes
-/// have no direction that anybody drives in.
+/// Width in metres up to which a lane counts as zero at a contact with another lane. The direction
+/// of the edges of such lanes is meaningless.
 const NO_WIDTH: f64 = 0.001;
 
-/// Heights are compared where edges are not farther apart than this in the plan view, in metres:
-/// a gap does not hide a step.
+/// Maximum distance of edges in the plan view for comparing their heights, in metres. It allows
+/// small gaps, so that a gap does not hide a step.
 const NEAR: f64 = 0.1;
 
-/// Where two lanes touch.
+/// Kind of place where two lanes touch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Where {
     /// Within a road, or between two roads that are linked without a junction.
     Roads,
-    /// Between an incoming and a connecting road; whether the junction has heights of its own.
+    /// Between an incoming and a connecting road; whether the junction has its own heights.
     Connection { elevation_grid: bool },
     /// Between two roads of a direct junction.
     Direct,
 }
 
-/// Two drivable lanes with width that touch.
+/// Two drivable lanes that touch and have some width.
 pub(crate) struct Pair<'m, 'a> {
     pub touching: &'m TouchingLanes<'a>,
     pub from: LaneRef<'m, 'a>,
@@ -58,7 +58,7 @@ pub(crate) struct Pair<'m, 'a> {
     pub at: Where,
 }
 
-/// The drivable lanes that touch, once per pair.
+/// Returns the drivable lanes that touch, once per pair.
 pub(crate) fn pairs<'m, 'a>(part: MapPart<'m, 'a>) -> impl Iterator<Item = Pair<'m, 'a>> {
     pairs_of(part.map(), part.touching_lanes())
 }
@@ -100,17 +100,17 @@ pub(crate) fn place_of(
     }
 }
 
-/// What is wrong with one edge.
+/// A fault of one edge.
 pub(crate) struct EdgeFault {
     /// `left` or `right`, as seen along s of the first road.
     pub side: &'static str,
     pub amount: f64,
-    /// Where, on the first lane.
+    /// Position on the edge of the first lane.
     pub point: BorderPoint,
 }
 
 impl Pair<'_, '_> {
-    /// Whether one of the lanes is a kerb, which is lowered and bent where people and vehicles cross it.
+    /// Checks for a hard border, which is lowered and bent at crossings for people and vehicles.
     pub fn is_kerb(&self) -> bool {
         [self.from, self.to]
             .iter()
@@ -129,7 +129,7 @@ impl Pair<'_, '_> {
         faults.max_by(|one, other| one.amount.total_cmp(&other.amount))
     }
 
-    /// The edge that bends most, among those that meet within `gap` metres; in radians.
+    /// Returns the edge with the largest kink, in radians, if it meets within `gap` metres.
     pub fn kink(&self, gap: f64) -> Option<EdgeFault> {
         let turn = if self.touching.joint.is_reversed() {
             PI
@@ -143,8 +143,8 @@ impl Pair<'_, '_> {
         })
     }
 
-    /// The edge with the highest step, among those that meet; in metres. What a slope alone makes
-    /// of a gap in the plan view is not counted.
+    /// Returns the edge with the highest step among those that meet, in metres. The height
+    /// difference caused by a slope over a gap in the plan view is subtracted.
     pub fn step(&self) -> Option<EdgeFault> {
         self.worst(|[here, there]| {
             let apart = distance(here, there);
@@ -154,8 +154,8 @@ impl Pair<'_, '_> {
         })
     }
 
-    /// How far the lanes are tilted against each other, in radians, when both are at least
-    /// `width` metres wide.
+    /// Returns the tilt of the lanes against each other in radians, if both are at least `width`
+    /// metres wide.
     pub fn roll(&self, width: f64) -> Option<f64> {
         let roll = |at: usize| {
             let (left, right) = (self.touching.left[at].point, self.touching.right[at].point);
@@ -165,8 +165,8 @@ impl Pair<'_, '_> {
         Some((roll(0)? - roll(1)?).abs())
     }
 
-    /// The edge with the greatest change of slope, among those that meet, where nothing but
-    /// elevation and superelevation gives the roads their slope.
+    /// Returns the edge with the greatest change of slope among those that meet. Only roads without
+    /// lateral shapes other than superelevation are compared.
     pub fn pitch(&self, gap: f64, step: f64) -> Option<EdgeFault> {
         let flat = |lane: LaneRef<'_, '_>| lane.at.road.lateral().is_flat();
         if !flat(self.from) || !flat(self.to) {
@@ -185,7 +185,7 @@ impl Pair<'_, '_> {
         })
     }
 
-    /// Reports something about the pair, at the statement that links them.
+    /// Reports a fault of the pair at the link between the two lanes.
     pub fn report<'s, 'd>(
         &self,
         text: &str,
@@ -215,7 +215,7 @@ fn distance(here: BorderPoint, there: BorderPoint) -> f64 {
     here.point.plan().distance(there.point.plan())
 }
 
-/// Reports edges that bend where linked lanes touch.
+/// Reports edges with a kink where linked lanes touch.
 pub(crate) fn report_kink(pair: &Pair<'_, '_>, found: &mut Sink<'_>) {
     let limit = found.number(&KINK);
     if let Some(edge) = pair
@@ -234,7 +234,7 @@ pub(crate) fn report_kink(pair: &Pair<'_, '_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Reports steps in height where linked lanes touch; returns whether there was one.
+/// Reports steps in height where linked lanes touch. Returns whether there was one.
 pub(crate) fn report_step(pair: &Pair<'_, '_>, found: &mut Sink<'_>) -> bool {
     let limit = found.number(&STEP);
     let Some(edge) = pair.step().filter(|edge| edge.amount > limit) else {
@@ -249,8 +249,8 @@ pub(crate) fn report_step(pair: &Pair<'_, '_>, found: &mut Sink<'_>) -> bool {
     true
 }
 
-/// Reports kinks and steps between linked lanes at places of one sort: with gaps, what `smooth` means for
-/// junctions. Gaps are said by `lane_smoothness.contact_point_no_horizontal_gaps`.
+/// Reports kinks and steps at places of one kind. Together with gaps they define `smooth` for
+/// junctions; `lane_smoothness.contact_point_no_horizontal_gaps` reports gaps.
 pub(crate) fn report_misfits(
     map: &RoadMap<'_>,
     mine: impl Fn(Where) -> bool,

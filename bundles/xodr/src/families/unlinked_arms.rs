@@ -1,4 +1,4 @@
-//! Roads that lead into a junction and do not say so: the roads of the junction name them, they name none of it.
+//! Roads that lead into a junction without a link to it, although its roads refer to them.
 
 use std::collections::BTreeMap;
 
@@ -7,11 +7,11 @@ use qcbus_opendrive::{ContactPoint, JunctionType, Road, RoadContact, RoadEnd, Ro
 
 use super::mouths;
 
-/// Roads whose mouths lie less than this apart, in metres, lie at one place.
+/// Distance of mouths in metres below which two roads lie at the same place.
 const THERE: f64 = 1.0;
 
-/// Ends of incoming roads that are linked to nothing or to another junction, with the links of the connecting roads
-/// that begin or end there.
+/// Ends of incoming roads without a link or with a link to another junction. Each end has the links
+/// of the connecting roads that begin or end there.
 pub(crate) struct UnlinkedArms<'a>(BTreeMap<RoadEnd, Vec<RoadContact<'a>>>);
 
 impl<'a> UnlinkedArms<'a> {
@@ -44,7 +44,7 @@ impl<'a> UnlinkedArms<'a> {
         UnlinkedArms(ends)
     }
 
-    /// The ends in document order.
+    /// Returns the ends in document order.
     pub fn iter(&self) -> impl Iterator<Item = (RoadEnd, &[RoadContact<'a>])> {
         self.0.iter().map(|(end, links)| (*end, links.as_slice()))
     }
@@ -54,8 +54,8 @@ impl<'a> UnlinkedArms<'a> {
     }
 }
 
-/// Whether a road that a connecting road names lies there, but is linked to nothing or to another junction. One that is
-/// linked to a road may go on there as well.
+/// Checks whether a named road lies there with no link or a link to another junction. A road with a
+/// link to a road is excluded, because it may continue there as well.
 fn is_elsewhere(map: &RoadMap<'_>, arm: &Road<'_>, contact: &RoadContact<'_>) -> bool {
     let elsewhere = match arm.link(contact.to.end) {
         None => true,

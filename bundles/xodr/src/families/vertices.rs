@@ -2,16 +2,16 @@
 
 use qcbus_document::Node;
 
-/// The vertices of a polyline by sort.
+/// The vertices of a polyline by kind.
 pub(crate) struct Vertices<'a> {
-    /// Those in road coordinates.
+    /// Vertices in road coordinates.
     pub road: Vec<Node<'a>>,
-    /// Those in the object's coordinates.
+    /// Vertices in the object's coordinates.
     pub local: Vec<Node<'a>>,
 }
 
 impl<'a> Vertices<'a> {
-    /// Those of a polyline.
+    /// Returns the vertices of a polyline.
     pub fn of(polyline: Node<'a>) -> Vertices<'a> {
         Vertices {
             road: polyline.children_named("vertexRoad").collect(),

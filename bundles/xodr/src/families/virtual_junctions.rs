@@ -1,20 +1,20 @@
-//! Where roads branch off the main road of a virtual junction (OpenDRIVE 1.9, 12.7).
+//! Branches off the main road of a virtual junction (OpenDRIVE 1.9, 12.7).
 
 use qcbus_opendrive::geometry::{Point, Pose};
 use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadLink, RoadMap};
 
-/// A connecting road's end that is linked to the main road of its virtual junction.
+/// An end of a connecting road that is linked to the main road of its virtual junction.
 pub(crate) struct Branch<'m, 'a> {
     pub main: &'m Road<'a>,
     pub road: &'m Road<'a>,
-    /// The end of the connecting road that lies at the main road.
+    /// The end of the connecting road at the main road.
     pub end: ContactPoint,
     pub link: RoadLink<'a>,
-    /// Where on the main road, in metres.
+    /// s on the main road, in metres.
     pub s: f64,
 }
 
-/// The roads of virtual junctions with their junction, apart from those that only cross.
+/// Returns the roads of virtual junctions with their junction, without crossing roads.
 pub(crate) fn connecting_roads<'m, 'a>(
     map: &'m RoadMap<'a>,
 ) -> impl Iterator<Item = (&'m Junction<'a>, &'m Road<'a>)> {
@@ -27,7 +27,7 @@ pub(crate) fn connecting_roads<'m, 'a>(
     })
 }
 
-/// The ends at which a road of a virtual junction is linked to the main road.
+/// Returns the ends at which a road of a virtual junction is linked to the main road.
 pub(crate) fn branches<'m, 'a>(
     map: &'m RoadMap<'a>,
     junction: &'m Junction<'a>,
@@ -54,12 +54,12 @@ pub(crate) fn branches<'m, 'a>(
     linked.collect()
 }
 
-/// All branches of all virtual junctions.
+/// Returns all branches of all virtual junctions.
 pub(crate) fn all_branches<'m, 'a>(map: &'m RoadMap<'a>) -> impl Iterator<Item = Branch<'m, 'a>> {
     connecting_roads(map).flat_map(|(junction, road)| branches(map, junction, road))
 }
 
-/// A point as seen from a pose: how far ahead and how far to the left, in metres.
+/// Returns the distance ahead and to the left of a point seen from a pose, in metres.
 pub(crate) fn seen_from(pose: Pose, point: Point) -> (f64, f64) {
     let (sin, cos) = pose.hdg.sin_cos();
     let (dx, dy) = (point.x - pose.x, point.y - pose.y);

@@ -3,7 +3,7 @@
 use foldhash::HashSet;
 use qcbus_opendrive::{JunctionType, Road, RoadLink, RoadMap};
 
-/// Whether a link leads from a road of a virtual junction to the main road of that junction.
+/// Checks whether a link leads from a road of a virtual junction to its main road.
 pub(crate) fn leads_to_main_road(map: &RoadMap<'_>, road: &Road<'_>, link: RoadLink<'_>) -> bool {
     let junction = road.junction().and_then(|id| map.junction(id));
     junction.is_some_and(|junction| {
@@ -13,8 +13,8 @@ pub(crate) fn leads_to_main_road(map: &RoadMap<'_>, road: &Road<'_>, link: RoadL
     })
 }
 
-/// The ids of the roads that connections of virtual junctions name as connecting ones. That such a road names
-/// another junction, or none, is said elsewhere: it is one of the virtual junction's all the same.
+/// Returns the connecting roads of virtual junctions by id. They belong to the virtual junction
+/// even if they name another one or none, which another rule reports.
 pub(crate) fn connecting_roads<'a>(map: &RoadMap<'a>) -> HashSet<&'a str> {
     let connections = map.connections();
     let connections =
@@ -24,8 +24,8 @@ pub(crate) fn connecting_roads<'a>(map: &RoadMap<'a>) -> HashSet<&'a str> {
         .collect()
 }
 
-/// Whether a road may be linked to a place within another: it belongs to a virtual junction, or to
-/// one of which the file does not say what it is.
+/// Checks whether a road may be linked to a position inside another road. This holds if it belongs
+/// to a virtual junction, or to a junction of unknown type.
 pub(crate) fn may_be_within(map: &RoadMap<'_>, road: &Road<'_>) -> bool {
     let Some(id) = road.junction() else {
         return false;

@@ -1,18 +1,18 @@
-//! The closed vocabularies of OpenDRIVE: the words of all versions together. The schemas of 1.1 to 1.3 list none,
-//! that of 1.6 leaves out some.
+//! The closed vocabularies of OpenDRIVE, with the words of all versions together. The schemas of
+//! 1.1 to 1.3 list none, and the schema of 1.6 leaves out some.
 
 use qcbus_sdk::Level;
 
-/// The words that an attribute may say.
+/// The valid words of an attribute.
 pub(crate) struct Vocabulary {
-    /// The attribute is on elements of these names …
+    /// Names of the elements with the attribute.
     pub elements: &'static [&'static str],
-    /// … within these; empty: anywhere.
+    /// Names of their parents; empty means any parent.
     pub parents: &'static [&'static str],
     pub attribute: &'static str,
     pub words: &'static [&'static str],
-    /// How bad another word is: readers take the usual for an unknown weight of a line, but not for an unknown
-    /// direction.
+    /// Severity of an unknown word. Readers use a default for an unknown weight of a line, but not
+    /// for an unknown direction.
     pub level: Level,
 }
 

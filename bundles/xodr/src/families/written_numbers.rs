@@ -1,7 +1,7 @@
-//! Numbers as they are written in attributes, of which some cannot be computed with.
+//! Numbers in attributes as written. Some of them cannot be used in computations.
 
-/// Attributes that are numbers, and what they measure. Those that are whole numbers in every version and
-/// those that are words are not among them.
+/// Attributes that are numbers, with the quantity that they measure. Attributes that are whole
+/// numbers in every version, and attributes with words, are not included.
 const MEASURES: &[(Measure, &[&str])] = &[
     (
         Measure::Extent,
@@ -97,31 +97,31 @@ const MEASURES: &[(Measure, &[&str])] = &[
     ),
 ];
 
-/// What a number measures.
+/// Quantity that a number measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Measure {
-    /// A place or a size: within what there is on Earth.
+    /// A position or a size, limited to the dimensions of the Earth.
     Extent,
     /// An angle or a curvature.
     Turn,
-    /// A coefficient of higher degree, which may be large where its polynomial holds for millimetres.
+    /// A coefficient of higher degree, possibly large if its polynomial applies for millimetres.
     Coefficient,
-    /// A speed, for which "without limit" has words of its own.
+    /// A speed. Separate words exist for "without limit".
     Speed,
-    /// Anything that may be of any size.
+    /// A quantity without a limit of size.
     Other,
 }
 
 impl Measure {
-    /// Whether an attribute of this name is a number on any element.
+    /// Checks whether an attribute with this name is a number on any element.
     pub(crate) fn is_of_some(attribute: &str) -> bool {
         let mut measures = MEASURES.iter();
         measures.any(|(_, names)| names.contains(&attribute))
     }
 
-    /// What an attribute of an element measures; `None` when it is no number to be looked at here.
+    /// Returns the quantity of an attribute, or `None` if it is not a number to check here.
     pub(crate) fn of(element: &str, attribute: &str) -> Option<Measure> {
-        // Numbers of the header are looked at with its other attributes.
+        // Numbers of the header are checked together with its other attributes.
         let is_other =
             element == "header" || (attribute == "value" && matches!(element, "userData" | "rule"));
         let mut measures = MEASURES.iter().filter(|_| !is_other);
@@ -131,21 +131,21 @@ impl Measure {
     }
 }
 
-/// What a text says that was written for a number.
+/// Meaning of a text that is written as a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Written {
     /// Not a number.
     Nan,
-    /// Infinite, by a word.
+    /// Infinite, written as a word.
     Infinite,
-    /// Digits that stand for more than a double holds.
+    /// Digits whose value does not fit into a double.
     Overflow,
-    /// An ordinary number.
+    /// A finite number.
     Finite(f64),
 }
 
 impl Written {
-    /// Reads a number in any of the spellings that parsers of XML Schema, C and Python know.
+    /// Reads a number in any spelling that parsers of XML Schema, C and Python know.
     pub(crate) fn read(text: &str) -> Option<Written> {
         let text = text.trim();
         if let Ok(value) = text.parse::<f64>() {
@@ -168,8 +168,8 @@ impl Written {
     }
 }
 
-/// Whether a text may be a number that is infinite, none, or large. Asked of every attribute of a map, so
-/// it looks at a few bytes only and does not miss any.
+/// Checks whether a text may be an infinite, invalid or large number. The check runs for every
+/// attribute of a map, so it reads only a few bytes. It never misses such a number.
 pub(crate) fn is_suspicious(mut bytes: &[u8]) -> bool {
     while let [b' ' | b'\t' | b'\n' | b'\r' | b'+' | b'-', rest @ ..] = bytes {
         bytes = rest;
@@ -182,11 +182,11 @@ pub(crate) fn is_suspicious(mut bytes: &[u8]) -> bool {
     }
 }
 
-/// Whether a number without sign may be of ten millions and more: by its digits before the point and its power of
-/// ten, without reading it.
+/// Checks whether an unsigned number may be ten millions or more. It uses the digits before the
+/// point and the power of ten, without parsing the number.
 fn is_large(bytes: &[u8]) -> bool {
     const DIGITS: usize = 8;
-    // A power of ten ends within as many bytes; most that are positive are `e+00`, as C prints them.
+    // A power of ten is within the last bytes. Most positive ones are `e+00`, as in C.
     let tail = bytes.get(bytes.len().saturating_sub(DIGITS)..);
     let has_power = |tail: &[u8]| {
         let mut ends = tail.iter();
@@ -202,12 +202,12 @@ fn is_large(bytes: &[u8]) -> bool {
     before + power >= DIGITS
 }
 
-/// The power of ten that ends a number, if it is positive; most numbers end in `e+00`, `e-03` or in none.
+/// Returns the positive power of ten at the end of a number. Most end in `e+00`, `e-03` or none.
 fn power_of_ten(bytes: &[u8]) -> usize {
     const MOST: usize = 6;
     let white = |byte: &u8| byte.is_ascii_whitespace();
     let digits = bytes.iter().rev().skip_while(|byte| white(byte));
-    // Longer runs of digits are decimals, which most numbers have many of.
+    // Longer runs of digits are decimals, which most numbers have.
     let end = digits.clone().take(MOST + 1);
     let count = end.take_while(|byte| byte.is_ascii_digit()).count();
     if count > MOST {
@@ -229,7 +229,7 @@ fn power_of_ten(bytes: &[u8]) -> usize {
     })
 }
 
-/// A number as written, cut when it is long.
+/// Returns a number as written, truncated if it is long.
 pub(crate) fn shown(text: &str) -> String {
     const MOST: usize = 24;
     let text = text.trim();
@@ -239,7 +239,7 @@ pub(crate) fn shown(text: &str) -> String {
     }
 }
 
-/// A value with so many decimals, or with its power of ten where it has too many digits to be read.
+/// Formats with this number of decimals, or with a power of ten if that would be unreadable.
 pub(crate) fn brief(value: f64, decimals: usize) -> String {
     if value.abs() < 1e7 {
         format!("{value:.decimals$}")

@@ -1,17 +1,17 @@
-//! Stretches over which a lane has no width (OpenDRIVE 1.9, 11.4).
+//! Stretches on which a lane has no width (OpenDRIVE 1.9, 11.4).
 
 use qcbus_opendrive::LaneRef;
 
-/// Up to which width, in metres, a lane has none.
+/// Width in metres up to which a lane counts as having none.
 pub(crate) const NO_WIDTH: f64 = 0.001;
 
-/// The stretches of a lane without width, from and to in metres from the section's start; those
-/// that touch are one. `None` when the lane has no widths.
+/// Returns the stretches of a lane without width, as start and end in metres from the start of the
+/// section. Adjacent stretches are merged. Returns `None` if the lane has no widths.
 pub(crate) fn zero_stretches(lane: LaneRef<'_, '_>) -> Option<Vec<(f64, f64)>> {
     let length = lane.length()?;
     let mut zero: Vec<(f64, f64)> = Vec::new();
     for stretch in lane.widths().stretches(length) {
-        // Most have width at their start: no need to look for the widest place.
+        // Most stretches have width at their start, so the search for the maximum is skipped.
         if stretch.cubic.a > NO_WIDTH {
             continue;
         }

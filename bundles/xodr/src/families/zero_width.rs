@@ -1,4 +1,4 @@
-//! Lanes that have no width where they are linked (OpenDRIVE 1.9, 11.6).
+//! Lanes without width at a link (OpenDRIVE 1.9, 11.6).
 
 use foldhash::HashMap;
 use qcbus_document::Node;
@@ -7,7 +7,7 @@ use qcbus_sdk::{Param, Sink};
 
 use super::on_road::{MAX_PLACES, OnRoad, lane_name};
 
-/// Up to which width a lane has none.
+/// Width up to which a lane counts as having none.
 pub(crate) const ZERO_WIDTH: Param = Param::number(
     "zero_width",
     0.001,
@@ -15,13 +15,13 @@ pub(crate) const ZERO_WIDTH: Param = Param::number(
     "lanes that are not wider than this have a width of zero",
 );
 
-/// Whether a lane has no width at an end of its section. Negative widths have rules of their own.
+/// Checks for zero width at an end of the section. Separate rules check negative widths.
 pub(crate) fn is_zero_at(lane: LaneRef<'_, '_>, end: ContactPoint, zero: f64) -> bool {
     lane.side().is_some() && lane.width_at(end).is_some_and(|width| width.abs() <= zero)
 }
 
-/// Whether a lane has some width somewhere in its section: at the other end, or where one of its
-/// records starts or is halfway.
+/// Checks whether a lane has some width in its section. It checks both ends, and the start and the
+/// middle of each record.
 pub(crate) fn opens(lane: LaneRef<'_, '_>, zero: f64) -> bool {
     let wide = |ds: f64| lane.width(ds).is_some_and(|width| width > zero);
     let Some(length) = lane.length() else {
@@ -38,8 +38,8 @@ pub(crate) fn opens(lane: LaneRef<'_, '_>, zero: f64) -> bool {
         || stretches.any(|stretch| wide(stretch.from) || wide(0.5 * (stretch.from + stretch.to)))
 }
 
-/// Reports lanes without width at `end` that are linked there: by links of their own, by lane links
-/// of a junction that start at them, by lane links that lead to them.
+/// Reports lanes without width at `end` that are linked there: by their own links, or by lane links
+/// of a junction that start at them or lead to them.
 pub(crate) fn has_no_links(map: &RoadMap<'_>, end: ContactPoint, found: &mut Sink<'_>) {
     let zero = found.number(&ZERO_WIDTH);
     let junctions = LaneLinks::of(map, end);

@@ -15,7 +15,7 @@ pub static RULE: Rule<Document> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Elements of a name within another, and what they say nothing without.
+/// Elements with the attributes that they need to be meaningful.
 struct Needs {
     element: &'static str,
     parents: &'static [&'static str],
@@ -34,7 +34,7 @@ const fn needs(
     }
 }
 
-/// Places of objects and lane sections and the directions of references have rules of their own.
+/// Required attributes. Other rules check object and section positions and reference directions.
 const NEEDS: &[Needs] = &[
     needs("road", &["OpenDRIVE"], &["length"]),
     needs("type", &["road"], &["s", "type"]),
@@ -69,7 +69,7 @@ fn run(document: &Document<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What others refer to by an id that is unique in the file, and may have no empty one in any version.
+/// Reports missing and empty ids that must be unique in the file. No version allows empty ones.
 fn ids(document: &Document<'_>, schema: &OwnSchema<'_>, found: &mut Sink<'_>) {
     let referred = KINDS.iter().filter(|kind| kind.scope == Scope::File);
     for kind in referred {

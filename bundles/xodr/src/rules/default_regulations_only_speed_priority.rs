@@ -13,7 +13,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// What may stand in any element.
+/// Elements that are allowed in any element.
 const ANYWHERE: [&str; 3] = ["userData", "include", "dataQuality"];
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

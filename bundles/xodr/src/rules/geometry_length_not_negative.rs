@@ -7,7 +7,7 @@ use crate::model::{Part, Roads};
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_geometry_length_not_negative",
     uids: &["qcbus.dev:xodr:1.0.0:geometry.length_not_negative"],
-    // From 1.5 on the schema says so.
+    // From 1.5 on the schema reports this.
     versions: "..1.5.0",
     after: super::READABLE,
     page: include_str!("geometry_length_not_negative.md"),

@@ -12,10 +12,10 @@ pub static RULE: Rule<Document> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Up to this much less, in metres, a bound is the same as the other.
+/// Tolerance in metres by which a bound may be less than the other.
 const ROUNDING: f64 = 1e-9;
 
-/// The first version whose header table asks for ISO 8601.
+/// First version whose header table requires ISO 8601.
 const ISO_DATES_SINCE: Version = Version::new(1, 6);
 
 fn run(document: &Document<'_>, found: &mut Sink<'_>) {
@@ -45,7 +45,7 @@ fn run(document: &Document<'_>, found: &mut Sink<'_>) {
     date(header, found);
 }
 
-/// The map's extent: metres, the greater bound not below the smaller one.
+/// Checks the extent in metres: the greater bound must not be below the smaller one.
 fn extent(header: Node<'_>, found: &mut Sink<'_>) {
     numbers(
         Some(header),
@@ -66,7 +66,7 @@ fn extent(header: Node<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Each attribute, where it is given, must be a finite double.
+/// Checks that each given attribute is a finite double.
 fn numbers(node: Option<Node<'_>>, attributes: &[(&'static str, &str)], found: &mut Sink<'_>) {
     let Some(node) = node else { return };
     for (name, unit) in attributes {
@@ -97,7 +97,7 @@ fn date(header: Node<'_>, found: &mut Sink<'_>) {
     if is_iso_8601(date) {
         return;
     }
-    // The standard prefers one form and allows all of ISO 8601.
+    // The standard prefers one form but allows all of ISO 8601.
     let fault = if is_other_iso_8601(date) {
         "is written in a form of ISO 8601 that readers may not know; preferred is"
     } else {
@@ -109,8 +109,8 @@ fn date(header: Node<'_>, found: &mut Sink<'_>) {
         .level(Level::Information);
 }
 
-/// Before ISO 8601 was asked for, a date has any form. One that looks like it, though, should name a day that
-/// there is.
+/// Reports a date in ISO form with a day that does not exist. In versions that do not require ISO
+/// 8601, any other form is allowed.
 fn no_such_day(header: Node<'_>, date: &str, found: &mut Sink<'_>) {
     let day = date.trim().get(..10).unwrap_or_default();
     let mut parts = day.split('-');
@@ -130,7 +130,7 @@ fn no_such_day(header: Node<'_>, date: &str, found: &mut Sink<'_>) {
     }
 }
 
-/// `YYYY-MM-DD`, optionally with `Thh:mm`, seconds, a fraction, and `Z` or an offset.
+/// Checks for `YYYY-MM-DD`, optionally `Thh:mm`, seconds, a fraction, and `Z` or an offset.
 fn is_iso_8601(text: &str) -> bool {
     let (day, time) = match text.split_once('T') {
         Some((day, time)) => (day, Some(time)),
@@ -139,8 +139,8 @@ fn is_iso_8601(text: &str) -> bool {
     is_day(day) && time.is_none_or(is_time)
 }
 
-/// The forms of ISO 8601 beside the preferred one: without separators, by week, by day of the year, and
-/// of less precision.
+/// Checks for the other forms of ISO 8601: without separators, by week, by day of the year, or with
+/// less precision.
 fn is_other_iso_8601(text: &str) -> bool {
     let (day, time) = text
         .split_once('T')
@@ -211,7 +211,7 @@ fn is_time(text: &str) -> bool {
     zone_is_right && is_fraction && (is_clock(clock, 2) || is_clock(clock, 3))
 }
 
-/// `hh:mm` or `hh:mm:ss`; a leap second is allowed.
+/// Checks for `hh:mm` or `hh:mm:ss`. A leap second is allowed.
 fn is_clock(text: &str, fields: usize) -> bool {
     let parts: Vec<&str> = text.split(':').collect();
     let within =

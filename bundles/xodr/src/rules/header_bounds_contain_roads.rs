@@ -23,10 +23,10 @@ const TOLERANCE: Param = Param::number(
     "how far reference lines may reach beyond the bounds",
 );
 
-/// How far a point lies beyond a bound; negative within.
+/// Function for the distance of a point beyond a bound, negative within.
 type Beyond = fn(Point, f64) -> f64;
 
-/// One of the four bounds, and what reaches farthest beyond it.
+/// One of the four bounds, with the point that lies farthest beyond it.
 struct Bound {
     name: &'static str,
     value: f64,
@@ -90,13 +90,13 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         .here("the bound, and the point farthest beyond it");
 }
 
-/// To the millimetre, and without a sign of zero.
+/// Rounds to the millimetre and removes the sign of zero.
 fn rounded(value: f64) -> f64 {
     (value * 1000.0).round() / 1000.0 + 0.0
 }
 
-/// The bounds that say something. Many programs write zeros where they mean nothing; a reversed pair is the
-/// finding of another rule, and nothing lies within.
+/// Returns the bounds with information. Many programs write zeros for missing bounds, so these are
+/// ignored. A reversed pair gives `None`, because another rule reports it.
 fn bounds(header: Node<'_>) -> Option<Vec<Bound>> {
     let value = |name| header.f64(name).ok().filter(|number| number.is_finite());
     let mut all = Vec::new();
@@ -123,14 +123,14 @@ fn bounds(header: Node<'_>) -> Option<Vec<Bound>> {
     Some(all)
 }
 
-/// Notes what of a geometry lies beyond the bounds; whether any of it lies within them.
+/// Records points beyond the bounds. Returns whether any part of a geometry lies within them.
 fn look(geometry: &Geometry<'_>, tolerance: f64, bounds: &mut [Bound]) -> bool {
     let Some(start) = geometry.start_point() else {
         return false;
     };
     let length = geometry.length().unwrap_or(0.0).abs();
     let beyond = |bound: &Bound| (bound.beyond)(start, bound.value);
-    // No point of a curve is farther from its start than its length.
+    // The distance of any point of a curve from its start is at most its length.
     if bounds
         .iter()
         .all(|bound| beyond(bound) + length <= tolerance)

@@ -31,7 +31,7 @@ fn check(reference: Node<'_>, found: &mut Sink<'_>) {
         }
         return;
     }
-    // What is included is not known here.
+    // The included content is not available here.
     if reference.child("include").is_some() {
         return;
     }

@@ -45,7 +45,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     };
     let (x, y) = ((low.x + high.x) / 2.0, (low.y + high.y) / 2.0);
     let extent = (high.x - low.x).max(high.y - low.y) / 2.0;
-    // A map that is large by itself cannot be centered any better.
+    // A map that is large itself cannot be centered better.
     if largest(farthest) <= limit || extent > largest(farthest) / 2.0 {
         return;
     }

@@ -16,7 +16,8 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Zones of Gauss and Krüger may be written in front of the easting: 60 500 000 is the middle of the sixtieth.
+/// Maximum x and y. Gauss and Krüger zones may precede the easting: 60 500 000 is the middle of the
+/// sixtieth.
 const DISTANCE: Param = Param::number(
     "distance",
     1e8,
@@ -31,14 +32,14 @@ const HEIGHT: Param = Param::number(
     "largest z of the offset that is taken for a height on Earth",
 );
 
-/// Headings smaller than this turn nothing: at 100 km they are 0.1 mm.
+/// Smallest relevant heading. Smaller ones have no effect: at 100 km they are 0.1 mm.
 const LEAST_HEADING: f64 = 1e-9;
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let Some(offset) = map.header().and_then(|header| header.child("offset")) else {
         return;
     };
-    // What is no finite number is another rule's finding.
+    // Another rule reports values that are not finite numbers.
     let value = |name| offset.f64(name).ok().filter(|number| number.is_finite());
     for (name, limit) in [("x", &DISTANCE), ("y", &DISTANCE), ("z", &HEIGHT)] {
         let limit = found.number(limit);

@@ -29,7 +29,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Counts projections in a PROJ string. A pipeline is one projection made of several steps.
+/// Reports several projections in a PROJ string. A pipeline is one projection with steps.
 fn check_text(reference: Node<'_>, found: &mut Sink<'_>) {
     let text = reference.text();
     let names: Vec<&str> = text

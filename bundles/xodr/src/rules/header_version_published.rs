@@ -11,7 +11,7 @@ pub static RULE: Rule<Document> = Rule {
 };
 
 fn run(document: &Document<'_>, found: &mut Sink<'_>) {
-    // A version that is missing or no number is the finding of the rule about the header.
+    // The rule about the header reports a version that is missing or not a number.
     let header = document.root().and_then(|root| root.child("header"));
     let (Some(header), Some(version)) = (header, found.version()) else {
         return;

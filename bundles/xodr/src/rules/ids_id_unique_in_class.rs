@@ -24,7 +24,7 @@ fn check<'d>(kind: &Kind, document: &Document<'d>, found: &mut Sink<'_>) {
     let mut exact: HashMap<(Option<Node<'d>>, &str), Node<'d>> = HashMap::default();
     let mut numeric: HashMap<u64, Node<'d>> = HashMap::default();
     for node in kind.nodes(document) {
-        // An empty id is none, which another rule says.
+        // An empty id does not count as an id. Another rule reports it.
         let given = node.attr("id").filter(|id| !id.trim().is_empty());
         let Some(id) = given else { continue };
         let place = Place::attribute_or_node(node, "id");

@@ -18,7 +18,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Since this version another UID says the same.
+/// First version in which another UID states the same requirement.
 const BY_LAYER: Version = Version::new(1, 9);
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

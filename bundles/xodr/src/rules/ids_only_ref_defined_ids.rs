@@ -19,13 +19,13 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// An attribute that names another element.
+/// An attribute that refers to another element.
 struct Reference {
     element: &'static str,
     parent: &'static str,
     attribute: &'static str,
     target: Target,
-    /// What means "none" here.
+    /// Values that mean "none".
     none: &'static [&'static str],
 }
 
@@ -65,7 +65,7 @@ const ELEMENT: Target = Target::By(
 const ROAD: Target = Target::Any(Class::Road);
 const SIGNAL: Target = Target::Any(Class::Signal);
 
-/// Parent, element, attribute, what it names, what means none. The parents tell namesakes apart.
+/// Parent, element, attribute, target, values for "none". Parents distinguish equal names.
 const REFERENCES: &[Reference] = &[
     to(
         "OpenDRIVE",
@@ -134,7 +134,7 @@ const REFERENCES: &[Reference] = &[
     ),
 ];
 
-/// The ids that are defined: in the file by class, and in each object by class.
+/// The defined ids: by class in the file, and by class in each object.
 struct Defined<'d> {
     anywhere: Vec<(Class, HashSet<&'d str>)>,
     in_object: HashMap<(Node<'d>, Class), HashSet<&'d str>>,
@@ -173,7 +173,7 @@ fn check(reference: &Reference, node: Node<'_>, defined: &Defined<'_>, found: &m
         Target::Any(class) => (class, defined.anywhere(class, id), ""),
         Target::By(attribute, classes) => {
             let kind = node.attr(attribute);
-            // A type that does not exist is the schema's business.
+            // The schema reports a type that does not exist.
             let Some((_, class)) = classes.iter().find(|(name, _)| Some(*name) == kind) else {
                 return;
             };
@@ -205,7 +205,8 @@ fn check(reference: &Reference, node: Node<'_>, defined: &Defined<'_>, found: &m
     }
 }
 
-/// What the id belongs to when only the type of what is named is mistaken: nothing refers to what it is in.
+/// Returns a hint if only the type is wrong and the id exists for another type. Elements around the
+/// reference are excluded.
 fn of_another_type(
     reference: &Reference,
     node: Node<'_>,
@@ -227,7 +228,7 @@ fn of_another_type(
     })
 }
 
-/// The outline that the border around a corner reference names.
+/// Returns the outline to which the border around a corner reference refers.
 fn outline_of_border<'d>(reference: Node<'d>, object: Node<'d>) -> Option<Node<'d>> {
     let border = reference.parent().filter(|parent| parent.is("border"))?;
     let id = plain(border.attr("outlineId")?);

@@ -36,7 +36,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The roads that take part in the junction by its connections and cross paths.
+/// Returns the roads in the connections and cross paths of the junction.
 fn roads_of<'a>(junction: &Junction<'a>) -> BTreeSet<&'a str> {
     let connections = junction
         .connections()
@@ -45,7 +45,7 @@ fn roads_of<'a>(junction: &Junction<'a>) -> BTreeSet<&'a str> {
     connections.chain(paths).flatten().collect()
 }
 
-/// Whether a road is linked to the junction.
+/// Checks whether a road is linked to the junction.
 fn meets(road: &Road<'_>, junction: &Junction<'_>) -> bool {
     let link = |end| road.link(end).and_then(|link| link.junction_id());
     ContactPoint::BOTH

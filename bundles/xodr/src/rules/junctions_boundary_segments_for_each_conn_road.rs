@@ -49,7 +49,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// A road with the end that a joint lies at. A contact point that is no end may lie anywhere.
+/// A road with the end at which a joint lies, or `None` for an invalid contact point.
 type Reached<'a> = (&'a str, Option<ContactPoint>);
 
 fn joint(segment: BoundarySegment<'_>) -> Option<Reached<'_>> {

@@ -18,7 +18,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Since this version, there is a rule about junctions of two roads.
+/// First version with a rule about junctions of two roads.
 const TWO_ROADS_SINCE: Version = Version::new(1, 9);
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -30,7 +30,7 @@ pub static RULE: Rule<Roads> = Rule {
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let mut seen = HashSet::default();
-    // Nearly all lanes say themselves where they lead.
+    // The set is computed lazily, because nearly all lanes have their own links.
     let taken = LazyCell::new(|| {
         let joints = map.junction_joints().iter();
         joints
@@ -53,7 +53,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The lane ends that lane links of junctions name.
+/// The lane ends in lane links of junctions.
 type Taken<F> = LazyCell<HashSet<LaneEnd>, F>;
 
 fn check(
@@ -91,7 +91,7 @@ fn check(
             lane_name(next),
             end.link_name()
         );
-        // Who links a lane at one end and not at the other one, out of which traffic comes, has forgotten it.
+        // If only the end from which traffic comes is linked, the other link is missing by mistake.
         let begun = lane.links(end.other()).next().is_some();
         let forgotten = begun && Traffic::of(lane) == Traffic::Towards(end);
         let level = if forgotten {
@@ -107,7 +107,7 @@ fn check(
     }
 }
 
-/// Whether two lanes have both edges in common.
+/// Checks whether both edges of two lanes meet.
 fn touch(
     (lane, end): (LaneRef<'_, '_>, ContactPoint),
     (next, at): (LaneRef<'_, '_>, ContactPoint),

@@ -38,7 +38,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                     junction.id(),
                     end.link_name()
                 );
-                // Where it is entered it must be linked; elsewhere it may be a piece that somebody left out.
+                // A link is required where traffic enters. At the other end, a road may have been
+                // left out.
                 let known = connection.incoming_road().and_then(|id| map.road(id));
                 let level = if enters && known.is_some() {
                     Level::Error
@@ -55,12 +56,12 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether traffic gets to an end of a road that is linked to nothing.
+/// Checks whether traffic reaches an end of a road that has no link.
 fn is_open(road: &Road<'_>, end: ContactPoint, narrow: f64) -> bool {
     road.link(end).is_none() && routes_at(road, end, narrow).next().is_some()
 }
 
-/// Whether lanes are linked at an end of their road although the road is not: another rule's business.
+/// Checks for lane links at an end of a road without a link, which another rule reports.
 fn has_lane_links(road: &Road<'_>, end: ContactPoint) -> bool {
     lanes_at(road, end).any(|lane| lane.links(end).next().is_some())
 }

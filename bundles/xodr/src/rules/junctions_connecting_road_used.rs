@@ -25,7 +25,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         };
         let kind = junction.kind();
         let connects = matches!(kind, Some(JunctionType::Common | JunctionType::Virtual));
-        // A junction without any connection lacks more than this one.
+        // A junction without any connection has a more serious fault.
         if !connects || junction.connections().next().is_none() || named.contains(road.id()) {
             continue;
         }
@@ -45,8 +45,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The ids of roads that junctions name in whatever way: as connecting roads, as roads that are crossed, as part
-/// of a boundary.
+/// Returns the ids of all roads that junctions mention: as connecting, incoming or crossed roads,
+/// or as part of a boundary.
 fn named<'a>(map: &RoadMap<'a>) -> HashSet<&'a str> {
     let mut named = HashSet::default();
     for junction in map.junctions() {
@@ -65,7 +65,7 @@ fn named<'a>(map: &RoadMap<'a>) -> HashSet<&'a str> {
     named
 }
 
-/// Whether a road follows another one of its junction: then the first of them is the one that is named.
+/// Checks whether a road is part of a chain, of which the connection only names the first road.
 fn is_link_of_a_chain<'a>(map: &RoadMap<'a>, road: &Road<'a>) -> bool {
     let beside = |end| map.road_at(map.linked_end(road, end)?.to.road);
     let mut beside = ContactPoint::BOTH.into_iter().filter_map(beside);

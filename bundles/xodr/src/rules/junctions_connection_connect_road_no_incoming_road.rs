@@ -19,7 +19,7 @@ pub static RULE: Rule<Roads> = Rule {
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for junction in map.junctions() {
-        // The main road of a virtual junction goes through it and comes in at the same time.
+        // The main road of a virtual junction passes through it and is also an incoming road.
         if junction.kind() == Some(JunctionType::Virtual) {
             continue;
         }

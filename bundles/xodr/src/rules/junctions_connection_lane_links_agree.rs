@@ -33,7 +33,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// A lane link that the connecting lane contradicts: it names another lane of the incoming road.
+/// Reports a lane link if the connecting lane links to another lane of the incoming road.
 fn contradicted(
     map: &RoadMap<'_>,
     bundle: &Bundle<'_>,
@@ -53,7 +53,7 @@ fn contradicted(
     else {
         return;
     };
-    // A lane that does not exist, or the center lane, is wrong anyway.
+    // Another rule reports a lane that does not exist, or the center lane.
     if map
         .lane_at_road_end(bundle.from, from, LayerKind::Permanent)
         .is_none()
@@ -77,14 +77,14 @@ fn contradicted(
         .at(place, "what the lane says");
 }
 
-/// A connecting lane that comes from a lane of which the connection knows nothing.
+/// Reports a connecting lane with a link to an incoming lane but without a lane link.
 fn left_out(map: &RoadMap<'_>, bundle: &Bundle<'_>, found: &mut Sink<'_>) {
     let end = bundle.to.end;
     let (Some(road), Some(incoming)) = (map.road_at(bundle.to.road), map.road_at(bundle.from.road))
     else {
         return;
     };
-    // A lane link that leads to no lane is the one that is missing.
+    // If a lane link leads to a lane that does not exist, it is probably the missing one.
     let exists = |(_, id, _): &(i64, i64, Node<'_>)| {
         let lane = map.lane_at_road_end(bundle.to, *id, LayerKind::Permanent);
         *id != 0 && lane.is_some()
@@ -101,7 +101,7 @@ fn left_out(map: &RoadMap<'_>, bundle: &Bundle<'_>, found: &mut Sink<'_>) {
         if !bundle.links.iter().all(exists) {
             return;
         }
-        // Without any lane links, lanes of the same number are linked.
+        // Without lane links, lanes with the same number are linked.
         let by_number = bundle.links.is_empty();
         let Some(from) = named(lane, end).find(|from| !(by_number && *from == id)) else {
             continue;
@@ -125,7 +125,7 @@ fn left_out(map: &RoadMap<'_>, bundle: &Bundle<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// A connecting road along which a connection leads one way only, though its lanes lead the other way as well.
+/// Reports a connecting road with lanes in both directions but connections in only one.
 fn unconnected<'a>(
     map: &RoadMap<'a>,
     (road, end): (&Road<'a>, ContactPoint),
@@ -168,7 +168,7 @@ fn unconnected<'a>(
         .at(incoming.node(), "the road that it goes on from");
 }
 
-/// The lanes that a lane names at an end.
+/// Returns the permanent lanes to which a lane is linked at an end.
 fn named<'a>(lane: LaneRef<'_, 'a>, end: ContactPoint) -> impl Iterator<Item = i64> + use<'a> {
     let links = lane.links(end);
     links

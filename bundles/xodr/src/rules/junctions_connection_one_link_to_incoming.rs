@@ -34,8 +34,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// A lane link must begin on a lane that leads into the junction, and go on in one that leads away
-/// from there.
+/// Reports a lane link that starts on a lane leading out of the junction. It also reports a target
+/// lane whose traffic runs towards the junction.
 fn against_traffic(map: &RoadMap<'_>, joint: &LaneJoint<'_>, found: &mut Sink<'_>) {
     let (Some(from), Some(to)) = (map.lane(joint.from.lane), map.lane(joint.to.lane)) else {
         return;

@@ -26,7 +26,7 @@ fn check(junction: &Junction<'_>, connection: Connection<'_>, found: &mut Sink<'
         Some(JunctionType::Direct) => "linkedRoad",
         _ => return,
     };
-    // With the other kind of road at the far side, its own rule has been broken.
+    // If the connection has the other kind of road at the far side, another rule reports it.
     let has = |name: &str| connection.node().attribute(name).is_some();
     let other = has("connectingRoad") || has("linkedRoad");
     let wanted = ["incomingRoad", to, "contactPoint"];

@@ -8,7 +8,7 @@ use crate::model::Roads;
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_connection_smooth_fit",
     uids: &["asam.net:xodr:1.9.0:junctions.connection.smooth_fit"],
-    // Said in the text about connecting roads since 1.6; its UID is of 1.9.
+    // The text about connecting roads contains this requirement since 1.6. Its UID is from 1.9.
     versions: "1.6.0..",
     backport: Backport::Lower { since: "" },
     after: super::READABLE,

@@ -22,7 +22,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for junction in map.junctions().iter().filter(identified) {
         let paths = junction.cross_paths();
         let paths = paths.map(|path| (path.crossing_road(), path.node(), "crossing"));
-        // Direct junctions and crossings have no roads of their own.
+        // Direct junctions and crossings have no own roads.
         let connects = matches!(
             junction.kind(),
             Some(JunctionType::Common | JunctionType::Virtual)

@@ -33,7 +33,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Says so when a link names a place or a lane that the road does not have.
+/// Reports a link to a position or a lane that the road does not have.
 fn is_nowhere(
     crossing: &Crossing<'_, '_>,
     landing: &Landing<'_, '_>,
@@ -73,9 +73,9 @@ fn is_nowhere(
     true
 }
 
-/// Whether some layer of a road has the lane at s, on either side of a boundary.
+/// Checks whether any layer of a road has the lane at s, on either side of a section boundary.
 fn has_lane(road: &Road<'_>, s: f64, lane: i64) -> bool {
-    // The centre has no side, and is there everywhere.
+    // The center lane has no side and exists everywhere.
     let Some(side) = Side::of_lane_id(lane) else {
         return true;
     };
@@ -97,7 +97,7 @@ fn check(crossing: &Crossing<'_, '_>, landing: &Landing<'_, '_>, found: &mut Sin
         return;
     };
     let beside = (low - t).max(t - high);
-    // The link names a place; the crossing road covers it with its width.
+    // The link names one position, but the crossing road covers its whole width.
     let half = crossing
         .corners(landing.end)
         .map_or(0.0, |[one, other]| 0.5 * one.distance(other));

@@ -23,7 +23,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Looks at the two lanes that one end of a cross path links.
+/// Checks the two lanes that are linked at one end of a cross path.
 fn check(map: &RoadMap<'_>, path: CrossPath<'_>, end: ContactPoint, found: &mut Sink<'_>) {
     let Some(link) = path.lane_link(end) else {
         return;
@@ -47,7 +47,7 @@ fn check(map: &RoadMap<'_>, path: CrossPath<'_>, end: ContactPoint, found: &mut 
         };
         let level = match kind {
             "walking" | "biking" => continue,
-            // The older word for walking.
+            // `sidewalk` is the older word for walking.
             "sidewalk" => Level::Warning,
             _ => Level::Error,
         };

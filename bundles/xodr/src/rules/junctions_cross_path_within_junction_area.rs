@@ -52,7 +52,7 @@ fn corners(crossing: &Crossing<'_, '_>) -> impl Iterator<Item = Point> {
     ends.into_iter().flatten().flatten()
 }
 
-/// How far the crossing road leaves the stretch of the main road between `sStart` and `sEnd`.
+/// Returns how far the crossing road extends beyond `sStart` to `sEnd` of the main road.
 fn outside_of_range<'a>(map: &RoadMap<'a>, crossing: &Crossing<'_, 'a>) -> Option<(f64, Point)> {
     let junction = crossing.junction;
     let (from, to) = (junction.s_start()?, junction.s_end()?);
@@ -67,7 +67,7 @@ fn outside_of_range<'a>(map: &RoadMap<'a>, crossing: &Crossing<'_, 'a>) -> Optio
     beyond.max_by(|one, other| one.0.total_cmp(&other.0))
 }
 
-/// How far the crossing road leaves the boundary of the junction, if there is one.
+/// Returns how far the crossing road extends beyond the boundary of the junction, if any.
 fn outside_of_boundary<'a>(map: &RoadMap<'a>, crossing: &Crossing<'_, 'a>) -> Option<(f64, Point)> {
     let ring = ring(&boundary(map, crossing.junction)?);
     let outside = corners(crossing).filter(|corner| !contains(&ring, *corner));

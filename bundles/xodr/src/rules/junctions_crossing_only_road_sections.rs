@@ -13,7 +13,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// What describes connections or areas, which crossings do not have.
+/// Elements for connections or areas, which crossings do not have.
 const FOREIGN: [&str; 4] = ["connection", "crossPath", "boundary", "elevationGrid"];
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

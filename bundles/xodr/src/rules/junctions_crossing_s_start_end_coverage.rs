@@ -21,12 +21,13 @@ const CLEARANCE: Param = Param::number(
     "roads that are farther apart in height lie over each other",
 );
 
-/// How far around a section roads are looked at, and in which steps, in metres.
+/// Distance around a section in which roads are checked, in metres. The step and the inward shift
+/// follow.
 const AROUND: f64 = 50.0;
 const STEP: f64 = 0.5;
 const SHRINK: f64 = 0.02;
 
-/// More sections than this do not belong to one crossing, and no more pairs of pieces are compared.
+/// Maximum numbers of sections of one crossing, and of compared pairs of pieces.
 const MOST: usize = 16;
 const BUDGET: usize = 20_000_000;
 
@@ -41,7 +42,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// A section with its road and its range.
+/// A road section with its road and its range.
 struct Crossed<'m, 'a> {
     section: RoadSection<'a>,
     road: &'m Road<'a>,
@@ -107,7 +108,8 @@ fn check<'a>(
                 let [from, to] = section.range;
                 (from - overlap[at][0]).max(overlap[at][1] - to)
             };
-            // A road may have several sections in a crossing; one that covers the overlap will do.
+            // Of several sections of a road in a crossing, one that covers the overlap is
+            // sufficient.
             let same_road = all
                 .iter()
                 .filter(|section| section.road.index() == here.road.index());
@@ -153,8 +155,8 @@ fn pieces(crossed: &Crossed<'_, '_>) -> Vec<Patch> {
     })
 }
 
-/// Where the pieces of two roads cover the same ground at the same height: for each place the ranges of s on
-/// both roads.
+/// Returns the places where the pieces of two roads cover the same ground at the same height. Each
+/// place has the ranges of s on both roads.
 fn overlaps(
     roads: [&Road<'_>; 2],
     ones: &[Patch],
@@ -192,7 +194,7 @@ fn overlaps(
     all
 }
 
-/// Adds a range to the places that it hangs together with.
+/// Adds a range and merges it with all adjacent places.
 fn join(all: &mut Vec<[[f64; 2]; 2]>, range: [[f64; 2]; 2]) {
     let hangs = |place: &[[f64; 2]; 2]| {
         let mut roads = place.iter().zip(&range);

@@ -14,7 +14,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// A lane link with an overlap zone, and the lanes of the two roads that it links.
+/// A lane link with an overlap zone and the lanes that it links.
 struct Overlap<'a> {
     zone: Node<'a>,
     connection: Node<'a>,
@@ -75,7 +75,7 @@ fn overlaps_of(connection: Connection<'_>) -> impl Iterator<Item = Overlap<'_>> 
     })
 }
 
-/// Two links overlap when they belong to different connections and start or end in one lane.
+/// Checks whether two links of different connections start or end in the same lane.
 fn share_a_lane(one: &Overlap<'_>, other: &Overlap<'_>) -> bool {
     one.connection != other.connection && one.lanes.iter().any(|lane| other.lanes.contains(lane))
 }

@@ -39,7 +39,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             junction.id(),
             named.collect::<Vec<_>>().join(", ")
         );
-        // A single pair does no harm; it could be a link between the roads.
+        // A single pair is harmless, because it could be a direct link between the roads.
         let level = if pairs.len() == 1 {
             Level::Warning
         } else {

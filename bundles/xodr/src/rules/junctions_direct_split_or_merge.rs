@@ -7,7 +7,7 @@ use qcbus_sdk::{Rule, Sink};
 use crate::families::virtual_junctions::seen_from;
 use crate::model::Roads;
 
-/// Lanes lie side by side when their middles are farther apart than this, in metres.
+/// Minimum distance of the middles of two lanes that count as side by side, in metres.
 const MARGIN: f64 = 0.1;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -25,7 +25,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let junction = joint.junction.and_then(|at| map.junctions().get(at));
         junction.is_some_and(|junction| junction.kind() == Some(JunctionType::Direct))
     };
-    // The lane links of a junction that start at one end of one road.
+    // The lane links of a junction, grouped by the road end at which they start.
     let mut fans: BTreeMap<_, Vec<Path<'_>>> = BTreeMap::new();
     for joint in map.junction_joints().iter().filter(direct) {
         for turned in [false, true] {
@@ -39,11 +39,11 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// A lane link as a way from the left to the right, across the road end that it starts from.
+/// A lane link as a path across the road end at which it starts.
 struct Path<'a> {
-    /// Where the one lane lies across that road, in metres to the left.
+    /// Position of the first lane across that road, in metres to the left.
     here: f64,
-    /// Where the other lane lies, looked at in the same direction.
+    /// Position of the other lane, measured in the same direction.
     there: f64,
     joint: LaneJoint<'a>,
 }

@@ -13,7 +13,7 @@ const STEP: Param = Param::number(
     "largest difference in height between road and grid that is accepted",
 );
 
-/// Places across the mouth of a road at which heights are compared.
+/// Number of places across the mouth of a road at which heights are compared.
 const SAMPLES: usize = 5;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -37,7 +37,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         };
         for stretch in &stretches {
-            // A transition leads from one height to the other.
+            // A transition connects different heights, so only joints without one are checked.
             let joint = stretch.segment.kind() == Some("joint");
             let sudden = stretch
                 .segment
@@ -103,7 +103,7 @@ fn check(
     }
 }
 
-/// The heights of a grid: row by row from right to left, and where the reference line is in them.
+/// The heights of a grid, by row from right to left, with the index of the reference line.
 struct Heights {
     start: f64,
     spacing: f64,
@@ -127,9 +127,9 @@ impl Heights {
         })
     }
 
-    /// The height at a place by straight and by cubic interpolation; `None` outside of the grid.
+    /// Returns the height by linear and by cubic interpolation, or `None` outside the grid.
     fn at(&self, s: f64, t: f64) -> Option<[f64; 2]> {
-        // A place on the last row lies in the square before it.
+        // A position on the last row belongs to the square before it.
         let split = |x: f64| {
             let cell = (x + 1e-9).floor();
             (cell as i64, (x - cell).clamp(0.0, 1.0))
@@ -155,8 +155,8 @@ impl Heights {
     }
 }
 
-/// Between the second and the third of four heights, at a share of the distance: on a straight line, and on
-/// a cubic whose slopes follow from the neighbours where there are any.
+/// Interpolates between the second and the third of four heights: linear, and cubic with slopes
+/// from the neighbours if both exist. `share` is the fraction of the distance.
 fn interpolated([before, from, to, after]: [Option<f64>; 4], share: f64) -> Option<[f64; 2]> {
     let from = from?;
     let to = match to {

@@ -21,7 +21,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         };
         match junction.kind() {
             Some(JunctionType::Common) => {}
-            // What is no type is the schema's finding.
+            // The schema reports an invalid type.
             None => continue,
             Some(kind) => {
                 let text = format!(

@@ -56,11 +56,11 @@ fn check(
     }
 }
 
-/// How far the rows of a grid reach.
+/// The extent of the rows of a grid.
 struct Area {
     start: f64,
     spacing: f64,
-    /// To the left and to the right, in metres.
+    /// Extent to the left and to the right, in metres.
     rows: Vec<(f64, f64)>,
 }
 
@@ -80,12 +80,12 @@ impl Area {
         })
     }
 
-    /// How far a place lies outside of the grid, negative inside.
+    /// Returns the distance of a position from the grid, negative inside.
     fn beyond(&self, s: f64, t: f64) -> f64 {
         let along = (s - self.start) / self.spacing;
         let last = (self.rows.len() - 1) as f64;
         let outside = (-along).max(along - last) * self.spacing;
-        // The two rows between which the place lies; both must reach it.
+        // The position lies between these two rows. Both must cover it.
         let around =
             [along.floor(), along.ceil()].map(|row| self.rows[row.clamp(0.0, last) as usize]);
         let aside = around.map(|(left, right)| (t - left).max(-t - right));

@@ -55,7 +55,7 @@ fn check(junction: &Junction<'_>, line: &Placed, ring: &[Point], found: &mut Sin
     }
 }
 
-/// The distance between two straight stretches, zero when they cross.
+/// Returns the distance between two line segments, zero if they cross.
 fn apart(a: Point, b: Point, c: Point, d: Point) -> f64 {
     let side = |p: Point, q: Point, r: Point| (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x);
     let crosses = side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0;

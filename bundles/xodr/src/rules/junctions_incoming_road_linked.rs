@@ -25,7 +25,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     one_of_several(map, found);
 }
 
-/// A road that leads into a junction, and is linked to nothing or to another junction.
+/// Reports a road that leads into a junction but has no link, or a link to another junction.
 fn unlinked(map: &RoadMap<'_>, arm: RoadEnd, links: &[RoadContact<'_>], found: &mut Sink<'_>) {
     let first = links.first().and_then(|link| map.road_at(link.from.road));
     let (Some(road), Some(connecting)) = (map.road_at(arm.road), first) else {
@@ -56,9 +56,9 @@ fn unlinked(map: &RoadMap<'_>, arm: RoadEnd, links: &[RoadContact<'_>], found: &
     finding.also_violates("asam.net:xodr:1.9.0:road.linkage.both_sides_consistency");
 }
 
-/// A road that is linked to one of several roads of a junction.
+/// Reports a road that is linked to only one of several roads of a junction.
 fn one_of_several(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    // The first connecting road that is seen from each incoming road, and who is told about.
+    // The first connecting road of each incoming road, and the roads that are already reported.
     let mut first = foldhash::HashMap::default();
     let mut told = HashSet::default();
     for (junction, connection) in map.connections() {
@@ -92,7 +92,7 @@ fn one_of_several(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The link of a road that leads to a road within a junction.
+/// Returns the link of a road that leads to a road within a junction.
 fn link_within<'a>(
     map: &RoadMap<'a>,
     road: &Road<'a>,

@@ -29,14 +29,14 @@ const CLEARANCE: Param = Param::number(
     "junctions that are so far apart in height lie over each other",
 );
 
-/// Length of the pieces of roads that are compared, in metres, and by how much they are narrower.
+/// Length of the compared pieces of roads, and inward shift of their edges, in metres.
 const STEP: f64 = 2.0;
 const SHRINK: f64 = 0.05;
 
-/// Heights that differ from the clearance by less, in metres, keep it.
+/// Tolerance of the clearance in metres. Smaller differences count as sufficient clearance.
 const SAME: f64 = 1e-6;
 
-/// No more pairs of roads and pieces are compared, and no more points are taken along a straight side of a boundary.
+/// Maximum numbers of compared pairs, and of points along a straight side of a boundary.
 const BUDGET: usize = 10_000_000;
 const MOST_POINTS: f64 = 64.0;
 
@@ -51,12 +51,12 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Ground that a junction covers: its boundary, or a road that belongs to it.
+/// Ground that a junction covers: its boundary, or one of its roads.
 struct Footprint<'m, 'a> {
     junction: &'m Junction<'a>,
     shape: Shape<'m, 'a>,
     extent: Extent,
-    /// The least and the greatest height, as far as they are known.
+    /// Minimum and maximum height, if known.
     heights: [f64; 2],
     pieces: OnceCell<Vec<Patch>>,
 }
@@ -65,17 +65,17 @@ enum Shape<'m, 'a> {
     Ring(Vec<Point>),
     Road {
         road: &'m Road<'a>,
-        /// The junction has a boundary, which counts against other boundaries.
+        /// Whether the junction has a boundary, which is compared with other boundaries instead.
         bounded: bool,
     },
 }
 
-/// Least and greatest x, least and greatest y.
+/// Minimum and maximum of x, then of y.
 type Extent = [f64; 4];
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let mut footprints = footprints(map);
-    // Along the longer side of the map fewer footprints lie beside each other.
+    // Along the longer side of the map, fewer footprints overlap in their extents.
     let whole = footprints
         .iter()
         .fold(NOWHERE, |all, one| joined(all, one.extent));
@@ -180,7 +180,7 @@ fn footprints<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<Footprint<'m, 'a>> {
     footprints
 }
 
-/// A box that a road cannot leave: no point of it is farther from both ends together than its length.
+/// Returns a box around a road. A point's distances to both ends add up to at most the length.
 fn reach(road: &Road<'_>) -> Option<Extent> {
     let length = road.length().filter(|length| *length > 0.0)?;
     let [start, end] = [road.pose(0.0)?, road.pose(Station::before(length))?];
@@ -197,7 +197,7 @@ fn reach(road: &Road<'_>) -> Option<Extent> {
     Some([x - around, x + around, y - around, y + around])
 }
 
-/// Whether two footprints overlap; then they are reported.
+/// Reports two footprints if they overlap. Returns whether they do.
 fn check(
     one: &Footprint<'_, '_>,
     other: &Footprint<'_, '_>,
@@ -238,7 +238,7 @@ fn check(
     }
 }
 
-/// The point of either ring that lies deepest in the other one.
+/// Returns the point of either ring that lies deepest inside the other one.
 fn deepest(one: &[Point], other: &[Point]) -> Option<(f64, Point)> {
     let inside = |points: &[Point], ring: &[Point]| {
         let inner = fine(points)
@@ -252,7 +252,7 @@ fn deepest(one: &[Point], other: &[Point]) -> Option<(f64, Point)> {
         .max_by(|one, other| one.0.total_cmp(&other.0))
 }
 
-/// The points of a ring, with more of them along its straight sides.
+/// Returns the points of a ring, with additional points along its straight sides.
 fn fine(ring: &[Point]) -> impl Iterator<Item = Point> {
     sides(ring).flat_map(|(one, other)| {
         let count = one.distance(other).ceil().clamp(1.0, MOST_POINTS);
@@ -266,7 +266,7 @@ fn fine(ring: &[Point]) -> impl Iterator<Item = Point> {
     })
 }
 
-/// The pieces of a road.
+/// Returns the pieces of a road.
 fn pieces(road: &Road<'_>) -> Vec<Patch> {
     let range = [0.0, road.length().unwrap_or(0.0)];
     strip(road, range, STEP, SHRINK, |station| {

@@ -21,7 +21,7 @@ pub static RULE: Rule<Roads> = Rule {
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let used = Used::of(map);
-    // Of roads of which the junction knows nothing `road.linkage.both_sides_consistency` speaks.
+    // `road.linkage.both_sides_consistency` reports roads that the junction does not mention.
     let known = Known::by(map);
     for (road, end, junction) in arms(map) {
         let at = RoadEnd {

@@ -21,8 +21,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Takes away, one after the other, the roads over which none has priority. What is left gives way in a circle,
-/// or to such a circle.
+/// Reports a cycle of priorities. It repeatedly removes roads over which no road has priority. The
+/// remaining roads form a cycle or give way to one.
 fn check(junction: &Junction<'_>, found: &mut Sink<'_>) {
     let records: Vec<(&str, &str, Priority<'_>)> = junction
         .priorities()

@@ -77,7 +77,7 @@ fn report(
         .at(junction.node(), "the virtual junction");
 }
 
-/// Whether the road's end really lies at the place that its link names.
+/// Checks whether the end of the road lies at the position in its link.
 fn check_place(branch: &Branch<'_, '_>, found: &mut Sink<'_>) {
     let limit = found.number(&GAP);
     let poses = branch

@@ -41,7 +41,7 @@ fn check(crossing: &Crossing<'_, '_>, landing: &Landing<'_, '_>, found: &mut Sin
         .filter_map(|corner| {
             let (s, t) = landing.project(corner)?;
             let pose = landing.other.pose(s)?;
-            // Beyond the ends of the road the foot stays at the end.
+            // Beyond the ends of the road, the foot of the perpendicular stays at the end.
             let (ahead, _) = seen_from(pose, corner);
             let edge = |side: Side| {
                 let section = landing

@@ -29,7 +29,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             .pose(branch.s)
             .zip(branch.road.end_pose(branch.end));
         let kink = poses.and_then(|(main, road)| heading_difference(main.hdg, road.hdg));
-        // Along the main road or against it.
+        // The road may run along the main road or against it.
         let Some(kink) = kink
             .map(|kink| kink.min(PI - kink))
             .filter(|kink| *kink > limit)

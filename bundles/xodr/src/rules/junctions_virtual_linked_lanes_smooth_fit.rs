@@ -16,7 +16,7 @@ use crate::model::Roads;
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_virtual_linked_lanes_smooth_fit",
     uids: &["asam.net:xodr:1.9.0:junctions.virtual.linked_lanes_smooth_fit"],
-    // Said in the text about virtual junctions since 1.6; its UID is of 1.9.
+    // The text about virtual junctions contains this requirement since 1.6. Its UID is from 1.9.
     versions: "1.6.0..",
     after: super::READABLE,
     params: &[
@@ -69,8 +69,8 @@ fn check(branch: &Branch<'_, '_>, lane: LaneRef<'_, '_>, link: LaneLink<'_>, fou
     ) else {
         return;
     };
-    // Which edge meets which is a matter of place, not of names: the lanes may run in opposite
-    // directions, on either side of the center.
+    // Positions decide which edges meet, not their names. The lanes may run in opposite directions
+    // and lie on either side of the center.
     let apart = |[one, other]: [BorderPoint; 2]| {
         let distance = |a: BorderPoint, b: BorderPoint| a.point.plan().distance(b.point.plan());
         distance(own[0], one).max(distance(own[1], other))

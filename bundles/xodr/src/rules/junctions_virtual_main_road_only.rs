@@ -25,7 +25,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let Some(road) = connecting.filter(|_| connection.incoming_road() != Some(main)) else {
             continue;
         };
-        // A road that is not linked at both ends may be incomplete.
+        // A road without links at both ends may be incomplete.
         let ends = ContactPoint::BOTH.map(|end| road.link(end).and_then(|link| link.road_id()));
         if let [Some(start), Some(end)] = ends
             && ![start, end].contains(&main)

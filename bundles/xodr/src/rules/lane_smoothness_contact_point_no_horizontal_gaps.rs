@@ -19,7 +19,7 @@ const GAP: Param = Param::number(
     "largest distance in the plan view that is accepted",
 );
 
-/// ASAM's checker takes every gap between lanes for an error, so that this one does.
+/// Limit for gaps between lanes. Like ASAM's checker, this rule reports all of them as errors.
 const LANE_ERROR_FROM: Param = Param::number(
     "lane_error_from",
     0.01,
@@ -46,11 +46,11 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// The first version in which this rule is the one that speaks of reference lines.
+/// First version in which this rule covers reference lines.
 const NORMATIVE: Version = Version::new(1, 7);
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
-    // In older files `road.geometry.refline_no_gaps` says it.
+    // In older files `road.geometry.refline_no_gaps` reports it.
     if !is_normative(found) {
         return;
     }
@@ -74,8 +74,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether it is not the lanes but the roads that do not meet, of which other rules speak:
-/// `road.geometry.contact_point` and `road.linkage.ends_meet`.
+/// Checks whether the roads themselves do not meet. Then `road.geometry.contact_point` and
+/// `road.linkage.ends_meet` report it.
 fn is_of_roads(map: &RoadMap<'_>, gap: &LaneGap<'_, '_>, found: &Sink<'_>) -> bool {
     let [from, to] = [gap.joint.from, gap.joint.to].map(road_end);
     let apart = || mouths::apart(map, from, to).unwrap_or(0.0);
@@ -83,7 +83,7 @@ fn is_of_roads(map: &RoadMap<'_>, gap: &LaneGap<'_, '_>, found: &Sink<'_>) -> bo
     mouths && apart() >= found.number(&GAP_BROKEN_FROM)
 }
 
-/// The `laneOffset` that jumps where two lane sections of one layer meet.
+/// Returns the `laneOffset` that jumps at the boundary of two lane sections of one layer.
 fn stepping_offset<'a>(gap: &LaneGap<'_, 'a>, limit: f64) -> Option<Node<'a>> {
     let [from, to] = [gap.from.at, gap.to.at];
     if !std::ptr::eq(from.road, to.road) || !std::ptr::eq(from.layer, to.layer) {
@@ -129,7 +129,7 @@ fn report(map: &RoadMap<'_>, gap: &LaneGap<'_, '_>, found: &mut Sink<'_>) {
         Misfit::Slight if is_normative(found) && widest >= found.number(&LANE_ERROR_FROM) => {
             Misfit::Plain
         }
-        // Nobody gets thrown off a shoulder by following it.
+        // A gap in a lane without through traffic, such as a shoulder, is less harmful.
         Misfit::Broken if !(is_route(gap.from) && is_route(gap.to)) => Misfit::Plain,
         misfit => misfit,
     };

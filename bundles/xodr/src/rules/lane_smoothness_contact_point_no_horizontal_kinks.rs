@@ -18,7 +18,7 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
-    // In junctions it is a rule of its own: `junctions.connection.smooth_fit` and the like.
+    // Separate rules cover junctions: `junctions.connection.smooth_fit` and similar ones.
     for pair in pairs(map.part(part)).filter(|pair| pair.at == Where::Roads && !pair.is_kerb()) {
         report_kink(&pair, found);
     }

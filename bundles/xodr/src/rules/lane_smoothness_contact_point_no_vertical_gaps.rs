@@ -12,7 +12,7 @@ const ROLL: Param = Param::number(
     "largest difference between the crossfalls of two lanes that is accepted",
 );
 
-/// Narrower lanes have no crossfall worth the name: rounding of heights would tilt them, in metres.
+/// Minimum width for comparing crossfalls, in metres. Rounded heights tilt narrower lanes.
 const TOO_NARROW: f64 = 2.0;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -34,7 +34,7 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
-    // In junctions it is a rule of its own: `junctions.connection.smooth_fit` and the like.
+    // Separate rules cover junctions: `junctions.connection.smooth_fit` and similar ones.
     for pair in pairs(map.part(part)).filter(|pair| pair.at == Where::Roads && !pair.is_kerb()) {
         if !report_step(&pair, found) {
             report_roll(&pair, found);
@@ -42,7 +42,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// Lanes that meet at one edge only, as where one splits into two, may be tilted against each other.
+/// Reports different crossfalls. Lanes that meet at one edge only, as at a split, may have them.
 fn report_roll(pair: &Pair<'_, '_>, found: &mut Sink<'_>) {
     let limit = found.number(&ROLL);
     if let Some(roll) = pair.roll(TOO_NARROW).filter(|roll| *roll > limit) {

@@ -53,13 +53,13 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// Kinks of the elevation itself: there the lanes go on without a link.
+/// Reports kinks of the elevation itself, where lanes continue without a link.
 fn within(road: &Road<'_>, found: &mut Sink<'_>) {
     let limit = found.number(&PITCH);
     let profile = road.elevation();
     let mut last = None;
     for record in profile.in_order().skip(1) {
-        // Of several records at one place only the last one holds.
+        // Of several records at one place only the last one applies.
         let Some(s) = record.start().filter(|s| last != Some(*s)) else {
             continue;
         };

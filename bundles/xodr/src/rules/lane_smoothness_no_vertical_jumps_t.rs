@@ -36,7 +36,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 inner = Some(lane);
             }
         }
-        // Over the center, which has no width.
+        // These lanes are neighbours across the center, which has no width.
         let [left, right] = [Side::Left, Side::Right].map(|side| section.side(side).next());
         if let (Some(left), Some(right)) = (left, right) {
             check(left, Edge::Inner, right, found);
@@ -44,8 +44,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// Reports the greatest step between two lanes, at this edge of the first one and the inner edge of the
-/// second one.
+/// Reports the largest step between this edge of the first lane and the inner edge of the second
+/// lane.
 fn check<'m, 'a>(one: LaneRef<'m, 'a>, edge: Edge, other: LaneRef<'m, 'a>, found: &mut Sink<'_>) {
     let raised = |lane: LaneRef<'m, 'a>| !lane.heights().is_empty() || lane.level() == Some(true);
     if !is_drivable(one) || !is_drivable(other) || !(raised(one) || raised(other)) {
@@ -58,7 +58,7 @@ fn check<'m, 'a>(one: LaneRef<'m, 'a>, edge: Edge, other: LaneRef<'m, 'a>, found
         let step = there.point.z - here.point.z;
         (wide(one) && wide(other)).then_some((step, ds, there))
     });
-    // The first of the greatest ones.
+    // Of equal steps this keeps the first one.
     let worst = steps.fold(None, |worst: Option<(f64, Station, _)>, next| match worst {
         Some(worst) if worst.0.abs() + 1e-9 >= next.0.abs() => Some(worst),
         _ => Some(next),
@@ -81,8 +81,8 @@ fn check<'m, 'a>(one: LaneRef<'m, 'a>, edge: Edge, other: LaneRef<'m, 'a>, found
     }
 }
 
-/// Where heights may change: at both ends of the section, and before and after every height record; and
-/// halfway between them.
+/// Returns the stations where heights may change: both ends of the section, before and after every
+/// height record, and halfway between them.
 fn places<'m, 'a>(
     section: SectionRef<'m, 'a>,
     lanes: [LaneRef<'m, 'a>; 2],

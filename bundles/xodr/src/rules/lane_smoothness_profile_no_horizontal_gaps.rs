@@ -45,7 +45,7 @@ fn check(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) {
     };
     let lanes = section.side(side).map(|lane| lane.lane());
     let profiles = lanes.flat_map(|lane| [(lane.widths(), 0.0), (lane.borders(), 0.0)]);
-    // By place, in nanometres from the section's start: the first record that steps there.
+    // First record with a step at each place, in nanometres from the start of the section.
     let mut steps: BTreeMap<i64, (f64, Node<'_>)> = BTreeMap::new();
     for (profile, from) in std::iter::once((section.layer.offset(), start)).chain(profiles) {
         for (x, node) in stepping(profile, limit) {
@@ -65,7 +65,7 @@ fn check(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) {
     }
 }
 
-/// The starts of records, other than the first, at which a profile steps; with the records.
+/// Returns the records, except the first, at which a profile has a step, with their starts.
 fn stepping<'p, 'a>(
     profile: &'p Profile<'a>,
     limit: f64,
@@ -77,7 +77,7 @@ fn stepping<'p, 'a>(
     })
 }
 
-/// The first drivable lane one of whose edges jumps, and by how much.
+/// Returns the first drivable lane with a jumping edge, and the size of the jump.
 fn jump<'m, 'a>(
     before: &[LaneSpan<'m, 'a>],
     after: &[LaneSpan<'m, 'a>],
@@ -96,8 +96,8 @@ fn jump<'m, 'a>(
     })
 }
 
-/// By how much a lane for traffic goes on beside itself: what both of its edges jump to the same side. A lane that
-/// only widens at once can be driven on.
+/// Returns the sideways jump of a lane for traffic: the amount by which both edges jump to the same
+/// side. A lane that only widens suddenly can be driven on.
 fn moved(before: &[LaneSpan<'_, '_>], after: &[LaneSpan<'_, '_>]) -> f64 {
     let pairs = before.iter().zip(after);
     let travelled = pairs.filter(|(one, _)| is_route(one.lane));
@@ -129,7 +129,7 @@ fn report(
         node.name(),
         found.number(&GAP)
     );
-    // Lanes that widen at once are odd; those that go on elsewhere are broken in every version.
+    // Sudden widening is odd. Lanes that continue elsewhere are broken in every version.
     let level = match whole >= found.number(&GAP_BROKEN_FROM) {
         true => Level::Error,
         false => Level::Warning,

@@ -1,6 +1,6 @@
 //! The rules, one per file, in the order of the result.
 //!
-//! A new rule takes one line in each of the two lists below.
+//! A new rule needs one line in each of the two lists below.
 
 use qcbus_sdk::AnyRule;
 
@@ -300,10 +300,10 @@ mod xml_valid_schema;
 mod xml_valid_xml_document;
 mod xml_version_is_defined;
 
-/// The precondition of rules that need no more than a file that could be read: see `after`.
+/// Precondition of rules that only need a readable file; see `after`.
 pub(crate) const READABLE: &[&str] = &["check_asam_xodr_xml_root_tag_is_opendrive"];
 
-/// Every rule; one that depends on another comes after it.
+/// All rules. A rule comes after the rules on which it depends.
 pub static RULES: &[&dyn AnyRule] = &[
     &xml_valid_xml_document::RULE,
     &xml_root_tag_is_opendrive::RULE,

@@ -54,7 +54,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     if odd.is_empty() {
         return;
     }
-    // What the schema does not take is its finding, but who asks it for everything has to wait for it.
+    // The schema reports the values that it rejects. Its evaluation is slow, so it runs on demand.
     let document = found.subject().root();
     let refused: HashSet<u32> = qcbus_schema_rule::breaches(found.subject(), &document)
         .iter()
@@ -67,7 +67,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Which names of attributes stand for numbers, by the number of the name: each is looked up once.
+/// Cache by name number: whether an attribute name stands for numbers. Each is looked up once.
 #[derive(Default)]
 struct Measured(Vec<Option<bool>>);
 
@@ -84,7 +84,7 @@ impl Measured {
     }
 }
 
-/// A number that cannot be computed with.
+/// A number that cannot be used in computations.
 struct Odd<'a> {
     attribute: Attribute<'a>,
     level: Level,
@@ -92,17 +92,17 @@ struct Odd<'a> {
 }
 
 impl<'a> Odd<'a> {
-    /// What is to be said about a text that stands for a number, or for one of several, in an attribute.
+    /// Checks a text that stands for a number, or for one of several numbers, in an attribute.
     fn of(attribute: Attribute<'a>, text: &str, found: &Sink<'_>) -> Option<Odd<'a>> {
         let written = Written::read(text)?;
-        // Ids are long as well, and what an attribute measures takes a while to look up.
+        // Long ids reach this place as well, and the lookup of the quantity is slow.
         let least = found.number(&MOST).min(found.number(&EARTH));
         if matches!(written, Written::Finite(value) if value.abs() <= least.min(found.number(&COEFFICIENT)))
         {
             return None;
         }
         let node = attribute.node();
-        // How far the map may be moved is the business of `header_offset_plausible`.
+        // `header_offset_plausible` checks the size of the map offset.
         if node.is("offset") && matches!(written, Written::Finite(_)) {
             return None;
         }
@@ -125,7 +125,7 @@ impl<'a> Odd<'a> {
     }
 }
 
-/// Lengths and widths that the schema of 1.6 takes for texts.
+/// Lengths and widths that are texts in the schema of 1.6.
 const TEXTS: [(&str, &[&str]); 4] = [
     ("road", &["length"]),
     ("geometry", &["length"]),
@@ -133,7 +133,7 @@ const TEXTS: [(&str, &[&str]); 4] = [
     ("marking", &["width", "lineLength"]),
 ];
 
-/// What is no number in one of these; every other schema refuses it.
+/// Returns the values of these attributes that are not numbers. All other schemas reject them.
 fn of_texts<'a>(root: Node<'a>) -> impl Iterator<Item = Odd<'a>> {
     let elements = TEXTS.into_iter().flat_map(move |(element, names)| {
         let nodes = root.descendants_named(element);
@@ -158,7 +158,7 @@ fn of_texts<'a>(root: Node<'a>) -> impl Iterator<Item = Odd<'a>> {
     })
 }
 
-/// The heights of elevation grids, of which one attribute has many.
+/// Checks the heights of elevation grids. One attribute contains many heights.
 fn of_grids<'a>(map: &RoadMap<'a>, found: &Sink<'_>) -> Vec<Odd<'a>> {
     let mut odd = Vec::new();
     let Some(root) = map.root() else {
@@ -170,7 +170,7 @@ fn of_grids<'a>(map: &RoadMap<'a>, found: &Sink<'_>) -> Vec<Odd<'a>> {
     for attribute in rows.flat_map(|row| row.attributes()) {
         let mut heights = attribute.value().split_ascii_whitespace();
         let is_list = ["center", "left", "right"].contains(&attribute.name());
-        // One height alone is found with all others, unless its name is not among theirs.
+        // A single height is checked with all other attributes, if its name is in their list.
         let known = Measure::of("elevation", attribute.name()).is_some();
         if !is_list || (known && heights.clone().nth(1).is_none()) {
             continue;
@@ -192,14 +192,14 @@ fn of_grids<'a>(map: &RoadMap<'a>, found: &Sink<'_>) -> Vec<Odd<'a>> {
     odd
 }
 
-/// How bad a number is, and why; `None` when it can be computed with.
+/// Returns the severity and the reason, or `None` if the number can be used in computations.
 fn judge(written: Written, measure: Measure, found: &Sink<'_>) -> Option<(Level, String)> {
     let value = match written {
         Written::Nan => {
             let why = "which is not a number; it must be a finite number";
             return Some((Level::Error, why.to_owned()));
         }
-        // As good as the words for it, wherever it is understood.
+        // Infinity is as good as the words for "no limit" if a reader understands it.
         Written::Infinite if measure == Measure::Speed => {
             let why = "which is infinite; where there is no limit, the word is `no limit`";
             return Some((Level::Warning, why.to_owned()));

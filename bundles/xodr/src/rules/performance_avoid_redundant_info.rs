@@ -28,7 +28,7 @@ const GAP: Param = Param::number(
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_performance_avoid_redundant_info",
     uids: &[
-        // What ASAM's checker prints; annex F has the rule since 1.8.1.
+        // ASAM's checker prints this UID. Annex F contains the rule since 1.8.1.
         "asam.net:xodr:1.7.0:performance.avoid_redundant_info",
         "asam.net:xodr:1.8.1:performance.avoid_redundant_info",
     ],

@@ -29,12 +29,12 @@ fn is_natural(id: &str) -> bool {
     id.trim().parse::<u32>().is_ok()
 }
 
-/// Junctions may have the number that means none.
+/// Checks whether an id is an integer. Junctions may have the number that means "none".
 fn is_integer(id: &str) -> bool {
     id.trim().parse::<i32>().is_ok()
 }
 
-/// Says the first element whose id is no number of that kind, and how many more there are.
+/// Reports the first element whose id is not such a number, and the number of further ones.
 fn report<'d>(
     name: &str,
     most: &str,

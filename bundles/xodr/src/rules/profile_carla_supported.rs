@@ -35,7 +35,7 @@ const GAPS: &[Gap] = &[
     },
 ];
 
-/// The last version that CARLA's documentation names.
+/// Last version in the documentation of CARLA.
 const NEWEST: (u16, u16) = (1, 4);
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

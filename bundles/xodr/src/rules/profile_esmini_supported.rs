@@ -16,7 +16,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// What decides where roads and lanes lie, and so where vehicles drive.
+/// Elements that determine the position of roads and lanes, and so the paths of vehicles.
 const GAPS: &[Gap] = &[
     Gap {
         element: "border",

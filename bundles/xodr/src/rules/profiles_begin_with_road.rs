@@ -32,7 +32,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             found,
         );
         if let Some(layer) = road.permanent() {
-            // Before the first one the offset is 0: nothing is unclear where it goes on from there.
+            // Before the first record the offset is 0. A first record that starts at 0 continues
+            // it.
             let first = layer.offset().in_order().next();
             let from_zero =
                 first.is_some_and(|first| first.start().and_then(|s| first.at(s)) == Some(0.0));
@@ -50,7 +51,7 @@ fn check(road: &Road<'_>, what: &str, profile: &Profile<'_>, found: &mut Sink<'_
     let Some(s) = first.start().filter(|s| *s > found.number(&TOLERANCE)) else {
         return;
     };
-    // Whoever writes nothing but zeros says the same with every record.
+    // If the only record is zero everywhere, further records would not change anything.
     let flat = |at: f64| first.at(at) == Some(0.0);
     if profile.records().len() == 1 && flat(0.0) && flat(1.0) && flat(2.0) {
         return;

@@ -8,7 +8,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_records_are_complete",
     uids: &["qcbus.dev:xodr:1.0.0:records.are_complete"],
     level: Level::Warning,
-    // From 1.5 on the schema demands these attributes.
+    // From 1.5 on the schema requires these attributes.
     versions: "..1.5.0",
     after: super::READABLE,
     page: include_str!("records_are_complete.md"),
@@ -21,7 +21,7 @@ const IN_SECTION: [&str; 5] = ["sOffset", "a", "b", "c", "d"];
 const SHAPE: [&str; 6] = ["s", "t", "a", "b", "c", "d"];
 const GEOMETRY: [&str; 5] = ["s", "x", "y", "hdg", "length"];
 
-/// What the curves of a reference line must have.
+/// Required attributes of the curves of a reference line.
 const CURVES: [(&str, &[&str]); 4] = [
     ("arc", &["curvature"]),
     ("spiral", &["curvStart", "curvEnd"]),
@@ -73,7 +73,7 @@ fn of_profile(road: &Road<'_>, profile: &Profile<'_>, found: &mut Sink<'_>) {
 }
 
 fn check(road: &Road<'_>, node: Node<'_>, names: &[&str], found: &mut Sink<'_>) {
-    // Nearly all are written in the order of the standard.
+    // Nearly all elements have their attributes in the order of the standard.
     let mut written = node.attributes();
     let in_order = |name: &&str| written.next().is_some_and(|attribute| attribute.is(name));
     if names.iter().all(in_order) {

@@ -9,7 +9,7 @@ pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_corner_road_corner_road_local_exclusivity",
     uids: &[
         "asam.net:xodr:1.9.0:road.corner_road.corner_road_local_exclusivity",
-        // Annex F prints it with the version 1.x.0, which no reader of results accepts.
+        // Annex F prints this UID with the version 1.x.0, which no reader of results accepts.
         "asam.net:xodr:1.9.0:road.corner_local.no_mixing_road_local",
     ],
     versions: "1.9.0..",

@@ -15,7 +15,7 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    // From 1.5 on the schema demands the attribute, yet lets it be empty.
+    // From 1.5 on the schema requires the attribute but allows an empty value.
     let by_schema = is_by_schema(found, (1, 5), (1, 8));
     for record in below(map, "CRG", "surface") {
         check(record, by_schema, found);

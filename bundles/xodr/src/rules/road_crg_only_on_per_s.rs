@@ -64,7 +64,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Where a record applies, in metres along the road.
+/// The stretch on which a record applies, in metres along the road.
 #[derive(Clone, Copy)]
 struct Stretch<'a> {
     record: Node<'a>,

@@ -15,7 +15,7 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 const ALONG: &str = "asam.net:xodr:1.7.0:road.crg.s_t_offset_no_global";
-/// Said in the table of `CRG`, without an identifier.
+/// UID of a requirement in the table of `CRG` without an identifier.
 const ACROSS: &str = "qcbus.dev:xodr:1.9.0:road.crg.x_y_offset_only_global";
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -47,7 +47,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// A width must not be negative anywhere.
+/// Reports a negative width at any place.
 fn check_width(strip: &Strip<'_>, road: &Road<'_>, found: &mut Sink<'_>) {
     let Some(length) = road.length() else { return };
     let tolerance = found.number(&TOLERANCE);

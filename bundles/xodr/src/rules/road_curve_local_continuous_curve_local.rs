@@ -47,7 +47,7 @@ fn check(
     };
     let distance = from.distance(to);
     let by_length = chord(curve).filter(|chord| (chord - distance).abs() > limit);
-    // A curve without a length ends where the next one starts, if it can get there.
+    // A curve without a length ends at the start of the next curve if its radius allows that.
     let too_far = match (curve.curve(), curve.length()) {
         (Some(Curve::Arc { curvature }), None) => {
             Some(2.0 / curvature.abs()).filter(|widest| distance > widest + limit)

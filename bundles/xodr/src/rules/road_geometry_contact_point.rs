@@ -49,7 +49,7 @@ fn check<'a>(map: &RoadMap<'a>, road: &Road<'a>, end: ContactPoint, found: &mut 
     let Some(linked) = map.road_at(contact.to.road) else {
         return;
     };
-    // The rule is about roads that are connected without a junction.
+    // The rule only covers roads that are connected without a junction.
     if road.junction().is_some() || linked.junction().is_some() {
         return;
     }
@@ -93,9 +93,9 @@ fn check<'a>(map: &RoadMap<'a>, road: &Road<'a>, end: ContactPoint, found: &mut 
         .at_end(linked, other);
 }
 
-/// Reference lines that lie beside each other have lanes that may meet all the same: they do not where the
-/// mouths of the roads lie apart. Where the mouths lie apart but the reference lines hardly do, it is
-/// `road.linkage.ends_meet` that speaks of the mouths.
+/// Classifies the distance of two ends. If reference lines lie side by side, the lanes may still
+/// meet. They do not meet if the mouths of the roads are apart. If the mouths are apart but the
+/// reference lines nearly meet, `road.linkage.ends_meet` reports the mouths.
 fn misfit(
     (road, end): (&Road<'_>, ContactPoint),
     (linked, other): (&Road<'_>, ContactPoint),

@@ -14,10 +14,10 @@ const TURNS: Param = Param::number(
     "number of full turns up to which a heading is taken for radians",
 );
 
-/// How far apart ends lie that do not meet, in metres.
+/// Distance in metres from which two ends do not meet.
 const FAR: f64 = 1.0;
-/// How far apart ends lie that do, for every metre of the geometry, and by how many radians directions differ
-/// that go on.
+/// Distance of ends that meet, per metre of the geometry. It is also the maximum difference of
+/// directions that continue, in radians.
 const NEAR: f64 = 0.01;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -52,20 +52,20 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// How a geometry with such a heading fits what comes before and after it.
+/// Fit of a geometry with such a heading to the previous and the next geometry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fit {
-    /// It goes on: many turns are meant.
+    /// The geometry meets the next one, so the many turns are intended.
     Meets,
-    /// It ends so many metres away from what follows.
+    /// The end lies this number of metres from the next geometry.
     Misses(f64),
-    /// The same, but read as degrees it meets what follows.
+    /// Like `Misses`, but it meets the next geometry if the heading is read as degrees.
     MeetsInDegrees(f64),
 }
 
-/// A heading of many turns.
+/// A heading with many turns.
 struct Odd {
-    /// Its geometry's place in the road.
+    /// Index of its geometry in the road.
     at: usize,
     hdg: f64,
     fit: Option<Fit>,
@@ -109,7 +109,7 @@ fn report(road: &Road<'_>, odd: &[Odd], found: &mut Sink<'_>) {
     }
 }
 
-/// How a geometry fits what follows it and the direction of what is before it; `None` where that is not known.
+/// Returns the fit to the next geometry and to the previous direction, or `None` if unknown.
 fn fit<'a>(map: &RoadMap<'a>, road: &Road<'a>, at: usize, hdg: f64) -> Option<Fit> {
     let geometries = road.plan_view().geometries();
     let geometry: &Geometry<'_> = geometries.get(at)?;

@@ -21,9 +21,9 @@ const RADIUS: Param = Param::number(
     "a curve of less than this must not turn around more than once",
 );
 
-/// Curves that are wider than this, in metres, have room for any lanes.
+/// Radius in metres above which a curve has enough space for any lanes.
 const WIDE: f64 = 60.0;
-/// At how many places of a curve its edges are looked at.
+/// Number of places on a curve at which its edges are checked.
 const PLACES: u32 = 8;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -55,7 +55,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// The greatest curvature of a shape, for polynomials among some places.
+/// Returns the largest curvature of a shape. Polynomials are sampled at some places.
 fn sharpest(curve: &Curve, length: f64) -> f64 {
     let greatest = |curvatures: [Option<f64>; 5]| {
         let known = curvatures.into_iter().flatten().map(f64::abs);
@@ -76,7 +76,7 @@ fn sharpest(curve: &Curve, length: f64) -> f64 {
     }
 }
 
-/// Reports a curve that turns around and around within centimetres.
+/// Reports and returns whether a curve turns around more than once within centimetres.
 fn winds(
     geometry: &Geometry<'_>,
     curve: &Curve,
@@ -121,7 +121,7 @@ fn winds(
     true
 }
 
-/// The edge of a lane that runs backwards.
+/// A lane edge that runs backwards.
 struct Fold<'m, 'a> {
     lane: LaneRef<'m, 'a>,
     s: f64,
@@ -129,7 +129,7 @@ struct Fold<'m, 'a> {
     radius: f64,
 }
 
-/// Reports the lane whose outer edge lies beyond the center of the curve.
+/// Reports the lane with an outer edge beyond the center of the curve.
 fn folds(geometry: &Geometry<'_>, length: f64, road: &Road<'_>, found: &mut Sink<'_>) {
     let (Some(start), Some(placed)) = (geometry.s(), geometry.placed()) else {
         return;
@@ -170,7 +170,7 @@ fn folds(geometry: &Geometry<'_>, length: f64, road: &Road<'_>, found: &mut Sink
         .at(fold.lane.node(), "the lane");
 }
 
-/// The outermost lane for vehicles on the inside of a curve, if it reaches beyond the curve's center.
+/// Returns the outermost inner lane for vehicles if it extends beyond the center of the curve.
 fn fold_at<'m, 'a>(
     road: &'m Road<'a>,
     placed: &Placed,
@@ -178,7 +178,7 @@ fn fold_at<'m, 'a>(
     ds: f64,
 ) -> Option<Fold<'m, 'a>> {
     let curvature = match placed.curve {
-        // Their places take longer than all the rest.
+        // For these shapes the curvature is computed directly, because their points are expensive.
         Curve::Arc { curvature } => curvature,
         Curve::Spiral(spiral) => spiral.curvature(ds),
         _ => placed.pose(ds)?.curvature,

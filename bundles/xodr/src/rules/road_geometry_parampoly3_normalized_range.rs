@@ -8,7 +8,7 @@ use crate::model::{Part, Roads};
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_geometry_parampoly3_normalized_range",
     uids: &[
-        // ASAM's checker and annex F spell it differently.
+        // ASAM's checker and annex F use different spellings.
         "asam.net:xodr:1.7.0:road.geometry.parampoly3.normalized_range",
         "asam.net:xodr:1.7.0:road.geometry.paramPoly3.normalized_range",
     ],

@@ -40,7 +40,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// With aU = aV = bV = 0 and bU > 0 the curve starts at `@x`, `@y` in the direction of `@hdg`.
+/// Checks aU = aV = bV = 0 and bU > 0. Then the curve starts at `@x`, `@y` in the direction of
+/// `@hdg`.
 fn check(road: &Road<'_>, geometry: &Geometry<'_>, curve: &ParamPoly3, found: &mut Sink<'_>) {
     let (tolerance, harmful) = (found.number(&TOLERANCE), found.number(&HARMFUL));
     let shift = curve.u.a.hypot(curve.v.a);

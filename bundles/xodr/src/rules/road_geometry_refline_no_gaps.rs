@@ -15,8 +15,8 @@ const GAP: Param = Param::number(
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_geometry_refline_no_gaps",
     uids: &["asam.net:xodr:1.4.0:road.geometry.refline_no_gaps"],
-    // From 1.7 on `lane_smoothness.contact_point_no_horizontal_gaps` demands it as well, whose checker
-    // is the one that other tools have too.
+    // From 1.7 on `lane_smoothness.contact_point_no_horizontal_gaps` requires it as well. Other
+    // tools also use its checker.
     versions: "1.4.0..1.7.0",
     backport: Backport::Lower { since: "" },
     after: super::READABLE,

@@ -29,7 +29,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// The first version with rules about smooth lanes.
+/// First version with rules about smooth lanes.
 const ANNEX_D: Version = Version::new(1, 8);
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
@@ -69,7 +69,7 @@ fn check(road: &Road<'_>, one: &Geometry<'_>, next: &Geometry<'_>, found: &mut S
         start.hdg,
         kink.to_degrees()
     );
-    // Section 9.2 says that there should be none; annex D.1.3 that there shall not.
+    // Section 9.2 says "should", annex D.1.3 says "shall".
     let demanded = found.version() >= Some(ANNEX_D);
     let is_error = demanded && kink >= found.number(&KINK_ERROR_FROM);
     let level = if is_error {

@@ -28,7 +28,7 @@ const GRAVE: Param = Param::number(
     "m",
     "in versions before 1.9, a deviation up to this is a warning",
 );
-/// What a sum of lengths written with few digits may be off, as a share of it.
+/// Relative tolerance for a sum of lengths that are written with few digits.
 const RELATIVE: f64 = 1e-6;
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
@@ -44,7 +44,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             let (Some(s), Some(length)) = (geometry.s(), geometry.length()) else {
                 break;
             };
-            // Another checker's business, and nothing adds up from here on.
+            // Another checker reports a negative length. After it the sums are meaningless.
             if length < 0.0 {
                 break;
             }

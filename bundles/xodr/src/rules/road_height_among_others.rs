@@ -11,7 +11,7 @@ const APART: Param = Param::number(
     "a road that is not linked may lie up to so much above or below all others",
 );
 
-/// Only few roads that lie apart are odd: of two halves nobody knows which is meant.
+/// Minimum ratio of the two groups. Only a small group is odd; of two halves it is unclear which.
 const FEW: usize = 10;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -25,7 +25,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// A road and the heights of its ends, the lower one first.
+/// A road with the heights of its ends, the lower one first.
 struct Span<'m, 'd> {
     road: &'m Road<'d>,
     low: f64,
@@ -79,7 +79,7 @@ impl<'m, 'd> Span<'m, 'd> {
     }
 }
 
-/// Steps between linked roads are found where they are linked.
+/// Checks whether a road has no links. Steps between linked roads are found at the links.
 fn is_unlinked<'a>(map: &RoadMap<'a>, road: &Road<'a>) -> bool {
     ContactPoint::BOTH
         .iter()

@@ -16,7 +16,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// The first version in which one element holds all restrictions of a place.
+/// First version in which one element holds all restrictions of a place.
 const RESTRICTION_ELEMENTS: Version = Version::new(1, 8);
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

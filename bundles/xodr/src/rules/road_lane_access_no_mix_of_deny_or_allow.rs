@@ -11,7 +11,7 @@ const SAME_PLACE: Param = Param::number(
     "records that start closer together than this start at the same place",
 );
 
-/// With how many records before it a record is compared: bounds the work on hostile files.
+/// Maximum number of previous records for comparisons. It limits the work on hostile files.
 const LOOK_BACK: usize = 64;
 
 pub static RULE: Rule<Roads> = Rule {

@@ -41,7 +41,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether the offset moves nothing. One that cannot be read may move something.
+/// Checks whether the offset is zero. An unreadable offset may be different from zero.
 fn is_zero(offset: &Record<'_>) -> bool {
     let zero = |cubic: Cubic| [cubic.a, cubic.b, cubic.c, cubic.d] == [0.0; 4];
     offset.cubic().is_some_and(zero)

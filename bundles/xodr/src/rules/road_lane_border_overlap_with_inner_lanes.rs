@@ -27,7 +27,7 @@ pub static RULE: Rule<Roads> = Rule {
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     for section in map.part(part).sections() {
         for side in Side::BOTH {
-            // Where a side has widths, its borders do not count.
+            // If a side has widths, its borders are ignored.
             if section.has_widths(side) || !section.is_numbered(side) {
                 continue;
             }
@@ -68,7 +68,7 @@ fn compare(side: Side, inner: LaneRef<'_, '_>, outer: LaneRef<'_, '_>, found: &m
         .at(inner.node(), "the inner lane");
 }
 
-/// Where the outer border lies least far outside of the inner one, wherever both are defined.
+/// Returns the smallest distance of the outer border from the inner one, where both exist.
 fn lowest_distance(
     side: Side,
     inner: LaneRef<'_, '_>,

@@ -19,7 +19,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Center lanes have rules of their own since this version.
+/// First version with separate rules for center lanes.
 const CENTER_LANE_RULES: Version = Version::new(1, 9);
 const CENTER_LANE: &str = "asam.net:xodr:1.9.0:road.lane.center_lane";
 const SINGULAR: &str = "asam.net:xodr:1.9.0:road.lane.center_lane_singular";
@@ -42,7 +42,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
 }
 
 fn no_center_at_all(road: &Road<'_>, is_new: bool, found: &mut Sink<'_>) {
-    // Where there is but one section, it is the one to be mended.
+    // If there is only one section, that is the one to fix.
     let mut sections = road.sections().map(|section| section.node());
     let only = sections.next().filter(|_| sections.next().is_none());
     let lanes = road.layers().first().map(|lanes| lanes.node());
@@ -82,7 +82,7 @@ fn check(section: SectionRef<'_, '_>, is_new: bool, found: &mut Sink<'_>) {
 }
 
 fn check_lanes(group: Node<'_>, is_permanent: bool, is_new: bool, found: &mut Sink<'_>) {
-    // Before 1.9, the number of lanes within `center` is the schema's alone.
+    // Before 1.9, only the schema limits the number of lanes within `center`.
     let level = if is_new { Level::Error } else { Level::Warning };
     match group.children_named("lane").collect::<Vec<_>>().as_slice() {
         [_] => {}

@@ -4,7 +4,7 @@ use qcbus_sdk::{Level, Place, Rule, Sink};
 use crate::families::on_road::OnRoad;
 use crate::model::{Part, Roads};
 
-/// Types of lane on which traffic runs in one direction.
+/// Types of lanes on which traffic runs in one direction.
 const DIRECTED: &[&str] = &[
     "driving",
     "entry",

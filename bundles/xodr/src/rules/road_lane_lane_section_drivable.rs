@@ -28,7 +28,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         .filter_map(|(_, connection)| connection.connecting_road())
         .collect();
     for road in map.roads() {
-        // Roads that only close the boundary of a junction need no lanes (12.10).
+        // Roads that only complete the boundary of a junction need no lanes (12.10).
         let within = road.junction().is_some() && !connecting.contains(road.id());
         let Some(layer) = road
             .permanent()
@@ -57,7 +57,7 @@ fn is_there(lane: LaneRef<'_, '_>) -> bool {
     lane.side().is_some() && any && opens(lane)
 }
 
-/// Whether the lane has width anywhere. What cannot be evaluated is taken to have some.
+/// Checks whether the lane has width anywhere. If this is unknown, the answer is yes.
 fn opens(lane: LaneRef<'_, '_>) -> bool {
     match zero_stretches(lane).zip(lane.length()) {
         Some((zero, length)) => {

@@ -25,8 +25,8 @@ pub static RULE: Rule<Roads> = Rule {
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     for section in map.part(part).sections() {
-        // Borders count from the reference line; with an offset, which is not allowed beside them,
-        // nobody knows where the center is.
+        // Borders are measured from the reference line. An offset is not allowed beside them. With
+        // an offset, the position of the center is unknown.
         if section.layer.offset().is_empty() {
             for side in Side::BOTH {
                 on_wrong_side(section, side, found);
@@ -37,7 +37,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         let (Some(side), Some(id)) = (lane.side(), lane.id()) else {
             continue;
         };
-        // 0 is the business of the rule about the center lane's id.
+        // The rule about the center lane's id reports 0.
         if id == 0 || Side::of_lane_id(id) == Some(side) {
             continue;
         }
@@ -53,8 +53,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// The innermost lane of a side whose outer border lies beyond the center lane. Further out, a border
-/// that crosses an inner one is the business of the rule about that.
+/// Reports the innermost lane of a side if its outer border lies beyond the center lane. Another
+/// rule reports outer borders that cross an inner one.
 fn on_wrong_side(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) {
     let first = section.side(side).next();
     let by_border = !section.has_widths(side) && section.is_numbered(side);

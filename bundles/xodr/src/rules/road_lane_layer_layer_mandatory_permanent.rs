@@ -40,7 +40,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 continue;
             };
             let end = s + length;
-            // Sections for one side may lie beside another one that goes on.
+            // A section for a single side may lie beside another one that continues.
             if end < next - tolerance && section.single_side() != Some(true) {
                 let text = format!(
                     "this section of the permanent layer ends at s = {end} (s = {s} and length = {length}), \

@@ -26,7 +26,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// From the first lane with `@level="true"` to the edge of the road all lanes must have it.
+/// Checks that all lanes outside of the first one with `@level="true"` have this attribute too.
 fn outward(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) {
     let mut level: Option<LaneRef<'_, '_>> = None;
     for lane in section.side(side).filter(|lane| lane.id().is_some()) {
@@ -50,7 +50,7 @@ fn outward(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) {
     }
 }
 
-/// A change of `@level` where one lane goes on in another is not recommended (11.7.4).
+/// Reports a change of `@level` between linked lanes, which is not recommended (11.7.4).
 fn along(map: &RoadMap<'_>, joint: &LaneJoint<'_>, found: &mut Sink<'_>) {
     let (Some(from), Some(to)) = (map.lane(joint.from.lane), map.lane(joint.to.lane)) else {
         return;

@@ -41,7 +41,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         if is_elsewhere(joint, from, to, found.number(&FAR)) {
             continue;
         }
-        // Roads of different rules are the fault, not each of their lanes.
+        // If the traffic rules of two roads differ, this is one fault per pair of roads, not per
+        // lane.
         let rules = rules(from, to);
         let (one, other) = (from.at.road.index(), to.at.road.index());
         let is_new = match rules {
@@ -54,7 +55,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What happens to traffic where two lanes meet, if it does not get from the one onto the other.
+/// Describes the conflict between two lanes, or returns `None` if traffic can continue.
 fn against(
     joint: &LaneJoint<'_>,
     from: LaneRef<'_, '_>,
@@ -71,7 +72,7 @@ fn against(
     }
 }
 
-/// Whether two lanes lie so far apart that the link, not the direction, is wrong.
+/// Checks whether two lanes are so far apart that the link is wrong, not the direction.
 fn is_elsewhere(
     joint: &LaneJoint<'_>,
     from: LaneRef<'_, '_>,
@@ -84,7 +85,7 @@ fn is_elsewhere(
     edges.is_some_and(|([one, _], [other, _])| one.point.plan().distance(other.point.plan()) > far)
 }
 
-/// The sides on which traffic keeps on two roads, if they differ.
+/// Returns the traffic rules of two roads if they differ.
 fn rules(from: LaneRef<'_, '_>, to: LaneRef<'_, '_>) -> Option<[&'static str; 2]> {
     let (one, other) = (from.at.road.traffic_rule()?, to.at.road.traffic_rule()?);
     let name = |rule| match rule {

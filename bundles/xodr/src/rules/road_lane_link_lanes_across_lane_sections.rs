@@ -14,16 +14,16 @@ const OVERLAP: Param = Param::number(
     "share of the narrower lane's width that two lanes must have in common to be one lane",
 );
 
-/// The rule as annex F spells it; on findings that ASAM's checker has nothing like.
+/// UID in the spelling of annex F, for findings without a counterpart in ASAM's checker.
 const ANNEX_F: &str = "asam.net:xodr:1.4.0:road.lane.link.lanes_across_laneSections";
 
-/// Lanes that are narrower, in metres, do not count as going on.
+/// Minimum width of lanes that count as continuing, in metres.
 const NARROW: f64 = 0.1;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_link_lanes_across_lane_sections",
     uids: &[
-        // As ASAM's checker prints it.
+        // ASAM's checker prints this UID.
         "asam.net:xodr:1.4.0:road.lane.link.lanes_across_lane_sections",
         ANNEX_F,
     ],
@@ -45,7 +45,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// Lanes that go on in the next section by place, width and type, and of which neither is linked
+/// Reports lanes that continue in the next section by position, width and type without any link
 /// across the boundary.
 fn not_linked_at_all(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) {
     let Some((next, length)) = section.next(side).zip(section.length(side)) else {
@@ -79,7 +79,7 @@ fn not_linked_at_all(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'
     }
 }
 
-/// The share of the narrower lane's width that both have in common; none for lanes of no width.
+/// Returns the overlap of two lanes as a fraction of the narrower width, or zero without width.
 fn overlap(one: &LaneSpan<'_, '_>, other: &LaneSpan<'_, '_>) -> f64 {
     let range = |span: &LaneSpan<'_, '_>| (span.inner.min(span.outer), span.inner.max(span.outer));
     let ((low, high), (from, to)) = (range(one), range(other));
@@ -115,7 +115,8 @@ fn not_returned(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What a lane that does not link back has there: a link of the right number may lead to the wrong end.
+/// Describes the links of a lane that does not link back. The right number may lead to the wrong
+/// end.
 fn what_it_says<'a>(
     map: &RoadMap<'a>,
     joint: &LaneJoint<'a>,
@@ -136,8 +137,9 @@ fn what_it_says<'a>(
     }
 }
 
-/// Lanes of connecting roads are linked from one side only: the roads around a junction name the
-/// junction. The same goes for whatever end is linked to a junction.
+/// Checks whether a lane must link back. Connecting roads have links on one side only, because the
+/// roads around a junction link to the junction. The same applies to every end with a link to a
+/// junction.
 fn demands_link_back<'a>(
     map: &RoadMap<'a>,
     joint: &LaneJoint<'a>,
@@ -170,7 +172,7 @@ fn links_back<'a>(
             .and_then(|id| map.linked_lane(to, joint.to.end, id, link.layer()));
         match target {
             Some(target) => target.lane == from.key(),
-            // The road does not say where its lanes lead, or not to which end: the number has to do.
+            // If the road has no link or no contact point there, only the number can be compared.
             None => link.id() == from.id() && map.linked_end(to.at.road, joint.to.end).is_none(),
         }
     })

@@ -15,7 +15,7 @@ const NEAR: Param = Param::number(
     "how near the edges of two lanes must be for one to go on as the other",
 );
 
-/// Lanes that are narrower, in metres, do not count as going on.
+/// Minimum width of lanes that count as continuing, in metres.
 const NARROW: f64 = 0.1;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -43,7 +43,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let Some((one, other)) = roads.filter(|(one, other)| outside(one) && outside(other)) else {
             continue;
         };
-        // An end that is linked to itself goes on nowhere.
+        // An end with a link to itself has no continuation.
         if from != to && told.insert((from.min(to), from.max(to))) {
             let theirs: Vec<Open<'_, '_>> = open_lanes(other, to.end).collect();
             for lane in open_lanes(one, from.end) {
@@ -53,10 +53,10 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// A lane that is linked to nothing at an end of its road, with its inner and its outer edge there.
+/// A lane without a link at an end of its road, with its inner and its outer edge there.
 type Open<'m, 'a> = (LaneRef<'m, 'a>, [Point; 2]);
 
-/// The drivable lanes at an end of a road that are linked to nothing there.
+/// Returns the drivable lanes without a link at an end of a road.
 fn open_lanes<'m, 'a>(road: &'m Road<'a>, end: ContactPoint) -> impl Iterator<Item = Open<'m, 'a>> {
     let sections = Side::BOTH.into_iter().filter_map(move |side| {
         let section = road.permanent()?.end_section(road, side, end)?;

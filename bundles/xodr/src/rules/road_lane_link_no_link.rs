@@ -30,14 +30,14 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// Why lanes have nothing to be linked to at an end of a road, if that is so.
+/// Returns the reason why lanes have no target for a link at an end of a road, or `None`.
 fn nothing_to_link(map: &RoadMap<'_>, road: &Road<'_>, end: ContactPoint) -> Option<String> {
     let Some(link) = road.link(end) else {
         let here = RoadEnd {
             road: road.index(),
             end,
         };
-        // Where others say that they touch this end, the link of the road is what is missing.
+        // If other roads state that they touch this end, the link of the road is missing.
         let is_touched = map.contacts_of(here).next().is_some();
         return (!is_touched).then(|| {
             format!(
@@ -65,7 +65,7 @@ fn check<'a>(
         reaches.then(|| section.side(side))
     });
     let links = sections.flatten().filter_map(|lane| {
-        // Links from temporary lanes to the permanent ones may mean those of the same road.
+        // A link from a temporary lane to a permanent one may refer to the same road.
         let mut links = lane.links(end);
         let link =
             links.find(|link| !is_temporary || link.node().attr("layer") == Some("temporary"))?;
@@ -98,7 +98,7 @@ fn check<'a>(
     }
 }
 
-/// Whether a section reaches an end of its road.
+/// Checks whether a section reaches an end of its road.
 fn reaches(
     road: &Road<'_>,
     section: SectionRef<'_, '_>,

@@ -31,8 +31,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether the temporary lanes begin or end here: no other temporary section touches this end,
-/// and the road goes on.
+/// Checks whether the temporary lanes begin or end here. That means that no other temporary section
+/// touches this end and the road continues.
 fn begins_or_ends(lane: LaneRef<'_, '_>, end: ContactPoint) -> bool {
     let (Some(side), Some(start)) = (lane.side(), lane.at.s()) else {
         return false;
@@ -61,8 +61,8 @@ fn begins_or_ends(lane: LaneRef<'_, '_>, end: ContactPoint) -> bool {
     inside && !touches
 }
 
-/// Whether the temporary lane reaches the end of its road, and the road that is linked there has no
-/// temporary lanes on which it could go on.
+/// Checks whether the temporary lane reaches the end of its road. The linked road must have no
+/// temporary lanes to continue it.
 fn is_alone_at_end<'a>(map: &RoadMap<'a>, lane: LaneRef<'_, 'a>, end: ContactPoint) -> bool {
     let (Some(side), Some(contact)) = (lane.side(), map.linked_end(lane.at.road, end)) else {
         return false;

@@ -18,7 +18,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Lanes on which no vehicle drives, whatever lies before or behind them.
+/// Types of lanes on which no vehicle drives, independent of the lanes before and after them.
 const FOR_OTHERS: &[&str] = &["sidewalk", "walking", "curb", "median", "rail", "tram"];
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -17,7 +17,7 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    // Who is linked to which lane end, across roads that belong to no junction.
+    // The lanes that are linked to each lane end, across roads that belong to no junction.
     let mut named: BTreeMap<LaneEnd, Vec<(LaneRef<'_, '_>, &LaneJoint<'_>)>> = BTreeMap::new();
     for joint in map.roads().iter().flat_map(|road| map.joints_of(road)) {
         let lanes = map.lane(joint.from.lane).zip(map.lane(joint.to.lane));
@@ -52,8 +52,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether two lanes may merge: they lie in one lane section on one side, or on the two layers of one
-/// road, of which one is valid at a time.
+/// Checks whether two lanes may merge. They must lie in one lane section on one side, or on the two
+/// layers of one road. Only one of the layers is valid at a time.
 fn together(one: LaneRef<'_, '_>, other: LaneRef<'_, '_>) -> bool {
     let (one_road, other_road) = (one.at.road.index(), other.at.road.index());
     let layers = one.at.layer.kind() != other.at.layer.kind();

@@ -24,9 +24,9 @@ const LENGTH: Param = Param::number(
     "over how many metres lanes must be shifted too steeply to be told",
 );
 
-/// A shift of more than this, in metres, comes of a number that is reported as none.
+/// Offset in metres above which another rule reports the number as invalid.
 const ABSURD: f64 = 1e9;
-/// Into how many pieces a stretch is cut to see how much of it is steep.
+/// Number of pieces of a stretch for measuring its steep part.
 const PIECES: u32 = 64;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -48,7 +48,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// Reports the worst of a road, for what follows a record that is too steep is too far aside as well.
+/// Reports the first offset of a layer that is too large, otherwise the first slope that is too
+/// steep. Lanes after a steep record are usually shifted too far as well.
 fn one(road: &Road<'_>, layer: &LaneLayer<'_>, found: &mut Sink<'_>) {
     let Some(length) = road.length() else {
         return;
@@ -88,7 +89,7 @@ fn one(road: &Road<'_>, layer: &LaneLayer<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Where the lanes are shifted farthest, and how far, when that is too far.
+/// Returns the position and size of the largest shift of the lanes if it is too large.
 fn far(stretch: &Stretch<'_, '_>, found: &Sink<'_>) -> Option<(f64, f64)> {
     let length = stretch.length();
     let lowest = stretch.cubic.minimum(0.0, length)?;
@@ -103,8 +104,8 @@ fn far(stretch: &Stretch<'_, '_>, found: &Sink<'_>) -> Option<(f64, f64)> {
     is_far.then_some((farthest.at, offset))
 }
 
-/// Where the lanes are shifted most steeply, how steeply, and over how many metres it is too much, when that
-/// is more than a few.
+/// Returns the position and slope of the steepest shift of the lanes, and the length that is too
+/// steep. It returns them only if that length is more than a few metres.
 fn steepest(stretch: &Stretch<'_, '_>, found: &Sink<'_>) -> Option<(f64, f64, f64)> {
     let length = stretch.length();
     let (most, least) = (found.number(&SLOPE), found.number(&LENGTH));

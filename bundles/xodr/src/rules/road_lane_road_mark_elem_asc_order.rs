@@ -20,13 +20,14 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     ascending::lane_records(map.part(part), "roadMark", MARKS, found);
 }
 
-/// Two lines at one place are solid or broken, unless the file says where beside each other they lie.
+/// Severity of two lines at one place. Copies and contradicting types, such as solid and broken,
+/// are a warning. Types may differ if the file defines the positions of the lines.
 const MARKS: Equal = |before, mark| match contradict(before, mark) || is_copy(before, mark) {
     true => Some(Level::Warning),
     false => ascending::PARALLEL(before, mark),
 };
 
-/// A line that is there already, to the last attribute.
+/// Checks whether a line is an exact copy of the previous one, with all attributes.
 fn is_copy(before: Node<'_>, mark: Node<'_>) -> bool {
     let plain = |mark: Node<'_>| mark.children().next().is_none();
     let said = |mark: Node<'_>| mark.attributes().count();

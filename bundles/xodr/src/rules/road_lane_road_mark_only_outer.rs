@@ -39,7 +39,7 @@ fn check(lane: LaneRef<'_, '_>, mark: &LaneRecord<'_>, found: &mut Sink<'_>) {
     let lines = kinds.flat_map(|kind| kind.children().filter(|child| child.is("line")));
     let offsets: Option<Vec<f64>> = lines.map(|line| line.f64("tOffset").ok()).collect();
     let Some(offsets) = offsets else { return };
-    // Lines on both sides of the border are a mark that lies on it.
+    // Lines on both sides of the border form one mark on the border.
     let either = |side: fn(&f64) -> bool| offsets.iter().any(side);
     if either(|t| *t <= 0.0) && either(|t| *t >= 0.0) {
         return;
@@ -60,7 +60,7 @@ fn check(lane: LaneRef<'_, '_>, mark: &LaneRecord<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The greatest width of a lane from `ds` on: where it opens, any line lies beside it.
+/// Returns the largest width from `ds` on. Where a lane opens, any line would lie beside it.
 fn widest(lane: LaneRef<'_, '_>, ds: f64) -> Option<f64> {
     let length = lane.length()?;
     let stretches = lane.widths().stretches(length);

@@ -33,8 +33,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             continue;
         };
         for side in Side::BOTH {
-            // Of lanes that have no width up to the end of the section before: since which s, and
-            // where that was.
+            // Lanes without width up to the end of the previous section: the s of the start, and
+            // the lane there.
             let mut open: BTreeMap<i64, (f64, LaneRef<'_, '_>)> = BTreeMap::new();
             for section in layer.in_order(road).filter(|section| section.covers(side)) {
                 open = walk(section, side, &open, found);
@@ -45,7 +45,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
 
 type Open<'m, 'a> = BTreeMap<i64, (f64, LaneRef<'m, 'a>)>;
 
-/// Looks at the lanes of one section; returns those that have no width at its end.
+/// Checks the lanes of one section. Returns those without width at its end.
 fn walk<'m, 'a>(
     section: SectionRef<'m, 'a>,
     side: Side,

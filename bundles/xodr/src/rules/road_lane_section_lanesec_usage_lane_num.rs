@@ -22,7 +22,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             continue;
         };
         for (from, to) in zero {
-            // From nothing to something, or the other way round, within the section.
+            // The lane opens or closes within the section.
             let place = if to < length - 1e-3 {
                 Some((to, "opens"))
             } else if from > 1e-3 {

@@ -40,8 +40,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// Looks at one end of a section of the temporary layer: where one of its lanes is linked to the
-/// permanent layer, a section of that layer must begin. `starts` are ascending.
+/// Checks one end of a section of the temporary layer. If one of its lanes is linked to the
+/// permanent layer, a section of that layer must begin there. `starts` is in ascending order.
 fn check(section: SectionRef<'_, '_>, end: ContactPoint, starts: &[f64], found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);
     let mut links = section

@@ -22,7 +22,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     let least = found.number(&LEAST);
     let short = found.number(&SHORT);
     for section in map.part(part).sections() {
-        // One finding per section, although both sides may say the same.
+        // Each section gets one finding, although both sides may have the same fault.
         let mut sides = Side::BOTH.into_iter().filter(|side| section.covers(*side));
         let bad = sides.find_map(|side| {
             let length = section.length(side).filter(|length| *length <= short)?;

@@ -60,7 +60,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             }
         }
         for mark in lane.elements("roadMark") {
-            // What is not painted has no size; a strip of grass has any.
+            // A mark without paint has no size, and a strip of grass may have any size.
             if !matches!(mark.attr("type"), Some("none" | "grass")) {
                 look_at_mark(lane, mark, found);
             }
@@ -68,7 +68,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// Reports sizes of a mark and, where there are any, of the lines that it is made of.
+/// Reports too large sizes of a mark and of its lines, if there are any.
 fn look_at_mark(lane: LaneRef<'_, '_>, mark: Node<'_>, found: &mut Sink<'_>) {
     let (width, height) = (found.number(&MARK_WIDTH), found.number(&MARK_HEIGHT));
     for (name, limit, what) in [

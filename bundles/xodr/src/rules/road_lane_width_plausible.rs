@@ -31,12 +31,12 @@ const LENGTH: Param = Param::number(
     "over how many metres a lane must be narrow or wide to be told",
 );
 
-/// Lanes whose width changes by more than this, in metres, open or close.
+/// Change of width in metres above which a lane counts as opening or closing.
 const STEADY: f64 = 0.3;
-/// Nothing that is narrower, in metres, is meant to be a lane there.
+/// Width in metres below which the lane is intentionally absent.
 const NOTHING: f64 = 0.05;
 
-/// A record that begins with more than this, in metres, is reported as a number that is none.
+/// Start value of a record in metres above which another rule reports the number as invalid.
 const ABSURD: f64 = 1e9;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -68,7 +68,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// The width of a stretch that is too wide to be a lane.
+/// Returns the width of a stretch that is too wide for a lane.
 fn wide(stretch: &Stretch<'_, '_>, traffic: bool, found: &Sink<'_>) -> Option<f64> {
     let length = stretch.length();
     let any = found.number(&ANY);
@@ -80,7 +80,7 @@ fn wide(stretch: &Stretch<'_, '_>, traffic: bool, found: &Sink<'_>) -> Option<f6
     if !traffic || greatest <= most || length < found.number(&LENGTH) {
         return None;
     }
-    // Mouths of junctions widen at their ends only.
+    // Lanes at junctions widen only at their ends.
     let least = [0.25, 0.5, 0.75]
         .map(|share| stretch.cubic.value(share * length))
         .into_iter()
@@ -109,7 +109,7 @@ fn report_wide(
     found.issue(stretch.record.node(), text).in_lane(lane, ds);
 }
 
-/// Reports a lane that is narrow all along, and does not just open or close.
+/// Reports a lane that is narrow along its whole length and does not just open or close.
 fn narrow(lane: LaneRef<'_, '_>, length: f64, found: &mut Sink<'_>) {
     let least = found.number(&LEAST);
     let (mut low, mut high) = (f64::INFINITY, 0.0_f64);

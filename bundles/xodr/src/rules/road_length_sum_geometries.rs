@@ -30,7 +30,7 @@ const BROKEN_FROM: Param = Param::number(
     "from this difference on a part of the road has no place, or a part of its line no road, which is an error \
      in every version",
 );
-/// What a sum of lengths written with few digits may be off, as a share of it.
+/// Relative tolerance for a sum of lengths that are written with few digits.
 const RELATIVE: f64 = 1e-6;
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -21,7 +21,7 @@ pub static RULE: Rule<Roads> = Rule {
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     direct_junctions(map, found);
     let known = Known::by(map);
-    // `junctions.incoming_road_linked` speaks of them.
+    // `junctions.incoming_road_linked` reports these roads.
     let unlinked = UnlinkedArms::of(map);
     let mut told = BTreeSet::new();
     for road in map.roads() {
@@ -46,8 +46,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What a direct junction links must name the junction in turn. At common junctions it is the connecting
-/// roads that lead to the roads around.
+/// Checks that roads in a direct junction link back to it. At common junctions the connecting roads
+/// lead to the surrounding roads.
 fn direct_junctions(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for (junction, connection) in map.connections() {
         if junction.kind() != Some(JunctionType::Direct) {

@@ -19,13 +19,13 @@ const FAR: Param = Param::number(
     "how far a road may end from a junction that has no connection for it, or the junction's size if that is more",
 );
 
-/// A road that lies nearer than this, in metres, is the one that is meant.
+/// Distance in metres below which a road counts as the intended one.
 const THERE: f64 = 0.1;
 
-/// Roads around one junction that are looked at when one of its links is wrong. No real junction has as many.
+/// Maximum number of checked roads around a junction with a wrong link. Real ones have fewer.
 const MOST_ARMS: usize = 64;
 
-/// Of junctions with more roads than this nothing is said about roads that they do not connect.
+/// Maximum number of road ends. Larger junctions get no findings about unconnected roads.
 const MOST_ENDS: usize = 256;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -40,9 +40,10 @@ pub static RULE: Rule<Roads> = Rule {
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let mut told: HashSet<(RoadEnd, RoadEnd)> = HashSet::default();
-    // Which junctions say that they are at which road ends.
+    // The road ends at which a junction is, according to its connections and roads.
     let mut joined: HashSet<(usize, RoadEnd)> = HashSet::default();
-    // `junctions.connection.start_along_linkage` and `…end_opposite_linkage` say so.
+    // The rules `junctions.connection.start_along_linkage` and `…end_opposite_linkage` report
+    // contradictions.
     let arms = Arms {
         map,
         by_junction: OnceCell::new(),
@@ -57,7 +58,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let junction = contact.junction.or_else(|| junction_of(map, one));
         joined.extend(junction.into_iter().flat_map(|at| [(at, one), (at, other)]));
     }
-    // `junctions.incoming_road_linked` speaks of them.
+    // `junctions.incoming_road_linked` reports these roads.
     let unlinked = UnlinkedArms::of(map);
     for road in map.roads() {
         for end in ContactPoint::BOTH {
@@ -72,22 +73,23 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The place of the junction that a road belongs to.
+/// Returns the index of the junction to which a road belongs.
 fn junction_of(map: &RoadMap<'_>, at: RoadEnd) -> Option<usize> {
     let id = map.road_at(at.road)?.junction()?;
     Some(map.junction(id)?.index())
 }
 
-/// What links of roads and connections of junctions say to meet. Of reference lines outside of junctions that do
-/// not, by `broken` metres or more, `road.geometry.contact_point` speaks; connections that the links contradict
-/// are left out if they are `contradicted` by a rule of their own.
+/// Returns the contacts of road links and connections. It skips reference lines outside junctions
+/// with a gap of `broken` metres or more, which `road.geometry.contact_point` reports. If
+/// `contradicted` is set, it skips connections that contradict the links. A separate rule reports
+/// those.
 fn contacts<'a>(
     map: &RoadMap<'a>,
     contradicted: bool,
     broken: f64,
 ) -> impl Iterator<Item = RoadContact<'a>> {
     let links = map.roads().iter().flat_map(move |road| {
-        // The main road of a virtual junction is not cut, and met somewhere along it.
+        // The main road of a virtual junction is not split, so the contact is somewhere along it.
         let links = ContactPoint::BOTH.map(|end| Some((end, road.link(end)?)));
         let links = links.into_iter().flatten();
         let cut = links.filter(move |(_, link)| !leads_to_main_road(map, road, *link));
@@ -101,7 +103,7 @@ fn contacts<'a>(
     links.chain(connections)
 }
 
-/// Whether reference lines of two roads outside of junctions lie apart: then little is known of the mouths.
+/// Checks whether reference lines outside junctions are apart. Then mouths are unreliable.
 fn is_of_lines(map: &RoadMap<'_>, contact: &RoadContact<'_>, broken: f64) -> bool {
     let ends = [contact.from, contact.to].map(|at| Some((map.road_at(at.road)?, at.end)));
     let [Some((one, from)), Some((other, to))] = ends else {
@@ -117,7 +119,7 @@ fn is_of_lines(map: &RoadMap<'_>, contact: &RoadContact<'_>, broken: f64) -> boo
     })
 }
 
-/// Whether the connecting road says of that end that it meets another road than the incoming one.
+/// Checks whether the connecting road is linked there to a road other than the incoming one.
 fn is_contradicted(map: &RoadMap<'_>, contact: &RoadContact<'_>) -> bool {
     let roads = map
         .road_at(contact.from.road)
@@ -168,13 +170,13 @@ fn check<'m, 'a>(
         .at_end(other, contact.to.end);
 }
 
-/// The same without the digits that calculation leaves.
+/// Rounds a length to micrometres, to remove digits from calculation errors.
 fn in_micrometres(length: f64) -> f64 {
     (length * 1e6).round() / 1e6
 }
 
-/// The road end that lies where another is said to be: the other end of the same road, or of connecting roads that
-/// of another arm of the junction.
+/// Returns the road end at the place of the contact. This is the other end of the same road, or for
+/// connecting roads the end of another road at the junction.
 fn meant<'m, 'a>(
     contact: &RoadContact<'_>,
     other: &'m Road<'a>,
@@ -196,12 +198,12 @@ fn meant<'m, 'a>(
 /// The road ends around the junctions.
 struct Arms<'m, 'd> {
     map: &'m RoadMap<'d>,
-    /// Found out when something is wrong somewhere.
+    /// Computed on the first fault.
     by_junction: OnceCell<HashMap<&'d str, Vec<RoadEnd>>>,
 }
 
 impl<'m, 'd> Arms<'m, 'd> {
-    /// The road around the junction that lies at an end of one of its connecting roads.
+    /// Returns the road around the junction that lies at an end of one of its connecting roads.
     fn at(&self, connecting: &Road<'d>, here: RoadEnd) -> Option<(&'m Road<'d>, ContactPoint)> {
         let junction = connecting.junction()?;
         let arms = self
@@ -237,7 +239,7 @@ impl<'m, 'd> Arms<'m, 'd> {
     }
 }
 
-/// Looks at a road end whose link names a junction that says nothing about it.
+/// Reports a road end with a link to a distant junction that does not mention the end.
 fn junction(
     map: &RoadMap<'_>,
     (road, end): (&Road<'_>, ContactPoint),
@@ -287,8 +289,8 @@ fn junction(
         .at(junction.node(), "the junction");
 }
 
-/// How far a road end lies from the nearest end of a junction's roads, if that is farther than they lie from
-/// each other, and than `far`.
+/// Returns the distance of a road end from the nearest end of a junction's roads. It returns `None`
+/// unless this is more than `far` and more than the size of the junction.
 fn nearest(
     (road, end): (&Road<'_>, ContactPoint),
     ends: &[(&Road<'_>, ContactPoint)],
@@ -308,7 +310,7 @@ fn nearest(
     (apart > far.max(bounds.diagonal())).then_some(apart)
 }
 
-/// The rectangle around some points.
+/// Bounding rectangle of some points.
 #[derive(Default)]
 struct Bounds(Option<[f64; 4]>);
 

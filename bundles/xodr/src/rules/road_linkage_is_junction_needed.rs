@@ -20,7 +20,7 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    // Who names which end of a road, among roads outside of junctions.
+    // The links to each road end, from roads outside junctions.
     let mut named: BTreeMap<RoadEnd, Vec<(&str, Node<'_>)>> = BTreeMap::new();
     for road in map.roads().iter().filter(|road| road.junction().is_none()) {
         for contact in ContactPoint::BOTH
@@ -53,7 +53,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Who is linked there, each id once.
+/// Describes the roads with links there, each id once.
 fn who(links: &[(&str, Node<'_>)]) -> String {
     let mut seen = HashSet::default();
     let ids = links.iter().filter(|(id, _)| seen.insert(*id));

@@ -34,13 +34,13 @@ fn check(map: &RoadMap<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
         found.issue(link.node(), text);
         return;
     };
-    // Links to virtual junctions have a rule of their own.
+    // Separate rules cover links to virtual junctions.
     let is_virtual = |junction: &Junction<'_>| junction.kind() == Some(JunctionType::Virtual);
     if map.junction(id).is_some_and(is_virtual) {
         return;
     }
-    // A contact point is written by habit. A place within the junction's road says that another kind of
-    // junction is meant, or another link, whatever the version.
+    // A contact point is often written by habit. A position indicates, in every version, that
+    // another kind of junction or another link is intended.
     let before = found.version() < Some(Version::new(1, 7));
     for name in ["contactPoint", "elementS", "elementDir"] {
         let level = match name {

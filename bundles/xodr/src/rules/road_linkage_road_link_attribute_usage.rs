@@ -17,7 +17,7 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
-    // Needed for few maps.
+    // Only few maps need this set.
     let named = OnceCell::new();
     let is_virtual = |road: &Road<'_>| {
         let named = named.get_or_init(|| virtual_links::connecting_roads(map));
@@ -42,7 +42,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// The attributes that a link to a road lacks; without a type, it may lead to a junction.
+/// Returns the missing attributes of a link to a road. Without a type it may lead to a junction.
 fn missing(
     road: &Road<'_>,
     link: RoadLink<'_>,
@@ -51,7 +51,7 @@ fn missing(
     let has = |name: &str| link.node().attribute(name).is_some();
     let is_within = has("elementS") || has("elementDir");
     let wanted: &[(&str, &'static str)] = match link.element_type() {
-        // The main road is touched somewhere within.
+        // The contact is inside the main road.
         Some("road") if is_within && is_virtual(road) => &[("elementId", "`elementId`")],
         Some("road") => &[
             ("elementId", "`elementId`"),

@@ -32,10 +32,10 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Open ends in one cell of the grid that are compared. Where more meet, somebody has piled roads up.
+/// Maximum number of compared open ends per cell. More ends mean that roads are stacked.
 const MOST_IN_CELL: usize = 16;
 
-/// An end of a road that nothing is linked to.
+/// An end of a road without links from or to it.
 struct Open<'m, 'a> {
     road: &'m Road<'a>,
     end: ContactPoint,
@@ -65,7 +65,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The ends outside of junctions at which traffic arrives and nothing is said about what lies there.
+/// Returns the ends outside junctions where traffic arrives and no link exists.
 fn open_ends<'m, 'a>(map: &'m RoadMap<'a>, narrow: f64) -> impl Iterator<Item = Open<'m, 'a>> {
     let outside = map.roads().iter().filter(|road| road.junction().is_none());
     let ends = outside.flat_map(|road| ContactPoint::BOTH.map(|end| (road, end)));
@@ -86,7 +86,7 @@ fn open_ends<'m, 'a>(map: &'m RoadMap<'a>, narrow: f64) -> impl Iterator<Item = 
     })
 }
 
-/// Whether one road goes on as the other: the same place, and no turning round.
+/// Checks whether one road continues as the other: at the same place and without turning back.
 fn touch(one: &Open<'_, '_>, other: &Open<'_, '_>, near: f64, turn: f64) -> bool {
     let (here, there) = (one.frame, other.frame);
     let round = if one.end == other.end {

@@ -51,8 +51,8 @@ fn has(link: RoadLink<'_>, name: &str) -> bool {
     link.node().attribute(name).is_some()
 }
 
-/// A link with `elementS` or `elementDir` of a road that virtual junctions have nothing to do with: who
-/// writes them beside a contact point means the contact point.
+/// Reports `elementS` or `elementDir` beside a contact point, in a link of a road without any
+/// relation to virtual junctions. Such a link refers to the contact point.
 fn superfluous(link: RoadLink<'_>, found: &mut Sink<'_>) {
     for attribute in ["elementS", "elementDir"] {
         let Some(attribute) = link.node().attribute(attribute) else {
@@ -67,9 +67,9 @@ fn superfluous(link: RoadLink<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// A link with `elementS` or `elementDir`.
+/// Checks a link with `elementS` or `elementDir`.
 fn within(map: &RoadMap<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
-    // Beside a common junction, both attributes are wrong: another rule's business.
+    // At a common junction both attributes are wrong. Another rule reports this.
     let junction = link.junction_id().and_then(|id| map.junction(id));
     if junction.is_some_and(|junction| junction.kind() != Some(JunctionType::Virtual)) {
         return;
@@ -102,7 +102,7 @@ fn beyond(map: &RoadMap<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
             "elementS is {s}, but road `{}` goes from s = 0 to s = {length}; the link must lead to a place on it",
             road.id()
         );
-        // A place that there is not, whatever the version.
+        // The position does not exist, so this is an error in every version.
         found
             .issue(Place::attribute_or_node(link.node(), "elementS"), text)
             .in_every_version(Level::Error)
@@ -110,8 +110,8 @@ fn beyond(map: &RoadMap<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// A link of a road in a virtual junction to an end of the main road: legal where the junction
-/// itself lies there.
+/// Checks a link of a road in a virtual junction to an end of the main road. It is legal only if
+/// the junction itself lies there.
 fn at_an_end(map: &RoadMap<'_>, road: &Road<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);
     let junction = road.junction().and_then(|id| map.junction(id));

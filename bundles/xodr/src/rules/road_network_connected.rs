@@ -33,7 +33,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let share = found.number(&SHARE);
     let small =
         |piece: &&Piece| piece.first != largest.first && piece.length <= share * largest.length;
-    // Where most roads stand alone, the map is a collection of them, not a network.
+    // If most roads are isolated, the map is a collection of roads and not a network.
     let alone = pieces.iter().filter(small).count();
     if largest.roads < 2 || alone >= largest.roads {
         return;

@@ -20,7 +20,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let Some(root) = map.root().filter(|_| !map.lanes().any(leads)) else {
         return;
     };
-    // A road without any lanes has rules of its own.
+    // Separate rules cover roads without any lanes.
     if map.lanes().any(|lane| lane.side().is_some()) {
         let text = "no lane of this map is one that vehicles get along on, such as `driving`; a simulator finds no place \
                     for them";
@@ -28,7 +28,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether anybody gets along on a lane who needs a lane: on tracks that is somebody else.
+/// Checks whether a lane serves some traffic, including trains on tracks.
 fn is_for_others_too(lane: LaneRef<'_, '_>) -> bool {
     is_route(lane) || matches!(lane.kind(), None | Some("rail" | "tram" | "restricted"))
 }

@@ -29,11 +29,11 @@ const CLEARANCE: Param = Param::number(
 const INSIDE: &str = "asam.net:xodr:1.4.0:road.overlap_inside_junction";
 const SELF: &str = "asam.net:xodr:1.4.0:road.no_overlap_self";
 
-/// Up to this distance from a common contact, in metres, linked roads may overlap: their ends are
-/// cut off at right angles, whatever the roads do.
+/// Distance from a common contact in metres within which linked roads may overlap. Their ends are
+/// cut at right angles, independent of the course of the roads.
 const NEAR_CONTACT: f64 = 10.0;
 
-/// More roads than this do not share one place in a map that is one.
+/// Maximum number of roads that share one place in a real map.
 const MOST: usize = 64;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -77,8 +77,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     });
 }
 
-/// Roads that may overlap by the kind of junction that they share: direct junctions, crossings,
-/// and whatever has to do with virtual junctions.
+/// Returns the pairs of roads that may overlap because of their common junction: direct junctions,
+/// crossings, and everything related to virtual junctions.
 fn friends(map: &RoadMap<'_>) -> HashSet<(usize, usize)> {
     let mut friends = HashSet::default();
     let mut add = |one: Option<&str>, other: Option<&str>| {
@@ -115,7 +115,7 @@ fn friends(map: &RoadMap<'_>) -> HashSet<(usize, usize)> {
             }
         }
         if junction.kind() == Some(JunctionType::Virtual) {
-            // Whatever these roads say about their junction.
+            // The junction attribute of these roads is ignored.
             let named = junction.connections();
             let named = named.filter_map(|one| one.connecting_road());
             let named: BTreeSet<&str> = named.take(MOST).collect();
@@ -138,7 +138,7 @@ fn friends(map: &RoadMap<'_>) -> HashSet<(usize, usize)> {
     friends
 }
 
-/// Whether two pieces of one road are so far apart along it that they should not touch.
+/// Checks whether two pieces of one road are so far apart along it that they should not touch.
 fn is_far(map: &RoadMap<'_>, one: &Slice, other: &Slice) -> bool {
     let (first, second) = if one.from <= other.from {
         (one, other)
@@ -150,12 +150,12 @@ fn is_far(map: &RoadMap<'_>, one: &Slice, other: &Slice) -> bool {
         .road_at(one.road)
         .and_then(Road::length)
         .unwrap_or(f64::INFINITY);
-    // A ring's last piece touches its first one.
+    // The last piece of a ring touches the first one.
     let around = first.from + length - second.to;
     gap.min(around) > NEAR_CONTACT.max(2.0 * one.width.max(other.width))
 }
 
-/// The junctions that the start and the end of each road are linked to.
+/// Returns the junctions to which the start and the end of each road are linked.
 fn mouths<'a>(map: &RoadMap<'a>) -> Vec<[Option<&'a str>; 2]> {
     let linked = |road: &Road<'a>, end| road.link(end).and_then(|link| link.junction_id());
     let roads = map.roads().iter();
@@ -164,7 +164,7 @@ fn mouths<'a>(map: &RoadMap<'a>) -> Vec<[Option<&'a str>; 2]> {
         .collect()
 }
 
-/// Whether both pieces lie at an end where the file says that their roads touch.
+/// Checks whether both pieces lie at an end where the file connects their roads.
 fn meet(map: &RoadMap<'_>, mouths: &[[Option<&str>; 2]], one: &Slice, other: &Slice) -> bool {
     let near = |slice: &Slice, end: ContactPoint| {
         let length = map
@@ -193,7 +193,7 @@ fn meet(map: &RoadMap<'_>, mouths: &[[Option<&str>; 2]], one: &Slice, other: &Sl
                 there.road == other.road && near(other, there.end)
             })
     };
-    // Roads that lie side by side at the mouth of one junction share its corners.
+    // Adjacent roads at the mouth of one junction share its corners.
     let junction_near = |slice: &Slice| {
         let road = map.road_at(slice.road)?;
         let [at_start, at_end] = *mouths.get(slice.road)?;

@@ -40,7 +40,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Which of several outlines a border follows cannot be said without ids.
+/// Reports outlines without ids. Borders cannot refer to one of several such outlines.
 fn borders_need_ids<'a>(map: &RoadMap<'a>, list: Node<'a>, found: &mut Sink<'_>) {
     let object = owner(list);
     let Some(borders) = object.child("borders") else {

@@ -16,7 +16,7 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 const COMPLETE: &str = "asam.net:xodr:1.7.0:road.object.borders.useCompleteOutline_true";
-/// The counterpart, for which the standard gives no identifier.
+/// UID of the opposite case, for which the standard has no identifier.
 const PARTIAL: &str = "qcbus.dev:xodr:1.7.0:road.object.borders.partial_outline";
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
@@ -48,7 +48,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let place = Place::attribute_or_node(border, "useCompleteOutline");
         let finding = found.issue(place, text).stands(map, owner(border)).uid(uid);
         if said.is_none() {
-            // Plainly, a part of the outline was meant.
+            // A part of the outline was clearly intended.
             finding.level(Level::Warning);
         }
     }

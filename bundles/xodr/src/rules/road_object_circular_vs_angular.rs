@@ -17,8 +17,8 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    // Two volumes that contradict each other are a fault in every version, as one is the alternative to the
-    // other in all of them; what can be understood is none before the rule was written down.
+    // Two contradicting volumes are a fault in every version, because all versions allow only one
+    // of the two. Cases with a clear meaning are no fault in versions without this rule.
     let mild = if object_parts::is_before(found, (1, 7)) {
         Level::Information
     } else {
@@ -48,14 +48,14 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Repeats and shapes can give what the object leaves open.
+/// Checks whether repeats or shapes can provide the sizes that the object does not have.
 fn is_completed(object: Node<'_>) -> bool {
     ["repeat", "outlines", "outline", "skeleton"]
         .into_iter()
         .any(|part| object.child(part).is_some())
 }
 
-/// A size of zero stands for "none" in many files.
+/// Reports an object with a radius and sides. In many files a size of zero means "none".
 fn both<'a>(
     map: &RoadMap<'a>,
     object: Node<'a>,
@@ -73,8 +73,8 @@ fn both<'a>(
     let place = Place::attribute_or_node(object, "radius");
     let older = object_parts::is_before(found, (1, 5));
     let finding = found.issue(place, text).stands(map, object);
-    // Before 1.5 the two were alternatives by the words of a table only, and tools wrote both; one side with a
-    // radius makes no box.
+    // Before 1.5 only the words of a table said that the two exclude each other, and tools wrote
+    // both. A single side with a radius is not a box.
     if says_none {
         finding.level(mild);
     } else if older || (sides.len() < 2 && mild == Level::Information) {

@@ -26,7 +26,7 @@ const AWAY: Param = Param::number(
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let away = found.number(&AWAY);
     for (road, object) in map.objects() {
-        // In a junction it may be another road that is crossed.
+        // In a junction the crosswalk may cross another road.
         let in_junction = road.junction().is_some_and(|id| id != "-1");
         if object.kind() != Some("crosswalk") || in_junction || object.repeats().next().is_some() {
             continue;
@@ -56,7 +56,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Where a crosswalk lies along its road and from which t to which.
+/// Returns s of a crosswalk along its road, and its range of t.
 fn across(road: &Road<'_>, object: &Object<'_>) -> Option<(f64, [f64; 2])> {
     let (s, t) = object.s().zip(object.t())?;
     let (sin, cos) = object.hdg().unwrap_or(0.0).sin_cos();

@@ -25,7 +25,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             let ([(from, start), (to, end)], all) = (pair, path.points.len()) else {
                 continue;
             };
-            // Points passed on the way, over the closing side where the numbers fall.
+            // Points between the two references, across the closing side if the numbers fall.
             let between = (end + all - start + all - 1) % all;
             let falls = end <= start;
             if between == 0 || (falls && path.is_closed() == Some(false)) {

@@ -42,8 +42,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The first reference that steps back. On a closed outline one step back may lead over the
-/// closing side, as long as the marking does not run past its own start.
+/// Returns the first reference that steps back. On a closed outline one step back may cross the
+/// closing side, if the marking does not pass its own start.
 fn out_of_order(path: &Path<'_>, may_wrap: bool) -> Option<usize> {
     let start = path.steps.first()?.1;
     let mut wrapped = false;

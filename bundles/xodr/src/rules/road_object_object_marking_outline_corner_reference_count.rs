@@ -56,7 +56,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// A curve has both ends of the line.
+/// Checks whether a marking refers to a curve. A curve includes both ends of the line.
 fn refers_to_curve(marking: Marking<'_>, outline: Node<'_>) -> bool {
     marking.references().any(|reference| {
         let id = reference.attr("id");

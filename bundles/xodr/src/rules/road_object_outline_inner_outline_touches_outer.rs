@@ -14,10 +14,10 @@ const TOUCH: Param = Param::number(
     "how near a corner must be to touch the other outline",
 );
 
-/// Corners that are not farther apart than this, in metres, are the same point.
+/// Maximum distance in metres of corners that count as the same point.
 const SAME: f64 = 0.001;
 
-/// More comparisons than this are not made for one object: hostile files only.
+/// Maximum number of comparisons for one object. Only hostile files need more.
 const MOST: usize = 5_000_000;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -37,7 +37,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         let (inner, outer): (Vec<_>, Vec<_>) = object
             .outlines()
             .partition(|outline| outline.outer() == Some(false));
-        // With another number of outer outlines nobody knows which one is meant.
+        // With any other number of outer outlines, the intended one is unknown.
         let ([outer], Some(frame)) = (outer.as_slice(), ObjectFrame::of(road, &object)) else {
             continue;
         };
@@ -53,7 +53,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// The corners in u and v; `None` with curves or when a corner cannot be evaluated.
+/// Returns the corners in u and v, or `None` for curves and for corners without a position.
 fn polygon<'a>(frame: &ObjectFrame<'_, 'a>, outline: &Outline<'a>) -> Option<Vec<Point>> {
     let corners = outline.corners().map(|corner| place(frame, &corner));
     corners.collect()

@@ -17,9 +17,9 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Outlines of more corners are not looked at: each side is compared with each other.
+/// Maximum number of checked corners, because each side is compared with all others.
 const MOST: usize = 200;
-/// How far a side must reach beyond another, in metres, to cross it.
+/// Minimum length in metres by which a side must extend beyond another one to cross it.
 const ROUNDING: f64 = 1e-3;
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
@@ -41,7 +41,7 @@ fn check(road: &Road<'_>, object: &Object<'_>, outline: &Outline<'_>, found: &mu
     if is_upright(&corners) {
         return;
     }
-    // Without the last side if the outline is open, as lines painted by old versions are without a word.
+    // An open outline has no last side. Painted lines in old versions are implicitly open.
     let sides = match outline.closed() {
         Some(true) => count,
         Some(false) | None => count - 1,
@@ -74,8 +74,8 @@ fn check(road: &Road<'_>, object: &Object<'_>, outline: &Outline<'_>, found: &mu
     }
 }
 
-/// The corners in a plane: in s and t if all are on the road, in u and v if all are local. Curves bend
-/// away from the line between their ends, so that nothing is known.
+/// Returns the corners in a plane: in s and t if all are on the road, in u and v if all are local.
+/// Returns `None` for curves, because they deviate from the line between their ends.
 fn corners<'a>(outline: &Outline<'a>) -> Option<Vec<(Node<'a>, Point)>> {
     let mut kind = None;
     let mut points: Vec<(Node<'a>, Point)> = Vec::new();
@@ -88,7 +88,7 @@ fn corners<'a>(outline: &Outline<'a>) -> Option<Vec<(Node<'a>, Point)>> {
             CornerKind::Local => Point::finite(point.u()?, point.v()?),
             CornerKind::Curve => None,
         }?;
-        // Corners that are written twice make no side.
+        // A repeated corner makes no side.
         if points
             .last()
             .is_none_or(|(_, last)| last.distance(place) > 1e-9)
@@ -107,8 +107,8 @@ fn corners<'a>(outline: &Outline<'a>) -> Option<Vec<(Node<'a>, Point)>> {
     Some(points)
 }
 
-/// Whether the corners stand above each other: in the plan view a frame over the road is a line there and
-/// back, whose sides cross by what its legs lean.
+/// Checks whether the corners stand above each other. In the plan view, a frame over the road is a
+/// line there and back. Its sides cross if its legs lean.
 fn is_upright(corners: &[(Node<'_>, Point)]) -> bool {
     let height = |node: &Node<'_>| {
         let name = if node.is("cornerRoad") { "dz" } else { "z" };
@@ -117,7 +117,7 @@ fn is_upright(corners: &[(Node<'_>, Point)]) -> bool {
     let heights = || corners.iter().map(|(node, _)| height(node));
     let least = heights().fold(f64::INFINITY, f64::min);
     let most = heights().fold(f64::NEG_INFINITY, f64::max);
-    // What stands reaches higher than it is wide, across its longest side.
+    // An upright outline is higher than its width across its longest side.
     let next = corners.iter().cycle().skip(1);
     let sides = corners.iter().zip(next).map(|(one, next)| (one.1, next.1));
     let lengths = sides.map(|(from, to)| (from.distance(to), from, to));
@@ -132,13 +132,13 @@ fn is_upright(corners: &[(Node<'_>, Point)]) -> bool {
     most - least > width
 }
 
-/// Whether two sides cross, each reaching to both sides of the other by more than rounding. Marks that
-/// are lines without width go there and back.
+/// Checks whether two sides cross, each by more than the rounding on both sides of the other. Marks
+/// that are lines without width go there and back.
 fn cross([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
     divides([a, b], [c, d]) && divides([c, d], [a, b])
 }
 
-/// Whether the line through two points has the two others clearly on either side.
+/// Checks whether two points lie clearly on different sides of the line through two others.
 fn divides([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
     let (x, y) = (b.x - a.x, b.y - a.y);
     let length = x.hypot(y);

@@ -16,14 +16,14 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Sizes, and whether the schema of 1.7 and 1.8 forbids negative ones.
+/// Sizes, each with the flag whether the schema of 1.7 and 1.8 forbids negative values.
 const SIZES: [(&str, bool); 4] = [
     ("length", true),
     ("width", false),
     ("height", true),
     ("radius", true),
 ];
-/// What has a body.
+/// Types of objects with a body.
 const BODIES: [&str; 6] = [
     "building",
     "pole",
@@ -58,7 +58,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// A distance between repeated things that is less than none. From 1.6 on the schema says so.
+/// Reports a negative distance between repeated objects. From 1.6 on the schema reports this.
 fn backwards<'a>(map: &RoadMap<'a>, object: Node<'a>, repeat: Node<'a>, found: &mut Sink<'_>) {
     let distance = number(repeat, "distance").filter(|distance| *distance < 0.0);
     let Some(distance) = distance.filter(|_| is_before(found, (1, 6))) else {
@@ -73,7 +73,7 @@ fn backwards<'a>(map: &RoadMap<'a>, object: Node<'a>, repeat: Node<'a>, found: &
         .stands(map, object);
 }
 
-/// A thing that has an extent on the ground and none above it, or the other way round.
+/// Reports an object with an extent on the ground but no height, or the other way round.
 fn flat<'a>(map: &RoadMap<'a>, object: Node<'a>, found: &mut Sink<'_>) {
     let has_body = object
         .attr("type")
@@ -96,7 +96,7 @@ fn flat<'a>(map: &RoadMap<'a>, object: Node<'a>, found: &mut Sink<'_>) {
     let (Some(zero), Some(other)) = (zero, other) else {
         return;
     };
-    // A cylinder has a radius and no sides, a box the other way round.
+    // A cylinder has a radius and no sides; a box has sides and no radius.
     let round = is("radius", |size| size > 0.0);
     let sides = is("length", |size| size > 0.0) && is("width", |size| size > 0.0);
     if (round && matches!(zero, "length" | "width") || sides && zero == "radius")

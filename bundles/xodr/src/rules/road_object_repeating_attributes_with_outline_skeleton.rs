@@ -25,7 +25,7 @@ const SIZES: [&str; 6] = [
 ];
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    // Until 1.8 the schema demands the two heights of every repeat.
+    // Up to 1.8 the schema requires the two heights of every repeat.
     let heights_demanded = found
         .version()
         .is_some_and(|version| version < Version::new(1, 9));

@@ -18,7 +18,7 @@ pub static RULE: Rule<Roads> = Rule {
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for object in objects(map) {
         for repeat in object.children_named("repeat") {
-            // A radius of zero stands for "none" in many files.
+            // In many files a radius of zero means "none".
             let radius = object
                 .attribute("radius")
                 .filter(|_| number(object, "radius") != Some(0.0));

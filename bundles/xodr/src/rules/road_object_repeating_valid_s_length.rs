@@ -19,7 +19,7 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 const VALID: &str = "asam.net:xodr:1.9.0:road.object.repeating.valid_s_length";
-/// Said in the same list, without an identifier.
+/// UID of a requirement in the same list without an identifier.
 const LATERAL: &str = "qcbus.dev:xodr:1.9.0:road.object.repeating.t_end";
 const TOLERANCE: Param = Param::number(
     "s_tolerance",
@@ -38,12 +38,12 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The section of repetition must be on the road.
+/// Checks that the section of repetition is on the road.
 fn along<'a>(map: &RoadMap<'a>, repeat: Node<'a>, tolerance: f64, found: &mut Sink<'_>) {
     let (Some(s), Some(length)) = (number(repeat, "s"), number(repeat, "length")) else {
         return;
     };
-    // A negative length cannot be meant in any version; what lies beyond the road was only forbidden with 1.9.
+    // A negative length is meaningless in every version. Only 1.9 forbids parts beyond the road.
     let older = is_before(found, (1, 9));
     if length < 0.0 {
         if !is_by_schema(found, (1, 5), (1, 8)) {
@@ -95,7 +95,7 @@ fn along<'a>(map: &RoadMap<'a>, repeat: Node<'a>, tolerance: f64, found: &mut Si
     }
 }
 
-/// A cubic for t must arrive at `tEnd`.
+/// Checks that a cubic for t ends at `tEnd`.
 fn across(repeat: Node<'_>, tolerance: f64, found: &mut Sink<'_>) {
     if !["bT", "cT", "dT"]
         .iter()

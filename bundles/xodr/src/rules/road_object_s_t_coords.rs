@@ -43,7 +43,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The origin must be on the road, from its start to its end.
+/// Checks that the origin is on the road, from its start to its end.
 fn on_road<'a>(map: &RoadMap<'a>, object: Node<'a>, tolerance: f64, found: &mut Sink<'_>) {
     let (Some(s), Some(road)) = (number(object, "s"), map.road_of(object)) else {
         return;

@@ -35,7 +35,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// What is slender in every direction that matters.
+/// Types of objects that are slender in every relevant direction.
 const SLENDER_TYPES: [&str; 6] = [
     "pole",
     "tree",
@@ -44,7 +44,7 @@ const SLENDER_TYPES: [&str; 6] = [
     "trafficSign",
     "patch",
 ];
-/// What stands beside roads and may be kilometres long, but is not high.
+/// Types of objects beside roads that may be kilometres long but are low.
 const LOW_TYPES: [&str; 8] = [
     "barrier",
     "vegetation",
@@ -67,7 +67,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             "building" => [Some(large), Some(large)],
             _ => [None, Some(large)],
         };
-        // Roads on stilts, tunnels and the like are as long as they are.
+        // Elevated roads, tunnels and the like may have any length.
         let limits = [
             ("height", height),
             ("radius", ground),
@@ -82,7 +82,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Reports the first size beyond what is believed: one slip of the unit is one fault.
+/// Reports only the first size above its limit, because a wrong unit is one fault.
 fn check<'a>(
     map: &RoadMap<'a>,
     node: Node<'a>,

@@ -42,8 +42,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// The greatest curvature of the elevation between two places, in 1/m. The second derivative of a
-/// cubic is greatest at an end of its stretch.
+/// Returns the largest curvature of the elevation between two positions, in 1/m. The second
+/// derivative of a cubic is largest at an end of its stretch.
 fn sharpest(road: &Road<'_>, from: f64, to: f64) -> f64 {
     let mut sharpest = 0.0_f64;
     for stretch in road.elevation().stretches(road.length().unwrap_or(to)) {

@@ -16,7 +16,7 @@ const TOLERANCE: Param = Param::number(
     "how far one box may reach into the other",
 );
 
-/// No more pairs of boxes are compared.
+/// Maximum number of compared pairs of boxes.
 const BUDGET: usize = 5_000_000;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -43,7 +43,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             if budget == 0 {
                 return;
             }
-            // In the order of the file, whatever lies farther west.
+            // The pair is in file order, independent of the position.
             let (one, other) = (&boxes[*at.min(next)], &boxes[*at.max(next)]);
             if meet(one, other, found.number(&TOLERANCE))
                 && told.insert((one.object.node(), other.object.node()))
@@ -54,7 +54,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether two boxes reach into each other by more than a tolerance.
+/// Checks whether two boxes overlap by more than a tolerance.
 fn meet(one: &SurfaceBox<'_, '_>, other: &SurfaceBox<'_, '_>, tolerance: f64) -> bool {
     let level = one.heights[0] <= other.heights[1] && other.heights[0] <= one.heights[1];
     if !level {
@@ -63,7 +63,7 @@ fn meet(one: &SurfaceBox<'_, '_>, other: &SurfaceBox<'_, '_>, tolerance: f64) ->
     let Some(shape) = common(&one.corners, &other.corners) else {
         return false;
     };
-    // What is narrow may be long: compare its width, which is at least area over length.
+    // A narrow overlap may be long. Its width is compared, which is at least area over length.
     let around: f64 = sides(&shape).map(|(a, b)| a.distance(b)).sum();
     area(&shape) > tolerance * 0.5 * around
 }

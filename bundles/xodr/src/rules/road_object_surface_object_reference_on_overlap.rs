@@ -22,11 +22,11 @@ const CLEARANCE: Param = Param::number(
     "roads that are farther above or below the object are not covered",
 );
 
-/// Length of the pieces of roads that are compared, in metres, and by how much they are narrower.
+/// Length of the compared pieces of roads, and inward shift of their edges, in metres.
 const STEP: f64 = 2.0;
 const SHRINK: f64 = 0.02;
 
-/// No more pieces, and pairs of a box and a piece, are looked at.
+/// Maximum numbers of pieces, and of compared pairs of a box and a piece.
 const MOST_PIECES: usize = 500_000;
 const BUDGET: usize = 20_000_000;
 
@@ -47,7 +47,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         return;
     }
     let pieces = pieces(map);
-    // By object: the roads that it covers without being referenced there.
+    // For each object, the roads that it covers without being referenced there.
     let mut covered: BTreeMap<Node<'_>, (&SurfaceBox<'_, '_>, BTreeSet<usize>)> = BTreeMap::new();
     let mut budget = BUDGET;
     for one in &boxes {
@@ -75,7 +75,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The pieces of all roads in ascending order of the least x, with the greatest length of one along x.
+/// The pieces of all roads in ascending order of their smallest x. `longest` is the largest extent
+/// in x.
 struct Pieces<'m, 'a> {
     sorted: Vec<(f64, &'m Road<'a>, Patch)>,
     longest: f64,
@@ -116,7 +117,7 @@ fn near<'p, 'm, 'a>(
 
 fn covers(one: &SurfaceBox<'_, '_>, road: &Road<'_>, piece: &Patch, found: &Sink<'_>) -> bool {
     let shape = common(&one.corners, &piece.corners);
-    // A piece that is covered by a corner only may be one of several.
+    // If only a corner covers the piece, it may be one of several pieces.
     if shape.is_none_or(|shape| area(&shape) <= found.number(&AREA)) {
         return false;
     }

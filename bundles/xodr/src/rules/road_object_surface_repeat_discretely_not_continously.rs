@@ -14,7 +14,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Distances up to this, in metres, are zero.
+/// Distance in metres up to which a value counts as zero.
 const SAME: f64 = 1e-6;
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

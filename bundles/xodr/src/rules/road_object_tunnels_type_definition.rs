@@ -14,7 +14,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// The types that the standard knows.
+/// The types in the standard.
 const TYPES: [&str; 2] = ["standard", "underpass"];
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

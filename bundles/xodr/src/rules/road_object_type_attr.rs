@@ -15,7 +15,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Types that are no longer to be used, since when, and what replaces them.
+/// Deprecated types, with the first version of the deprecation and the replacement.
 const DEPRECATED: [(&str, Version, &str); 13] = [
     ("bike", Version::new(1, 5), ""),
     ("bus", Version::new(1, 5), ""),

@@ -18,7 +18,7 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 const CONNECTION: &str = "asam.net:xodr:1.7.0:road.railroad.switch.check_switch_conn";
-/// Said in the table of `mainTrack`, without an identifier.
+/// UID of a requirement in the table of `mainTrack` without an identifier.
 const PARENT: &str = "qcbus.dev:xodr:1.7.0:road.railroad.switch.main_track_is_parent";
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
@@ -33,7 +33,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The switch lies on its main track and leads off it.
+/// Checks that the switch lies on its main track and leads off it.
 fn main_track(road: &Road<'_>, switch: Switch<'_>, found: &mut Sink<'_>) {
     let Some(main) = switch.main_track() else {
         return;
@@ -56,7 +56,7 @@ fn main_track(road: &Road<'_>, switch: Switch<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Partners are joined by a road that is the side track of both.
+/// Checks that a road joins the partners and is the side track of both.
 fn connection(switch: Switch<'_>, partner: Switch<'_>, found: &mut Sink<'_>) {
     let (Some(side), Some(main)) = (switch.side_track(), partner.main_track()) else {
         return;

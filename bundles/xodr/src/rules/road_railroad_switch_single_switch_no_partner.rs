@@ -22,7 +22,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let Some(node) = switch.node().child("partner") else {
             continue;
         };
-        // A partner that does not exist is a dangling reference.
+        // Another rule reports a partner that does not exist.
         let Some((_, partner)) = node.attr("id").and_then(|id| all.get(id)) else {
             continue;
         };

@@ -15,7 +15,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Elements with `sStart` and `sEnd` on one road, below these parents, and what they are.
+/// Elements with `sStart` and `sEnd` on one road, with their parents and their names in texts.
 const RANGES: [(&str, &str, &str); 2] = [
     ("CRG", "surface", "the CRG record"),
     ("segment", "platform", "the segment of the platform"),

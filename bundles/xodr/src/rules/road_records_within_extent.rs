@@ -83,7 +83,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             whole.ends(road.objects_node(), name, found);
         }
         for lane in road.sections().flat_map(SectionRef::lanes) {
-            // A section without length has a rule of its own.
+            // Another rule reports a section without length.
             let length = lane.length().filter(|length| *length > 0.0);
             let Some((length, from)) = length.zip(lane.at.s()) else {
                 continue;
@@ -105,7 +105,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether the records of a lane are known already to start no later than `limit`.
+/// Checks whether the records of a lane are known to start at `limit` or earlier.
 fn all_start_by(lane: LaneRef<'_, '_>, name: &str, limit: f64) -> bool {
     let fits = |start: Option<f64>| start.is_some_and(|start| start <= limit);
     let profile = match name {
@@ -117,22 +117,22 @@ fn all_start_by(lane: LaneRef<'_, '_>, name: &str, limit: f64) -> bool {
     profile.records().iter().all(|record| fits(record.start()))
 }
 
-/// What records lie in.
+/// The extent in which records lie.
 struct Extent<'m> {
-    /// The attribute that says where a record starts.
+    /// Name of the attribute that gives the start of a record.
     start: &'static str,
-    /// In metres, counted like the records' starts.
+    /// Length in metres, measured like the starts of the records.
     length: f64,
-    /// Up to where they may start.
+    /// Maximum start of a record.
     limit: f64,
     what: &'static str,
-    /// Where it starts on the road, in metres.
+    /// Start of the extent on the road, in metres.
     from: f64,
     road: &'m str,
 }
 
 impl Extent<'_> {
-    /// Reports each element of this name that stands beyond the end.
+    /// Reports each element with this name that stands beyond the end.
     fn stands(&self, parent: Option<Node<'_>>, name: &'static str, found: &mut Sink<'_>) {
         let limit = self.length + found.number(&ROADSIDE);
         for node in ascending::children(parent, name) {
@@ -157,7 +157,7 @@ impl Extent<'_> {
         }
     }
 
-    /// Reports each element of this name that reaches beyond the end.
+    /// Reports each element with this name that reaches beyond the end.
     fn ends(&self, parent: Option<Node<'_>>, name: &'static str, found: &mut Sink<'_>) {
         let limit = self.length + found.number(&ROADSIDE);
         for node in ascending::children(parent, name) {
@@ -185,7 +185,7 @@ impl Extent<'_> {
         }
     }
 
-    /// An error where no rounding explains it.
+    /// Returns an error if rounding cannot explain the value, otherwise a warning.
     fn severity(&self, s: f64, found: &Sink<'_>) -> Level {
         if s > self.length + found.number(&CLEAR) {
             Level::Error
@@ -194,7 +194,7 @@ impl Extent<'_> {
         }
     }
 
-    /// Reports an element that begins before the road does, which the schemas of some versions forbid.
+    /// Reports an element that begins before the road, which the schemas of some versions forbid.
     fn begins_before(&self, node: Node<'_>, found: &mut Sink<'_>) -> bool {
         let tolerance = found.number(&TOLERANCE);
         let Some(s) = number(node, self.start).filter(|s| *s < -tolerance) else {
@@ -214,7 +214,7 @@ impl Extent<'_> {
         true
     }
 
-    /// Reports the first record of this name that starts beyond the end.
+    /// Reports the first record with this name that starts beyond the end.
     fn check<'a>(
         &self,
         mut records: impl Iterator<Item = Node<'a>>,

@@ -52,8 +52,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// An angle beyond a full turn that is a round number of degrees. Those that are not come from adding
-/// up turns, which is odd and harmless.
+/// Returns an angle beyond a full turn that is probably in degrees. It is a multiple of half a
+/// degree, or above `large`. Other angles come from adding up turns, which is odd but harmless.
 fn in_degrees<'n>(thing: Node<'_>, name: &'n str, large: f64) -> Option<(&'n str, f64)> {
     let angle = number(thing, name).filter(|angle| angle.abs() > TAU + 1e-3)?;
     let is_round = (angle * 2.0 - (angle * 2.0).round()).abs() < 1e-9;

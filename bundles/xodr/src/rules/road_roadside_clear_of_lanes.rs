@@ -31,7 +31,7 @@ const CLEARANCE: Param = Param::number(
     "from which height above the road on vehicles pass below",
 );
 
-/// Lanes that vehicles drive along all the time.
+/// Types of lanes with regular vehicle traffic.
 const LANES: [&str; 10] = [
     "driving",
     "entry",
@@ -44,7 +44,7 @@ const LANES: [&str; 10] = [
     "taxi",
     "HOV",
 ];
-/// What nobody puts onto a lane; barriers, obstacles and patches may be meant there.
+/// Types that never stand on a lane. Barriers, obstacles and patches may be intended there.
 const FIXED: [&str; 5] = ["pole", "tree", "vegetation", "streetLamp", "building"];
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
@@ -67,7 +67,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// What is repeated: copies that stand in a lane, or a row that goes from one side of the lanes to the other.
+/// Reports repeated objects: copies in a lane, or a row across all lanes.
 fn row(road: &Road<'_>, object: Node<'_>, repeat: Node<'_>, found: &mut Sink<'_>) {
     let kind = object.attr("type").unwrap_or_default();
     let fixed = FIXED.contains(&kind);
@@ -112,7 +112,8 @@ fn copies(road: &Road<'_>, object: Node<'_>, repeat: Node<'_>, row: &Row, found:
         .at(spot.lane.node(), "the lane");
 }
 
-/// What goes on without gaps from one side of all driving lanes to the other, along the road rather than across.
+/// Reports a continuous row along the road that crosses from one side of all driving lanes to the
+/// other.
 fn crossing(road: &Road<'_>, object: Node<'_>, repeat: Node<'_>, row: &Row, found: &mut Sink<'_>) {
     let [(s, from), (end, to)] = row.ends;
     if end - s < (to - from).abs() {
@@ -143,7 +144,7 @@ fn crossing(road: &Road<'_>, object: Node<'_>, repeat: Node<'_>, row: &Row, foun
         .on(road, end, to);
 }
 
-/// Whether what is repeated is neither flat nor above the vehicles at one of its ends.
+/// Checks whether a repeated object is neither flat nor above the vehicles at one of its ends.
 fn is_in_the_way(
     repeat: Node<'_>,
     [up, high]: [&str; 2],
@@ -156,10 +157,10 @@ fn is_in_the_way(
     low <= found.number(&CLEARANCE) && !height.is_some_and(|height| low + height < FLAT)
 }
 
-/// What ends lower than this above the road, in metres, is flat.
+/// Height above the road in metres below which an object is flat.
 const FLAT: f64 = 0.3;
 
-/// The lane in whose way something is.
+/// Returns the lane that is blocked at this position.
 fn blocked<'m, 'a>(road: &'m Road<'a>, s: f64, t: f64, depth: f64) -> Option<Spot<'m, 'a>> {
     let spot = lane_at(road, s, t).filter(|spot| spot.depth > depth)?;
     spot.lane
@@ -193,8 +194,9 @@ fn parking(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// A sign on a post of its own, not one that hangs over the lane, is painted on it or shares the place of
-/// the reference line, where signs are put that stand nowhere. Lights are never painted.
+/// Reports a sign on its own post in a lane. It ignores signs that hang over the lane or are
+/// painted on it. Signs without a position are put on the reference line, so it ignores that too.
+/// Lights are never painted.
 fn sign(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
     let height = number(node, "zOffset").unwrap_or(0.0);
     let in_the_way = match node.attr("dynamic") {
@@ -241,7 +243,7 @@ fn report(road: &Road<'_>, node: Node<'_>, should: &str, found: &mut Sink<'_>) {
         .at(spot.lane.node(), "the lane");
 }
 
-/// The corners of a building's box in s and t, as if the road were straight there.
+/// Returns the corners of a building's box in s and t, as if the road were straight there.
 fn corners(node: Node<'_>, (s, t): (f64, f64)) -> impl Iterator<Item = (f64, f64)> {
     let size = number(node, "length").zip(number(node, "width"));
     let size = size.filter(|_| node.attr("type") == Some("building"));

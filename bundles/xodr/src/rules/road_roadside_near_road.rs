@@ -55,7 +55,7 @@ const DEEP_SIGNAL: Param = Param::number(
     "how deep below its road a signal may begin",
 );
 
-/// How much higher or lower the ground may be per metre beside the road.
+/// Maximum change of the ground height per metre beside the road.
 const SLOPE: f64 = 0.5;
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
@@ -87,7 +87,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Reports what is far beside all roads. Whether it has.
+/// Reports an object or signal that is far from all roads. Returns whether it did.
 fn beside_all(
     map: &RoadMap<'_>,
     road: &Road<'_>,
@@ -124,8 +124,8 @@ fn beside_all(
     true
 }
 
-/// What is above the road or below it by metres that only a mistaken unit or sign explains, or a height
-/// above the sea in place of one above the road.
+/// Reports an object or signal so far above or below the road that only a wrong unit or sign
+/// explains it. The value may also be a height above the sea instead of the road.
 fn above_or_below(road: &Road<'_>, thing: Node<'_>, [up, across]: [&str; 2], found: &mut Sink<'_>) {
     let of_signal = thing.is("signal");
     let (high, deep) = if of_signal {

@@ -26,10 +26,10 @@ const NEAR: Param = Param::number(
     "the grid in which places count as the same",
 );
 
-/// What tells two signals or objects of one place apart.
+/// Attributes that distinguish two signals or objects at one place.
 const WORDS: [&str; 6] = ["type", "subtype", "name", "orientation", "value", "text"];
 const NUMBERS: [&str; 3] = ["zOffset", "hOffset", "hdg"];
-/// What an object or signal consists of or holds for; those that have one of these may share a place.
+/// Parts and validities of an object or signal. Elements with one of these may share a place.
 const PARTS: [&str; 9] = [
     "repeat",
     "outline",
@@ -42,7 +42,7 @@ const PARTS: [&str; 9] = [
     "positionInertial",
 ];
 
-/// The element's name, its words, and its numbers beside s and t as places in the grid.
+/// Name of the element, its words, and its numbers other than s and t as positions in the grid.
 type Key<'a> = (&'a str, [Option<&'a str>; 6], [i64; 3]);
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
@@ -56,7 +56,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             })
             .collect();
         stands.sort_unstable_by_key(|(s, t, thing, ..)| (*s, *t, thing.index()));
-        // Nearly everything stands alone, so that nobody needs to know what it is.
+        // Nearly all elements are alone at their place, so their attributes are not read.
         let together = stands.chunk_by(|one, other| (one.0, one.1) == (other.0, other.1));
         for group in together.filter(|group| group.len() > 1) {
             twins(road, group, grid, found);
@@ -64,10 +64,10 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// Where a thing stands in the grid, what it is, its s and t.
+/// Position of an element in the grid, the element, its s and t.
 type Stand<'a> = (i64, i64, Node<'a>, f64, f64);
 
-/// Reports what is twice among things of one place.
+/// Reports duplicates among the elements at one place.
 fn twins(road: &Road<'_>, group: &[Stand<'_>], grid: f64, found: &mut Sink<'_>) {
     let mut seen: HashMap<Key<'_>, Node<'_>> = HashMap::default();
     for (_, _, thing, s, t) in group.iter().copied() {
@@ -84,7 +84,7 @@ fn twins(road: &Road<'_>, group: &[Stand<'_>], grid: f64, found: &mut Sink<'_>) 
             seen.insert(key, thing);
             continue;
         };
-        // Two of one id are a matter of their ids.
+        // Another rule reports elements with the same id.
         if first.attr("id") == thing.attr("id") {
             continue;
         }

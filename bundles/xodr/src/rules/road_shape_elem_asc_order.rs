@@ -41,7 +41,7 @@ fn check(road: &Road<'_>, lateral: Node<'_>, found: &mut Sink<'_>) {
             number(last_s),
             number(last_t)
         );
-        // A step ahead is one, however small.
+        // Any increase of s counts as a step ahead, even a small one.
         if s < last_s - tolerance || (s <= last_s && t < last_t - tolerance) {
             let by = if s < last_s - tolerance { "s" } else { "t" };
             let text = format!(
@@ -59,7 +59,7 @@ fn check(road: &Road<'_>, lateral: Node<'_>, found: &mut Sink<'_>) {
                 return;
             }
         } else if s <= last_s + tolerance && (t - last_t).abs() <= tolerance {
-            // What says the same twice is wrong by form alone.
+            // A repeated record with the same values is only a formal fault.
             let level = match ["a", "b", "c", "d"]
                 .iter()
                 .all(|name| shape.f64(name).ok() == before.f64(name).ok())
@@ -82,7 +82,7 @@ fn check(road: &Road<'_>, lateral: Node<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether the shape is 0 everywhere, in whatever order one reads it.
+/// Checks whether the shape is 0 everywhere, independent of the order.
 fn is_flat(lateral: Node<'_>) -> bool {
     let zero = |shape: &Node<'_>, name: &str| shape.f64(name).is_ok_and(|value| value == 0.0);
     let mut shapes = lateral.children_named("shape");

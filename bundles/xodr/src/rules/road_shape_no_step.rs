@@ -29,7 +29,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// Reports the highest step of one cross section.
+/// Reports the highest step in one cross section.
 fn check(road: &str, row: &ShapeRow<'_>, found: &mut Sink<'_>) {
     let limit = found.number(&STEP);
     let steps = row.profile.in_order().skip(1).filter_map(|record| {

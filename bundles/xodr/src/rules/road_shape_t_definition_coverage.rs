@@ -43,7 +43,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// The rightmost place of all lanes that follow the lateral profile.
+/// Returns the rightmost position of all lanes that follow the lateral profile.
 fn right_edge(road: &Road<'_>) -> Option<Minimum> {
     let sections = road.permanent()?.sections(road);
     let lowest = sections.flat_map(|section| {
@@ -88,8 +88,8 @@ fn check(road: &Road<'_>, edge: Minimum, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether no shape of the road changes its height anywhere: then nothing changes beside them either,
-/// whatever readers take for what is not said.
+/// Checks whether the height of all shapes of the road is 0. Then it is 0 beside them as well,
+/// whatever a reader assumes there.
 fn is_flat(road: &Road<'_>) -> bool {
     let rows = road.lateral().shape.rows().iter();
     let mut records = rows.flat_map(|row| row.profile.records());

@@ -16,14 +16,14 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 const STATIC: &str = "asam.net:xodr:1.8.0:road.signal.boards.static_board_use_correct_type";
-/// Said in the same list, without an identifier.
+/// UID of a requirement in the same list without an identifier.
 const STATIC_DYNAMIC: &str = "qcbus.dev:xodr:1.8.0:road.signal.boards.static_board_is_not_dynamic";
-/// Said in 14.7.2, without an identifier.
+/// UID of a requirement in 14.7.2 without an identifier.
 const VARIABLE: &str = "qcbus.dev:xodr:1.8.0:road.signal.boards.vms_board_use_correct_type";
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for carrier in carriers(map) {
-        // A multi board without its other half is the business of another rule.
+        // Another rule reports a multi board without one of its halves.
         if carrier.is_called("multiBoard") {
             continue;
         }

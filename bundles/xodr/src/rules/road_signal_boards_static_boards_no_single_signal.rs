@@ -18,7 +18,7 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    // Where there is a display, a single sign is not alone.
+    // Beside a display, a single sign is allowed.
     for carrier in carriers(map).filter(|carrier| carrier.variable.is_none()) {
         let boards: Vec<Node<'_>> = carrier.node.children_named("staticBoard").collect();
         let signs: usize = boards

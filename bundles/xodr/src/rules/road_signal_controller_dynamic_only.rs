@@ -21,7 +21,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
     let controls = map.controllers().flat_map(|one| one.controls());
     let switched: HashSet<&str> = controls.filter_map(|one| one.signal_id()).collect();
-    // Where an id belongs to several signals, nobody can say which of them is switched.
+    // If several signals share an id, the switched one is unknown.
     let mut signals: HashMap<&str, Option<&SignalKey<'_>>> = HashMap::default();
     for key in map.signal_keys() {
         let id = key.id.filter(|id| switched.contains(id));

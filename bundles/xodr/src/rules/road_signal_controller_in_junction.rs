@@ -21,7 +21,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         .flat_map(|junction| junction.controllers())
         .filter_map(|controller| controller.id())
         .collect();
-    // Where no junction names any, it is the map's way.
+    // If no junction of the map names any controller, this is the style of the map.
     if named_there.is_empty() {
         return;
     }

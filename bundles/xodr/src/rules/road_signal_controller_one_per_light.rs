@@ -24,7 +24,7 @@ const SHARE: Param = Param::number(
     "share of a map's lights that are exceptions at most; more of them are the map's way",
 );
 
-/// A light as controllers name it.
+/// A light with its control and controller.
 struct Switched<'a> {
     control: Control<'a>,
     controller: Controller<'a>,
@@ -51,8 +51,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     by_none(map, &switched, share, found);
 }
 
-/// Lights of two controllers. Some tools write a controller per phase, in which lights return; then most
-/// lights have several.
+/// Reports lights with two controllers. It reports none if most lights have several, because some
+/// tools write a controller per phase and repeat the lights.
 fn by_several(switched: &HashMap<&str, Vec<Switched<'_>>>, share: f64, found: &mut Sink<'_>) {
     let mut several: Vec<_> = switched.iter().filter(|(_, by)| by.len() > 1).collect();
     if several.len() as f64 > share * switched.len() as f64 {
@@ -83,7 +83,7 @@ fn by_several(switched: &HashMap<&str, Vec<Switched<'_>>>, share: f64, found: &m
     }
 }
 
-/// Lights of no controller, in maps whose other lights of that type have one.
+/// Reports lights without a controller if other lights of the same type in the map have one.
 fn by_none(
     map: &RoadMap<'_>,
     switched: &HashMap<&str, Vec<Switched<'_>>>,
@@ -125,7 +125,7 @@ fn by_none(
     }
 }
 
-/// Signals that are switched by others.
+/// Returns the signals that other signals switch.
 fn dependents<'a>(lights: &[Signal<'a>]) -> HashSet<&'a str> {
     let all = lights.iter().flat_map(|signal| signal.dependencies());
     all.filter_map(|dependency| dependency.id()).collect()

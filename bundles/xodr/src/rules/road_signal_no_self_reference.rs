@@ -17,7 +17,7 @@ pub static RULE: Rule<Roads> = Rule {
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for signal in below(map, "signal", "signals") {
-        // What is empty is no id.
+        // An empty text is not an id.
         let Some(id) = signal.attr("id").filter(|id| !id.trim().is_empty()) else {
             continue;
         };

@@ -18,7 +18,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// What is taken for a signal by mistake. An id of these may well be that of a signal, too.
+/// Classes that may be confused with signals. An id of these may also be the id of a signal.
 const OTHERS: [Class; 4] = [
     Class::Object,
     Class::Tunnel,
@@ -44,7 +44,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let Some(id) = reference.attr("id").filter(|id| !signals.contains_key(id)) else {
             continue;
         };
-        // An id of nothing is a dangling reference.
+        // Another rule reports an id that does not exist.
         let Some(target) = others.iter().find_map(|known| known.get(id)) else {
             continue;
         };

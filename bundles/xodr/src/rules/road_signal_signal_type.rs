@@ -34,7 +34,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             }
         );
         let finding = found.issue(node, text).stands(map, owner(node));
-        // Without any type it is no sign at all; an empty one is what some tools write for objects of their own.
+        // Without any type it is not a sign. Some tools write an empty type for their own objects.
         if node.is("signal") && node.attribute("type").is_none() {
             finding.in_every_version(Level::Error);
         }

@@ -28,7 +28,7 @@ const HIGHEST: Param = Param::number(
     "the highest speed limit that is plausible",
 );
 
-/// Units of speed with how many metres per second they are.
+/// Units of speed with their value in metres per second.
 const UNITS: [(&str, f64); 3] = [("km/h", 1.0 / 3.6), ("mph", 0.44704), ("m/s", 1.0)];
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
@@ -54,17 +54,17 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether there is anything to say about a signal, which there is about few.
+/// Checks whether a signal is relevant for this rule. Only few signals are.
 fn speaks(signal: Node<'_>) -> bool {
     given(signal).is_some() || is_limit(signal)
 }
 
-/// The value of a signal; -1 stands for none in most files.
+/// Returns the value of a signal. In most files -1 means "none".
 fn given(signal: Node<'_>) -> Option<f64> {
     number(signal, "value").filter(|value| *value != -1.0)
 }
 
-/// The types of maximum speed whose value follows from nothing else.
+/// Checks whether a signal is a speed limit whose value does not follow from something else.
 fn is_limit(signal: Node<'_>) -> bool {
     let german = ["opendrive", "de", "deu", "germany"];
     let is_german = || {
@@ -80,7 +80,7 @@ fn signal_speeds(signal: Node<'_>) -> impl Iterator<Item = Node<'_>> {
         .flat_map(|semantics| semantics.children_named("speed"))
 }
 
-/// A value and its unit as metres per second.
+/// Returns a value with its unit as metres per second.
 fn speed(node: Node<'_>) -> Option<f64> {
     let unit = node.attr("unit")?;
     let (_, factor) = UNITS.iter().find(|(name, _)| *name == unit)?;
@@ -88,7 +88,7 @@ fn speed(node: Node<'_>) -> Option<f64> {
 }
 
 fn unit<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {
-    // Zero stands for no value as well, in the standard's own examples, too.
+    // Zero means "no value" as well, even in the examples of the standard.
     let value = given(signal).filter(|value| *value != 0.0);
     let Some(value) = value.filter(|_| is_blank(signal, "unit")) else {
         return;
@@ -106,14 +106,14 @@ fn unit<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {
     }
 }
 
-/// What tells a sign's kind: country, type and subtype.
+/// The kind of a sign: country, type and subtype.
 type SignKind<'a> = [&'a str; 3];
 
 fn sign_kind(signal: Node<'_>) -> SignKind<'_> {
     ["country", "type", "subtype"].map(|name| signal.attr(name).unwrap_or_default())
 }
 
-/// The kinds of signs that have a value with a unit somewhere in the file.
+/// Returns the kinds of signs with a value and a unit anywhere in the file.
 fn kinds_with_unit<'a>(map: &RoadMap<'a>) -> HashSet<SignKind<'a>> {
     below(map, "signal", "signals")
         .filter(|signal| given(*signal).is_some() && !is_blank(*signal, "unit"))
@@ -121,7 +121,7 @@ fn kinds_with_unit<'a>(map: &RoadMap<'a>) -> HashSet<SignKind<'a>> {
         .collect()
 }
 
-/// Where a version does not ask for units, a file that writes them for other signs of the kind has lost one.
+/// Reports a missing optional unit if other signs of the same kind in the file have one.
 fn unit_like_others<'a>(
     map: &RoadMap<'a>,
     signal: Node<'a>,
@@ -150,7 +150,7 @@ fn value<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {
             .attr("value")
             .is_none_or(|text| matches!(text.trim(), "" | "-1"))
     {
-        // Numbers of subtypes name the speed, as do names of models that stand for one.
+        // Digits in the subtype give the speed. Names of models for one speed do the same.
         let subtype = signal.attr("subtype").unwrap_or_default();
         let named_there =
             subtype.bytes().any(|byte| byte.is_ascii_digit()) && subtype.trim() != "-1";
@@ -169,11 +169,11 @@ fn value<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {
     plausible(map, signal, signal, found);
 }
 
-/// A speed that no sign shows.
+/// Reports a speed that no sign shows.
 fn plausible<'a>(map: &RoadMap<'a>, signal: Node<'a>, node: Node<'a>, found: &mut Sink<'_>) {
     let Some(value) = given(node) else { return };
     let highest = found.number(&HIGHEST);
-    // Without a unit, what no unit makes plausible.
+    // Without a unit, only values that are implausible in every unit are reported.
     let unit = node.attr("unit").unwrap_or_default();
     let guess = (unit.trim().is_empty() && is_limit(signal)).then_some(value / 3.6);
     let Some(speed) = speed(node).or(guess) else {
@@ -204,7 +204,7 @@ fn plausible<'a>(map: &RoadMap<'a>, signal: Node<'a>, node: Node<'a>, found: &mu
         .stands(map, signal);
 }
 
-/// The round speed that a crooked one is in metres per second.
+/// Returns the round speed in another unit if an odd value is that speed in metres per second.
 fn meant(value: f64, unit: &str) -> Option<String> {
     let near = |value: f64, step: f64| (value / step - (value / step).round()).abs() * step < 1e-3;
     if matches!(unit, "m/s" | "") || near(value, 0.1) {
@@ -218,13 +218,13 @@ fn meant(value: f64, unit: &str) -> Option<String> {
     }
 }
 
-/// What the semantics say must be what the signal says.
+/// Checks that the semantics agree with the signal.
 fn semantics<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {
     let before = found.count();
     for speeds in signal_speeds(signal) {
         plausible(map, signal, speeds, found);
     }
-    // What is implausible is so for one reason.
+    // An implausible value gets only one finding.
     if found.count() > before {
         return;
     }

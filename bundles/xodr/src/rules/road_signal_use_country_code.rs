@@ -60,7 +60,7 @@ fn report<'a>(map: &RoadMap<'a>, node: Node<'a>, found: &mut Sink<'_>) {
         .stands(map, owner(node));
 }
 
-/// What has no type refers to no rules.
+/// Checks whether the country is missing. Without a type there is no reference to rules.
 fn lacks(node: Node<'_>) -> bool {
     let has_type = !is_blank(node, "type") && !matches!(node.attr("type"), Some("-1" | "none"));
     has_type && is_blank(node, "country")

@@ -88,7 +88,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// Strips of road surface: how steep they fall to the side where they begin.
+/// Reports strips of road surface with a steep crossfall at their start.
 fn crossfall(road: &Road<'_>, found: &mut Sink<'_>) {
     let Some(surface) = &road.lateral().cross_section_surface else {
         return;
@@ -113,8 +113,8 @@ fn crossfall(road: &Road<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The stretch of a profile on which something is greatest and beyond `most`, the distance from its start and
-/// how much it is there. Looked at are places within it: what is steep at an end only is no slope but a step.
+/// Returns the stretch of a profile with the largest value above `most`, its distance from the
+/// start, and the value. Only inner positions count: a steep end is a step, not a slope.
 fn worst<'p, 'a>(
     profile: &'p Profile<'a>,
     road: &Road<'a>,

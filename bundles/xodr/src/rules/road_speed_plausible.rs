@@ -75,7 +75,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// A limit without unit that is, as a number, the road's own limit in another unit: the unit was lost.
+/// Returns a text for a lost unit: the number equals the road's own limit in another unit.
 fn unit_lost(road: &Road<'_>, speed: Node<'_>, s: f64) -> Option<String> {
     let is_blank = speed.attr("unit").is_none_or(|unit| unit.trim().is_empty());
     let max = speed.f64("max").ok().filter(|max| is_blank && *max > 0.0)?;
@@ -92,12 +92,12 @@ fn unit_lost(road: &Road<'_>, speed: Node<'_>, s: f64) -> Option<String> {
     ))
 }
 
-/// The type of a road at s.
+/// Returns the type of a road at s.
 fn kind_at<'a>(road: &Road<'a>, s: f64) -> Option<&'a str> {
     record_at(road, s)?.kind()
 }
 
-/// The record of a road's type that holds at s.
+/// Returns the record of a road's type that applies at s.
 fn record_at<'a>(road: &Road<'a>, s: f64) -> Option<RoadType<'a>> {
     let before = road.types().filter(|record| {
         let start = record.s();
@@ -106,8 +106,8 @@ fn record_at<'a>(road: &Road<'a>, s: f64) -> Option<RoadType<'a>> {
     before.max_by(|one, other| one.s().unwrap_or(0.0).total_cmp(&other.s().unwrap_or(0.0)))
 }
 
-/// What is odd about a limit on a road of a type. Limits below zero are no limits at all, which is said by
-/// the schema; so are words.
+/// Returns the fault of a limit on a road of a type. The schema reports limits below zero and
+/// words.
 fn judge(speed: Node<'_>, kind: Option<&str>, found: &Sink<'_>) -> Option<String> {
     let max = speed.f64("max").ok().filter(|max| *max >= 0.0)?;
     let (unit, factor) = match speed.attr("unit") {

@@ -14,8 +14,8 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// ALPHA-3 codes of countries that maps are often made of, and the names that older versions
-/// allow, with the code that is meant.
+/// ALPHA-3 codes of countries that are frequent in maps, and the names that older versions allow,
+/// each with the intended code.
 const ALPHA_2: &[(&str, &str)] = &[
     ("ARG", "AR"),
     ("AUS", "AU"),

@@ -28,7 +28,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     }
 }
 
-/// The lanes of a side that the road has anywhere: as many as its widest lane section.
+/// Checks that validities only use lanes in the range of the road's widest lane sections.
 fn check(road: &Road<'_>, validities: &[Node<'_>], found: &mut Sink<'_>) {
     for node in validities {
         let validity = Validity::of(*node);

@@ -17,7 +17,7 @@ pub static RULE: Rule<Document> = Rule {
 };
 
 fn run(document: &Document<'_>, found: &mut Sink<'_>) {
-    // Their schemas list all of these words, as those from 1.7 on do.
+    // The schemas of these versions list all of these words, as those from 1.7 on do.
     let lists_all = [(1, 4), (1, 5)].map(|(major, minor)| Version::new(major, minor));
     if found
         .version()
@@ -40,7 +40,7 @@ fn check(vocabulary: &Vocabulary, node: Node<'_>, schema: &OwnSchema<'_>, found:
         return;
     };
     let word = attribute.value().trim();
-    // An empty word is none.
+    // An empty word counts as missing.
     if word.is_empty() || vocabulary.words.contains(&word) {
         return;
     }
@@ -60,7 +60,7 @@ fn check(vocabulary: &Vocabulary, node: Node<'_>, schema: &OwnSchema<'_>, found:
     found.issue(attribute, text).level(vocabulary.level);
 }
 
-/// What a link to a junction says of an end of a road is not read.
+/// Checks whether a contact point is ignored because the link leads to a junction.
 fn is_idle(node: Node<'_>, vocabulary: &Vocabulary) -> bool {
     vocabulary.attribute == "contactPoint" && node.attr("elementType") == Some("junction")
 }

@@ -1,32 +1,32 @@
-//! The table of edits: how it is read, how an edit finds its element and changes it.
+//! The table of edits: parses it, finds the element of an edit and changes it.
 
 use qcbus_sdk::mutate::{Action, Scan, Selector};
 
-/// A rule and what should make it fire.
+/// A rule and the edits that should make it fire.
 #[derive(Debug)]
 pub struct Entry {
     /// The checker's id without its prefix.
     pub rule: String,
     /// Edits that violate it.
     pub edits: Vec<Edit>,
-    /// Why there is none.
+    /// Reason if there are no edits.
     pub without: Option<String>,
 }
 
 /// One violating edit.
 #[derive(Debug)]
 pub struct Edit {
-    /// As it stands in the table, for messages.
+    /// Text in the table, for messages.
     pub text: String,
     selector: Selector,
     action: Action,
-    /// Rules that may complain about it, too, at error level.
+    /// Further rules that may report errors.
     pub companions: Vec<String>,
-    /// Ends of the names of the maps that it is for; all where empty.
+    /// Suffixes of the names of the maps that it is for. Empty for all maps.
     pub only: Vec<String>,
 }
 
-/// Reads the table; its form is described at its top.
+/// Parses the table. The beginning of the table describes its format.
 pub fn table(text: &str) -> Vec<Entry> {
     let mut all: Vec<Entry> = Vec::new();
     for line in text.lines() {
@@ -75,7 +75,7 @@ impl Edit {
         edit
     }
 
-    /// Whether the edit is meant for the map with this name.
+    /// Returns whether the edit applies to the map with this name.
     pub fn is_for(&self, map: &str) -> bool {
         self.only.is_empty()
             || self
@@ -84,7 +84,7 @@ impl Edit {
                 .any(|version| map.ends_with(version.as_str()))
     }
 
-    /// The map with the edit in it; nothing where it lacks the element or the attribute.
+    /// Returns the edited map, or `None` if the element or the attribute is missing.
     pub fn apply(&self, map: &str) -> Option<String> {
         let scan = Scan::of(map).unwrap();
         let target = self.selector.all(&scan).next()?;

@@ -1,9 +1,11 @@
-//! Two layers of lanes, sides of their own, loops, places within roads, and data of others.
+//! Tests of two layers of lanes, separate sides, loops, places within roads, and data of other
+//! vendors.
 
 use crate::Row;
 use crate::build::{CENTER, Road, WIDTH, lane, link, section};
 
-/// A lane of either layer; `links` as `<predecessor id layer>`: `p-1 permanent`.
+/// Returns a lane of one of the layers, with `links` of the form `<predecessor id layer>`:
+/// `p-1 permanent`.
 fn layered(id: &str, links: &[&str]) -> String {
     let one = |link: &&str| {
         let (name, rest) = match link.split_at(1) {
@@ -21,7 +23,8 @@ fn lanes(layer: &str, sections: &str) -> String {
     format!("</lanes><lanes layer=\"{layer}\">{sections}")
 }
 
-/// A road of 100 m whose temporary lane begins at 40 m and ends with it, and the road behind it.
+/// Returns a road of 100 m and the road after it. The temporary lane of the first begins at 40 m
+/// and ends at its end.
 fn works(temporary: &[&str], behind: &[&str]) -> String {
     let permanent = format!(
         "{}{}",

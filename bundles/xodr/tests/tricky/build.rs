@@ -1,6 +1,6 @@
-//! Pieces of maps.
+//! Builders of map fragments.
 
-/// A file of version 1.`minor`.
+/// Returns a file of version 1.`minor`.
 pub(crate) fn file(minor: &str, map: &str) -> String {
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<OpenDRIVE>\n\
@@ -8,15 +8,15 @@ pub(crate) fn file(minor: &str, map: &str) -> String {
     )
 }
 
-/// A constant width from the section's start on.
+/// Constant width from the start of the section.
 pub(crate) const WIDTH: &str = r#"<width sOffset="0" a="3.5" b="0" c="0" d="0"/>"#;
 
-/// A driving lane; `links` as `p-1 s-1 s-2`, predecessors and successors.
+/// Returns a driving lane with predecessors and successors in `links`: `p-1 s-1 s-2`.
 pub(crate) fn lane(id: &str, links: &str) -> String {
     lane_with(id, links, WIDTH)
 }
 
-/// The same with other records.
+/// Returns the same lane with other records.
 pub(crate) fn lane_with(id: &str, links: &str, records: &str) -> String {
     let link = |word: &str| match word.split_at(1) {
         ("p", to) => format!(r#"<predecessor id="{to}"/>"#),
@@ -32,7 +32,7 @@ pub(crate) fn lane_with(id: &str, links: &str, records: &str) -> String {
 
 pub(crate) const CENTER: &str = r#"<lane id="0" type="none" level="false"/>"#;
 
-/// A lane section with lanes to the left and to the right; `s` may bring further attributes.
+/// Returns a lane section with left and right lanes. `s` may contain further attributes.
 pub(crate) fn section(s: &str, left: &str, right: &str) -> String {
     let group = |name: &str, lanes: &str| match lanes {
         "" => String::new(),
@@ -45,7 +45,7 @@ pub(crate) fn section(s: &str, left: &str, right: &str) -> String {
     )
 }
 
-/// A geometry; `shape` is a whole element.
+/// Returns a geometry. `shape` is a whole element.
 pub(crate) fn geometry(s: &str, x: &str, y: &str, hdg: &str, length: &str, shape: &str) -> String {
     format!(
         "<geometry s=\"{s}\" x=\"{x}\" y=\"{y}\" hdg=\"{hdg}\" length=\"{length}\">{shape}</geometry>\n"
@@ -63,7 +63,7 @@ pub(crate) struct Road<'a> {
     pub junction: &'a str,
     pub rule: &'a str,
     pub link: &'a str,
-    /// Between the plan view and the lanes.
+    /// Elements between the plan view and the lanes.
     pub profiles: &'a str,
     pub lanes: &'a str,
     pub tail: &'a str,
@@ -107,7 +107,8 @@ impl Road<'_> {
     }
 }
 
-/// A `<link>`: `p2 end` for the end of road 2 as predecessor, `sJ 7` for junction 7 as successor.
+/// Returns a `<link>`: `p2 end` for the end of road 2 as predecessor, `sJ 7` for junction 7 as
+/// successor.
 pub(crate) fn link(parts: &[&str]) -> String {
     let one = |part: &&str| {
         let (name, rest) = match part.split_at(1) {

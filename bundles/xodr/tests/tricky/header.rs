@@ -1,9 +1,9 @@
-//! What is written in the header.
+//! Tests of the content of the header.
 
 use crate::Row;
 use crate::build::{LINE, Road, geometry};
 
-/// A whole file with this header.
+/// Returns a whole file with this header.
 fn with_header(attributes: &str, content: &str, roads: &str) -> String {
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<OpenDRIVE>\n\

@@ -1,4 +1,4 @@
-//! Junctions of all types.
+//! Tests of junctions of all types.
 
 use crate::Row;
 use crate::build::{PI, Road, lane, link, section};
@@ -10,11 +10,12 @@ fn connection(id: &str, roads: [&str; 2], contact: &str, links: [&str; 2], to: &
     )
 }
 
-/// Two roads with lanes on both sides, a connecting road for either direction.
+/// Two roads with lanes on both sides, and a connecting road for each direction.
 struct Common<'a> {
     rule: &'a str,
     id: &'a str,
-    /// Links of the incoming road 1, of the connecting road 2; pose of the latter, and its lane.
+    /// Links of the incoming road 1 and of the connecting road 2, then the pose of road 2 and its
+    /// lane.
     incoming: &'a [&'a str],
     links: &'a [&'a str],
     pose: [&'a str; 3],
@@ -88,10 +89,10 @@ impl Common<'_> {
         ];
         let onto = match self.rule {
             "LHT" => lane("1", ""),
-            // Nothing leads onto it.
+            // No lane leads onto it.
             _ => lane("1", "").replace("driving", "restricted"),
         };
-        // A third road, without which no junction is needed.
+        // A junction needs a third road.
         let third = Road {
             id: "5",
             length: "50",
@@ -110,7 +111,7 @@ impl Common<'_> {
             lanes: &section(
                 "\"0\"",
                 "",
-                // It leads nowhere, so that it is not for everybody.
+                // The lane leads nowhere, so it is restricted.
                 &lane("-1", "p-1").replace("driving", "restricted"),
             ),
             rule: self.rule,
@@ -232,7 +233,7 @@ fn common() {
     crate::run(&rows);
 }
 
-/// A road of two lanes, or what it splits into.
+/// Returns a road of two lanes and the roads that it splits into.
 fn direct(ramp: &[&str], heading: &str, roads: [&str; 2]) -> String {
     let lanes = format!("{}{}", lane("-1", ""), lane("-2", ""));
     let first = Road {

@@ -1,4 +1,4 @@
-//! Lane links within a road.
+//! Tests of lane links within a road.
 
 use crate::Row;
 use crate::build::{Road, lane, lane_with, section};

@@ -1,4 +1,4 @@
-//! Lane sections, lane numbers, widths and borders.
+//! Tests of lane sections, lane numbers, widths and borders.
 
 use crate::Row;
 use crate::build::{CENTER, Road, WIDTH, lane, lane_with, section};

@@ -1,4 +1,4 @@
-//! Numbers, sizes and shapes that are no numbers, or are not meant.
+//! Tests of values, sizes and shapes that are not numbers or not intended.
 
 use crate::Row;
 use crate::build::{LINE, Road, geometry, lane, lane_with, section};

@@ -1,4 +1,4 @@
-//! Reference lines and profiles along the road.
+//! Tests of reference lines and profiles along the road.
 
 use crate::Row;
 use crate::build::{LINE, PI, Road, file, geometry};
@@ -6,7 +6,7 @@ use crate::build::{LINE, PI, Road, file, geometry};
 fn two(second: [&str; 4]) -> String {
     let [s, x, y, hdg] = second;
     let first = geometry("0", "0", "0", "0", "50", LINE);
-    // An arc, so that it is not the same line going on.
+    // The arc ensures that the geometry is not a continuation of the same line.
     let arc = r#"<arc curvature="0.001"/>"#;
     Road::default().with_plan_view(&format!("{first}{}", geometry(s, x, y, hdg, "50", arc)))
 }
@@ -146,7 +146,7 @@ fn elevation() {
     crate::run(&rows);
 }
 
-/// Another way to write a file.
+/// An alternative encoding of a file.
 type Spell = Box<dyn Fn(&str) -> Vec<u8>>;
 
 #[test]

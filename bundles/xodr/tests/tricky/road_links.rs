@@ -1,12 +1,12 @@
-//! Links between roads, in all combinations of contact points.
+//! Tests of links between roads, in all combinations of contact points.
 
 use crate::Row;
 use crate::build::{PI, Road, lane, link, section};
 
-/// Two roads of 100 m with a lane to either side, end to end.
+/// Two roads of 100 m with a lane on each side, end to end.
 struct Pair<'a> {
     links: [&'a str; 2],
-    /// x of the second road, and its heading.
+    /// x and heading of the second road.
     second: [&'a str; 2],
     /// Links of the lanes 1 and -1, in the first and in the second road.
     lanes: [[&'a str; 2]; 2],

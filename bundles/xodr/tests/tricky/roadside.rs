@@ -1,4 +1,4 @@
-//! Signals, controllers and objects.
+//! Tests of signals, controllers and objects.
 
 use crate::Row;
 use crate::build::{Road, lane, section};

@@ -1,4 +1,4 @@
-//! Differences that mean nothing, and faults that look as slight.
+//! Tests of differences without a meaning, and of faults that look as small.
 
 use crate::Row;
 use crate::build::{CENTER, LINE, Road, WIDTH, geometry, lane, lane_with, link, section};
@@ -19,7 +19,7 @@ fn lanes(lanes: &str) -> String {
     .text()
 }
 
-/// Its right lane has these records beside its width.
+/// Returns a road with these records on its right lane, besides the width.
 fn marks(width: &str, marks: &str) -> String {
     let records = format!("{width}{marks}");
     lanes(&section("\"0\"", "", &lane_with("-1", "", &records)))
@@ -36,7 +36,7 @@ fn shapes(shapes: &[String]) -> String {
     ))
 }
 
-/// One road after the other, the second linked with more than it takes.
+/// Returns two consecutive roads. The link of the second has more attributes than it takes.
 fn beside_contact_point(extra: &str) -> String {
     let first = Road {
         link: &link(&["s2 start"]),

@@ -1,9 +1,9 @@
-//! Where signals and objects stand, what they show and who switches them.
+//! Tests of the positions of signals and objects, of their content and of their controllers.
 
 use crate::Row;
 use crate::build::{CENTER, Road, lane, section};
 
-/// A road of two lanes a side.
+/// Returns a road with two lanes on each side.
 fn with(tail: &str) -> String {
     let lanes = section(
         "\"0\"",
@@ -511,14 +511,14 @@ fn outlines_that_are_lines() {
         );
         objects(&[&sized])
     };
-    // The side that closes it crosses the second one.
+    // The closing side crosses the second one.
     let bent = [
         ["0", "0", "0"],
         ["4", "0", "0"],
         ["0", "2", "0"],
         ["4", "2", "0"],
     ];
-    // Legs that lean by centimetres.
+    // The legs lean by a few centimetres.
     let frame = [
         ["0", "0", "0"],
         ["4", "0.02", "5"],

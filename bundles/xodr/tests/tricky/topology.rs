@@ -1,9 +1,9 @@
-//! How roads and lanes hang together around junctions, and in the whole map.
+//! Tests of connections of roads and lanes around junctions, and in the whole map.
 
 use crate::Row;
 use crate::build::{PI, Road, lane, link, section};
 
-/// Road 1 into junction 7, road 2 through it, road 3 out of it, and whatever else there is.
+/// Road 1 into junction 7, road 2 through it, road 3 out of it, and further elements.
 struct Way<'a> {
     links: [&'a [&'a str]; 3],
     lanes: [String; 3],
@@ -54,7 +54,7 @@ impl Way<'_> {
     }
 }
 
-/// Two roads make no junction: found in every map of this kind.
+/// Two roads do not need a junction, so every map of this kind has this finding.
 const TWO: &str = "warning junctions_common_when_to_use";
 
 #[test]

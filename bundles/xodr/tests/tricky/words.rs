@@ -1,8 +1,9 @@
-//! Words and attributes that old schemas leave open, and what is odd only at first sight.
+//! Tests of values and attributes that old schemas do not restrict, and of content that only looks
+//! wrong.
 
 use crate::Row;
 
-/// A straight road of 100 m with what is given ahead of its lanes and behind them.
+/// Returns a straight road of 100 m with the given elements before its lanes and after them.
 fn road(version: &str, head: &str, tail: &str) -> String {
     format!(
         r#"<?xml version="1.0"?><OpenDRIVE><header revMajor="1" revMinor="{version}"/>

@@ -1,9 +1,9 @@
-//! Whom an action moves, and how.
+//! Entities that an action moves, and their speeds and domains.
 
 use qcbus_openscenario::{Actors, Element, Entity};
 
-/// The scenario objects that an action moves, those of selections among them; `None` when it is not
-/// known who all of them are.
+/// Returns the scenario objects that an action moves, including members of selections. Returns
+/// `None` if not all of them are known.
 pub(crate) fn acting<'m, 'd>(action: Element<'m, 'd>) -> Option<Vec<&'m Entity<'d>>> {
     let names = Actors::of(action)?.names()?;
     let entities = action.scenario().entities();
@@ -18,7 +18,7 @@ pub(crate) fn acting<'m, 'd>(action: Element<'m, 'd>) -> Option<Vec<&'m Entity<'
     Some(acting)
 }
 
-/// The slowest of the vehicles that an action moves: its name and its `maxSpeed`. Entities without a
+/// Returns the name and `maxSpeed` of the slowest vehicle that an action moves. Entities without a
 /// known `maxSpeed` set no limit.
 pub(crate) fn slowest<'m>(action: Element<'m, '_>) -> Option<(&'m str, f64)> {
     let scenario = action.scenario();
@@ -30,17 +30,17 @@ pub(crate) fn slowest<'m>(action: Element<'m, '_>) -> Option<(&'m str, f64)> {
     limits.min_by(|(_, one), (_, other)| one.total_cmp(other))
 }
 
-/// What of an entity's motion an action takes over.
+/// Part of an entity's motion that an action controls.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Domain {
-    /// How fast it moves along its way.
+    /// Speed along its path.
     Longitudinal,
-    /// Where it moves across its way.
+    /// Position across its path.
     Lateral,
 }
 
 impl Domain {
-    /// The domain as an adjective.
+    /// Returns the domain as an adjective.
     pub(crate) fn word(self) -> &'static str {
         match self {
             Domain::Longitudinal => "longitudinal",
@@ -49,7 +49,8 @@ impl Domain {
     }
 }
 
-/// The domains that a `PrivateAction` takes over; a trajectory with times sets the speed, too.
+/// Returns the domains that a `PrivateAction` controls. A trajectory with times also sets the
+/// speed.
 pub(crate) fn domains(private: Element<'_, '_>) -> Vec<Domain> {
     let mut domains = Vec::new();
     for kind in private.children() {
@@ -71,7 +72,7 @@ pub(crate) fn domains(private: Element<'_, '_>) -> Vec<Domain> {
     domains
 }
 
-/// A number as a person would write it: at most three decimals.
+/// Formats a number with at most three decimals.
 pub(crate) fn short(value: f64) -> String {
     let rounded = (value * 1000.0).round() / 1000.0;
     format!("{}", if rounded == 0.0 { 0.0 } else { rounded })
@@ -80,7 +81,8 @@ pub(crate) fn short(value: f64) -> String {
 /// Elements of type `TransitionDynamics`.
 pub(crate) const TRANSITIONS: &[&str] = &["SpeedActionDynamics", "LaneChangeActionDynamics"];
 
-/// A number as it is written; what a parameter or an expression led to, and those.
+/// Formats a number as it is written. If the text contains a parameter or an expression, the result
+/// comes first and the text follows.
 pub(crate) fn stated(element: Element<'_, '_>, attribute: &str, value: f64) -> String {
     match element.written(attribute) {
         Some(written) if written.contains('$') => format!("`{}` (`{written}`)", short(value)),

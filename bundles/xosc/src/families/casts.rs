@@ -1,4 +1,4 @@
-//! The actors of many actions: a group's are looked up once, however many actions it has.
+//! Cache of actors for actions. The actors of a group are looked up once for all its actions.
 
 use std::rc::Rc;
 
@@ -7,19 +7,19 @@ use qcbus_openscenario::{Actors, Element};
 
 /// The actors of a `ManeuverGroup` or `Private` by name, with the elements that name them.
 pub(crate) struct Cast<'m, 'd> {
-    /// Where the group or `Private` stands in the document.
+    /// Offset of the group or `Private` in the document.
     pub(crate) at: u32,
     pub(crate) by_name: HashMap<String, Element<'m, 'd>>,
 }
 
-/// The casts that were looked up.
+/// Casts that are already looked up.
 #[derive(Default)]
 pub(crate) struct Casts<'m, 'd> {
     known: HashMap<u32, Rc<Cast<'m, 'd>>>,
 }
 
 impl<'m, 'd> Casts<'m, 'd> {
-    /// The actors of an action; `None` when nobody acts there.
+    /// Returns the actors of an action, or `None` if it has none.
     pub(crate) fn of(&mut self, action: Element<'m, 'd>) -> Option<Rc<Cast<'m, 'd>>> {
         let mut around = action.ancestors();
         let holder = around.find(|one| one.is("Private") || one.is("ManeuverGroup"))?;

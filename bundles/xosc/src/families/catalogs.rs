@@ -1,4 +1,4 @@
-//! Catalogs: where references lead, and what is known of the directories that they are looked for in.
+//! Catalogs: targets of references, and faults of the directories that they are looked up in.
 
 use std::borrow::Cow;
 
@@ -8,21 +8,23 @@ use qcbus_messages::{Absence, DocumentRole, MissingDocument};
 use qcbus_openscenario::{CatalogKind, Element, Form, Resolution, Scenario};
 use qcbus_sdk::{Level, Subject};
 
-/// What is the matter with the directory of one kind of catalogs.
+/// Fault of the directory of one kind of catalogs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Fault {
-    /// It is not there: the bus says so, as an error because something refers to it.
+    /// The directory does not exist. The bus reports this as an error because something refers to
+    /// it.
     Said,
-    /// Its path is empty, which some simulators take for the scenario's own directory.
+    /// The path is empty. Some simulators take it as the scenario's own directory.
     NoPath,
-    /// There is no `.xosc` file in it.
+    /// The directory contains no `.xosc` file.
     Empty,
-    /// Its path is that of a file.
+    /// The path leads to a file.
     File,
 }
 
-/// The references to catalogs in a scenario, those within entries included, and where each leads.
-/// Of catalogs and distributions nobody knows which locations will hold: there are none.
+/// Returns the references to catalogs in a scenario, including those within entries, and their
+/// targets. Catalogs and distributions return none, because the locations that will apply to them
+/// are unknown.
 pub(crate) fn references<'m, 'd>(
     scenario: &'m Scenario<'d>,
 ) -> impl Iterator<Item = (Element<'m, 'd>, &'m Resolution<'d>)> {
@@ -33,13 +35,13 @@ pub(crate) fn references<'m, 'd>(
         .map(|reference| (reference, scenario.resolution(reference)))
 }
 
-/// The kinds of catalogs that a reference may lead to.
+/// Returns the kinds of catalogs that a reference may lead to.
 pub(crate) fn kinds(reference: Element<'_, '_>) -> &'static [CatalogKind] {
     let parent = reference.node().parent();
     CatalogKind::of_reference(parent.map_or("", |parent| parent.name()))
 }
 
-/// Of references that share a fault, the first, and how many there are: one fault is said once.
+/// References that share a fault: the first one and their number. Each fault is reported once.
 pub(crate) struct Once<'m, 'd, K> {
     seen: HashMap<K, usize>,
     found: Vec<(Element<'m, 'd>, u32)>,
@@ -66,7 +68,7 @@ impl<'m, 'd, K: std::hash::Hash + Eq> Once<'m, 'd, K> {
     }
 }
 
-/// The end of a text about the first of several references.
+/// Returns the end of a message about the first of several references.
 pub(crate) fn further(count: u32) -> String {
     match count {
         0 | 1 => String::new(),
@@ -75,13 +77,13 @@ pub(crate) fn further(count: u32) -> String {
     }
 }
 
-/// Names in backticks with commas between them.
+/// Formats names in backticks, separated by commas.
 pub(crate) fn listed<'n>(names: impl Iterator<Item = &'n str>) -> String {
     let names: Vec<String> = names.map(|name| format!("`{name}`")).collect();
     names.join(", ")
 }
 
-/// What is the matter with the directory of a kind, if anything is.
+/// Returns the fault of the directory of a kind, if there is one.
 pub(crate) fn fault_of(
     scenario: &Scenario<'_>,
     subject: &Subject<'_>,
@@ -103,7 +105,7 @@ pub(crate) fn fault_of(
     if paths().any(|path| path == folder) {
         return Some(Fault::File);
     }
-    // The document itself is one of the files, though nobody reads it as its own catalog.
+    // The document itself is one of the files, although it is not read as its own catalog.
     let own = subject.root();
     let inside = |path: &str| {
         path.strip_prefix(folder.as_str())
@@ -113,7 +115,7 @@ pub(crate) fn fault_of(
     is_empty.then_some(Fault::Empty)
 }
 
-/// The directories of some kinds, each looked at once.
+/// Returns the faults of the directories by kind. Each directory is checked once.
 pub(crate) fn faults(
     scenario: &Scenario<'_>,
     subject: &Subject<'_>,
@@ -124,18 +126,19 @@ pub(crate) fn faults(
         .collect()
 }
 
-/// What could not be had of the files that an element refers to.
+/// Returns the missing document that an element refers to.
 pub(crate) fn missing<'s>(subject: &'s Subject<'_>, node: Node<'_>) -> Option<&'s MissingDocument> {
     let mut all = subject.missing().iter();
     all.find(|missing| missing.referred_at == node.offset())
 }
 
-/// A path relative to the document in the spelling of linked documents; `None` where it is not plain.
+/// Returns a path relative to the document in the notation of linked documents. Returns `None` if
+/// the path is not plain.
 fn folder(subject: &Subject<'_>, path: &str) -> Option<String> {
     let root = subject.root();
     let path = path.trim();
     let path = path.strip_prefix("file://").unwrap_or(path);
-    // Of archives and of escaped paths the bus knows more than this.
+    // Only the bus can resolve archives and escaped paths.
     if path.is_empty() || path.contains(['$', '%']) || root.path().contains('!') {
         return None;
     }
@@ -159,13 +162,13 @@ fn folder(subject: &Subject<'_>, path: &str) -> Option<String> {
     Some(format!("/{}", parts.join("/")))
 }
 
-/// The document's name without folders and extension.
+/// Returns the document's name without folders and extension.
 pub(crate) fn stem(path: &str) -> &str {
     let name = path.rsplit(['/', '\\', '!']).next().unwrap_or(path);
     name.rsplit_once('.').map_or(name, |(stem, _)| stem)
 }
 
-/// Whether a reference may mean a kind and does not lead to an entry of another.
+/// Checks whether a reference may mean a kind and does not lead to an entry of another kind.
 pub(crate) fn is_use(reference: Element<'_, '_>, to: &Resolution<'_>, kind: CatalogKind) -> bool {
     match to {
         Resolution::Entry(entry) | Resolution::OtherLocation(entry) => {

@@ -1,4 +1,4 @@
-//! Constraints of parameters: a value must satisfy all of at least one group.
+//! Constraints of parameters. A value must satisfy all constraints of at least one group.
 
 use std::borrow::Cow;
 
@@ -6,7 +6,7 @@ use qcbus_openscenario::{DataType, DateTime, Element, Value};
 
 use super::values;
 
-/// How two values are compared: the words of `rule`.
+/// Comparison of two values: the words of `rule`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Comparison {
     Equal,
@@ -18,7 +18,7 @@ pub(crate) enum Comparison {
 }
 
 impl Comparison {
-    /// What a `rule` means.
+    /// Returns the comparison that a `rule` stands for.
     pub(crate) fn of(element: Element<'_, '_>) -> Option<Comparison> {
         Some(match &*element.word("rule")? {
             "equalTo" => Comparison::Equal,
@@ -31,7 +31,7 @@ impl Comparison {
         })
     }
 
-    /// The word of `rule`.
+    /// Returns the word of `rule`.
     pub(crate) fn word(self) -> &'static str {
         match self {
             Comparison::Equal => "equalTo",
@@ -43,7 +43,7 @@ impl Comparison {
         }
     }
 
-    /// Whether it asks for an order.
+    /// Checks whether the comparison needs an order.
     pub(crate) fn is_order(self) -> bool {
         !matches!(self, Comparison::Equal | Comparison::NotEqual)
     }
@@ -54,14 +54,14 @@ impl Comparison {
 pub(crate) enum Operand<'d> {
     /// A number, or a point in time in seconds, in UTC.
     Number(f64),
-    /// A point in time in seconds, whose zone is not known.
+    /// A point in time in seconds with an unknown time zone.
     Local(f64),
-    /// A text, `true` and `false`.
+    /// A text, or `true` and `false`.
     Text(Cow<'d, str>),
 }
 
 impl<'d> Operand<'d> {
-    /// The value as one of a type; `None` for NaN, which does not compare.
+    /// Converts the value to an operand of a type. Returns `None` for NaN, which does not compare.
     pub(crate) fn new(value: &Value<'d>, data_type: DataType) -> Option<Operand<'d>> {
         match data_type {
             DataType::String => Some(Operand::Text(value.text())),
@@ -81,8 +81,8 @@ impl<'d> Operand<'d> {
         }
     }
 
-    /// Whether the comparison holds, benevolently where a double may be off by its last digits;
-    /// `None` when the two have no order.
+    /// Checks whether the comparison holds. It tolerates doubles that differ in their last digits.
+    /// Returns `None` if the two values have no order.
     pub(crate) fn holds(&self, comparison: Comparison, other: &Operand<'_>) -> Option<bool> {
         match (self, other) {
             (Operand::Number(left), Operand::Number(right))
@@ -109,7 +109,7 @@ impl<'d> Operand<'d> {
     }
 }
 
-/// A `ValueConstraint`; what is not known of it is `None`.
+/// A `ValueConstraint`. Unknown parts are `None`.
 pub(crate) struct Constraint<'m, 'd> {
     pub(crate) element: Element<'m, 'd>,
     pub(crate) comparison: Option<Comparison>,
@@ -117,7 +117,7 @@ pub(crate) struct Constraint<'m, 'd> {
 }
 
 impl Constraint<'_, '_> {
-    /// `lessThan 5`, as messages write it.
+    /// Formats the constraint for messages, for example `lessThan 5`.
     pub(crate) fn shown(&self) -> String {
         let rule = self.comparison.map_or("", Comparison::word);
         let value = self.element.text("value").unwrap_or_default();
@@ -131,7 +131,7 @@ pub(crate) struct Group<'m, 'd> {
     pub(crate) constraints: Vec<Constraint<'m, 'd>>,
 }
 
-/// The constraint groups of a declaration.
+/// Returns the constraint groups of a declaration.
 pub(crate) fn groups<'m, 'd>(
     declaration: Element<'m, 'd>,
     data_type: DataType,
@@ -155,8 +155,8 @@ pub(crate) fn groups<'m, 'd>(
 }
 
 impl<'m, 'd> Group<'m, 'd> {
-    /// The first constraint that a value violates, `Ok(None)` when it satisfies all, `Err` when nobody
-    /// knows.
+    /// Returns the first constraint that a value violates. Returns `Ok(None)` if it satisfies all,
+    /// and `Err` if this is unknown.
     pub(crate) fn violated(&self, value: &Operand<'_>) -> Result<Option<&Constraint<'m, 'd>>, ()> {
         let mut unknown = false;
         for constraint in &self.constraints {
@@ -170,14 +170,14 @@ impl<'m, 'd> Group<'m, 'd> {
         if unknown { Err(()) } else { Ok(None) }
     }
 
-    /// Constraints that no value satisfies at once.
+    /// Returns two constraints that no value satisfies at once.
     pub(crate) fn contradiction(
         &self,
         data_type: DataType,
     ) -> Option<(&Constraint<'m, 'd>, &Constraint<'m, 'd>)> {
         let equal = self.known(Comparison::Equal).next();
         if let Some((equal, value)) = equal {
-            // With a value given, every other constraint is decided.
+            // With a fixed value, every other constraint is decided.
             let against = self.violated(value).ok().flatten()?;
             return Some((equal, against));
         }
@@ -224,7 +224,7 @@ impl<'m, 'd> Group<'m, 'd> {
         of_kind.filter_map(|one| Some((one, one.operand.as_ref()?)))
     }
 
-    /// The strictest of the lower bounds (`sign` 1) or upper bounds (`sign` -1).
+    /// Returns the strictest of the lower bounds (`sign` 1) or upper bounds (`sign` -1).
     fn bound(
         &self,
         open: Comparison,
@@ -236,7 +236,7 @@ impl<'m, 'd> Group<'m, 'd> {
             let (Operand::Number(value) | Operand::Local(value)) = operand else {
                 continue;
             };
-            // The open ones come first and stay when a closed one is equal.
+            // The open bounds come first. They stay if a closed bound has the same value.
             if strictest.is_none_or(|(_, bound)| sign * value > sign * bound) {
                 strictest = Some((constraint, *value));
             }

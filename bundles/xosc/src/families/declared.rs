@@ -1,4 +1,5 @@
-//! What a scenario declares at its top: parameters, variables, monitors. And who refers to it.
+//! Declarations at the top of a scenario (parameters, variables, monitors), and the references to
+//! them.
 
 use std::borrow::Cow;
 
@@ -11,21 +12,21 @@ use crate::model::About as _;
 
 /// A kind of declaration and the elements that refer to it.
 pub(crate) struct Declarable {
-    /// The block at the top.
+    /// The block at the top of the scenario.
     block: &'static str,
-    /// The declaration in it.
+    /// The declaration within the block.
     declaration: &'static str,
-    /// What messages call it.
+    /// Its name for messages.
     pub(crate) what: &'static str,
-    /// The attribute that names one.
+    /// The attribute that refers to a declaration.
     pub(crate) reference: &'static str,
-    /// The elements that change its value.
+    /// The elements that change the value.
     pub(crate) writers: &'static [&'static str],
-    /// The elements that look at its value.
+    /// The elements that read the value.
     pub(crate) readers: &'static [&'static str],
 }
 
-/// Parameters, which stand in `ParameterDeclarations` of many elements; only those at the top can be
+/// Parameters. Many elements have `ParameterDeclarations`, but only those at the top can be
 /// referred to by name.
 pub(crate) const PARAMETERS: Declarable = Declarable {
     block: "ParameterDeclarations",
@@ -46,7 +47,7 @@ pub(crate) const VARIABLES: Declarable = Declarable {
     readers: &["VariableCondition"],
 };
 
-/// Monitors, which only the outside looks at.
+/// Monitors. Only tools outside of the scenario read them.
 pub(crate) const MONITORS: Declarable = Declarable {
     block: "MonitorDeclarations",
     declaration: "MonitorDeclaration",
@@ -57,7 +58,7 @@ pub(crate) const MONITORS: Declarable = Declarable {
 };
 
 impl Declarable {
-    /// The declarations at the top.
+    /// Returns the declarations at the top.
     pub(crate) fn declarations<'m, 'd>(
         &self,
         scenario: &'m Scenario<'d>,
@@ -69,7 +70,7 @@ impl Declarable {
             .flat_map(move |block| block.children_named(declaration))
     }
 
-    /// The declarations at the top by name, the first of each.
+    /// Returns the declarations at the top by name, the first of each name.
     pub(crate) fn by_name<'m, 'd>(
         &self,
         scenario: &'m Scenario<'d>,
@@ -83,7 +84,7 @@ impl Declarable {
         by_name
     }
 
-    /// The elements that refer to one of the kind.
+    /// Returns the elements that refer to this kind of declaration.
     pub(crate) fn references<'m, 'd>(
         &'static self,
         scenario: &'m Scenario<'d>,
@@ -101,7 +102,7 @@ impl Declarable {
         })
     }
 
-    /// The names that the elements refer to.
+    /// Returns the names that the elements refer to.
     pub(crate) fn names<'d>(
         &'static self,
         scenario: &Scenario<'d>,
@@ -112,7 +113,7 @@ impl Declarable {
             .collect()
     }
 
-    /// The names that elements refer to and nobody declares.
+    /// Returns the names that elements refer to but that are not declared.
     pub(crate) fn dangling(
         &'static self,
         scenario: &Scenario<'_>,
@@ -128,7 +129,7 @@ impl Declarable {
         dangling
     }
 
-    /// Says which references name nothing that is declared.
+    /// Reports references to undeclared names.
     pub(crate) fn resolve(&'static self, scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let declared = self.by_name(scenario);
         for elements in [self.writers, self.readers] {
@@ -157,12 +158,12 @@ impl Declarable {
     }
 }
 
-/// A name without the `$` that old files write before it.
+/// Returns a name without the `$` that old files write before it.
 pub(crate) fn bare(name: &str) -> &str {
     name.strip_prefix('$').unwrap_or(name)
 }
 
-/// The type that a declaration names.
+/// Returns the type that a declaration names.
 pub(crate) fn type_of(declaration: Element<'_, '_>, attribute: &str) -> Option<DataType> {
     DataType::of_declaration(declaration.written(attribute)?)
 }

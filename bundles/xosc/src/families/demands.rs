@@ -1,4 +1,4 @@
-//! What conditions demand of one and the same quantity.
+//! Demands of several conditions on the same quantity.
 
 use qcbus_openscenario::Element;
 
@@ -14,11 +14,11 @@ pub(crate) struct Bound<'m, 'd> {
     closed: bool,
     /// The element that demands it.
     pub(crate) element: Element<'m, 'd>,
-    /// What it demands, in words.
+    /// The demand in words.
     pub(crate) wanted: String,
 }
 
-/// What is demanded of a quantity.
+/// Demands on a quantity.
 #[derive(Clone)]
 pub(crate) struct Demand<'m, 'd> {
     low: Option<Bound<'m, 'd>>,
@@ -27,7 +27,7 @@ pub(crate) struct Demand<'m, 'd> {
     attribute: &'static str,
 }
 
-/// Conditions about one of several words: the element and the attribute with the word.
+/// Conditions about one of several words: the element, and the attribute with the word.
 const WORDS: &[(&str, &str)] = &[
     ("TrafficSignalCondition", "state"),
     ("TrafficSignalControllerCondition", "phase"),
@@ -41,8 +41,8 @@ const TEXTS: &[&str] = &[
     "UserDefinedValueCondition",
 ];
 
-/// The quantity that a condition is about and what it demands of it; `None` when it is not about one,
-/// or not about its value in this very step.
+/// Returns the quantity that a condition is about, and the demand on it. Returns `None` if it is
+/// about no quantity, or not about its value in the current step.
 pub(crate) fn of<'m, 'd>(condition: Element<'m, 'd>) -> Option<(String, Demand<'m, 'd>)> {
     let edge = condition.word("conditionEdge")?;
     if !matches!(&*edge, "none" | "rising") {
@@ -58,7 +58,7 @@ pub(crate) fn of<'m, 'd>(condition: Element<'m, 'd>) -> Option<(String, Demand<'
     Some((format!("{delay} {about} {same}"), claim))
 }
 
-/// The element that says what is compared, and the entities that it is about.
+/// Returns the element that states the comparison, and the entities that it is about.
 fn leaf<'m, 'd>(condition: Element<'m, 'd>) -> Option<(Element<'m, 'd>, String)> {
     if let Some(by_value) = condition.child("ByValueCondition") {
         return Some((by_value.children().next()?, String::new()));
@@ -72,7 +72,7 @@ fn leaf<'m, 'd>(condition: Element<'m, 'd>) -> Option<(Element<'m, 'd>, String)>
     }
     names.sort();
     let one = matches!(names.as_slice(), [name] if entities.object(name).is_some());
-    // Of several, one may meet this condition and another one that.
+    // One of several entities may meet this condition and another entity the other condition.
     if !one && triggering.word("triggeringEntitiesRule")? != "all" {
         return None;
     }
@@ -82,7 +82,7 @@ fn leaf<'m, 'd>(condition: Element<'m, 'd>) -> Option<(Element<'m, 'd>, String)>
 
 fn word<'m, 'd>(leaf: Element<'m, 'd>, attribute: &'static str) -> Option<Demand<'m, 'd>> {
     let word = leaf.word(attribute)?;
-    // Transitions last for a step, in which the state before or after them holds, too.
+    // Transitions last for one step. In this step the state before or after them also holds.
     if word.ends_with("Transition") {
         return None;
     }
@@ -148,22 +148,22 @@ impl<'m, 'd> Demand<'m, 'd> {
         ends.or(self.word.as_ref().map(|(_, bound)| bound))
     }
 
-    /// The element that demands it.
+    /// Returns the element that demands it.
     pub(crate) fn element(&self) -> Option<Element<'m, 'd>> {
         self.any().map(|bound| bound.element)
     }
 
-    /// What it demands, in words.
+    /// Returns the demand in words.
     pub(crate) fn wanted(&self) -> &str {
         self.any().map_or("", |bound| &bound.wanted)
     }
 
-    /// The attribute that says so.
+    /// Returns the attribute that states the demand.
     pub(crate) fn attribute(&self) -> &'static str {
         self.attribute
     }
 
-    /// What of this rules out the other.
+    /// Returns the bound of this demand that excludes the other demand.
     pub(crate) fn against(&self, other: &Demand<'m, 'd>) -> Option<&Bound<'m, 'd>> {
         if let (Some((word, bound)), Some((wanted, _))) = (&self.word, &other.word) {
             return (word != wanted).then_some(bound);
@@ -181,7 +181,7 @@ impl<'m, 'd> Demand<'m, 'd> {
         }
     }
 
-    /// Takes over what the other demands beyond this.
+    /// Adds the stricter bounds of the other demand.
     pub(crate) fn narrow(&mut self, other: Demand<'m, 'd>) {
         let tighter_low = |one: &Bound<'m, 'd>, than: &Bound<'m, 'd>| {
             one.value > than.value || (one.value == than.value && than.closed)

@@ -1,14 +1,14 @@
-//! What later versions of the standard keep only for the sake of older files.
+//! Deprecated parts of the standard, which later versions keep only for older files.
 
 use qcbus_openscenario::{Element, Scenario, Version};
 use qcbus_sdk::{Place, Sink};
 
-/// What of an element is deprecated.
+/// Deprecated part of an element.
 #[derive(Clone, Copy)]
 enum Subject {
     /// An attribute.
     Attribute(&'static str),
-    /// A word that an attribute says.
+    /// A word as the value of an attribute.
     Word(&'static str, &'static str),
     /// The element itself, within an element of another type.
     Within(&'static str),
@@ -16,7 +16,8 @@ enum Subject {
 
 use Subject::{Attribute, Within, Word};
 
-/// Something deprecated: the element, its type, what of it, since when, and what to write instead.
+/// A deprecated part: the element, its type, the part, the version since which it is deprecated,
+/// and the replacement.
 struct Deprecated {
     element: &'static str,
     class: &'static str,
@@ -25,8 +26,8 @@ struct Deprecated {
     instead: &'static str,
 }
 
-/// One line each: the element, what of it, what to write instead. Its type is named where it is
-/// another than the element.
+/// Each line has the element, the part and the replacement. The type is given if it differs from
+/// the element name.
 macro_rules! deprecated {
     ($($since:literal: {$(
         $element:ident $(($class:ident))? $part:ident($($word:literal),*) $instead:literal;
@@ -86,7 +87,7 @@ deprecated! {
 }
 
 impl Deprecated {
-    /// Whether this element has it, where the element is of the right type.
+    /// Checks whether this element is of the right type and has the deprecated part.
     fn is_in(&self, element: Element<'_, '_>) -> bool {
         let of_type = || element.class() == Some(self.class);
         match self.part {
@@ -116,8 +117,8 @@ impl Deprecated {
     }
 }
 
-/// Says what the document uses of what its version has deprecated: the first place of each kind, and
-/// how many more there are.
+/// Reports the deprecated parts that the document uses. Each kind is reported at its first use,
+/// with the number of further uses.
 pub(crate) fn report(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let version = scenario.version();
     for kind in TABLE.iter().filter(|kind| kind.since <= version) {

@@ -1,4 +1,4 @@
-//! Numbers that can be neither infinite nor `NaN`, both of which are doubles for the schema.
+//! Numbers that must be neither infinite nor `NaN`. The schema accepts both as doubles.
 
 use qcbus_openscenario::Scenario;
 use qcbus_sdk::Sink;
@@ -6,10 +6,10 @@ use qcbus_sdk::Sink;
 use crate::families::references::quoted;
 use crate::model::About as _;
 
-/// Elements with those of their attributes that are such numbers.
+/// Elements with the attributes that must be finite numbers.
 pub(crate) type Numbers = [(&'static str, &'static [&'static str])];
 
-/// Says which of the numbers are not finite, and why they must be.
+/// Reports the numbers that are not finite, and why they must be.
 pub(crate) fn report(scenario: &Scenario<'_>, numbers: &Numbers, why: &str, found: &mut Sink<'_>) {
     for (name, attributes) in numbers {
         for element in scenario.elements_everywhere(name) {

@@ -1,17 +1,18 @@
-//! The minimum subset: what a scenario may use that is exchanged between any two tools. Each rule names
-//! what one part of it allows; none of them runs without being asked for.
+//! The minimum subset of the standard for the exchange between any two tools. Each rule states
+//! which part of it is allowed. These rules run only on request.
 
 use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Place, Sink};
 
-/// Says every element of these names: the subset has none of them. `instead` is how to do without.
+/// Reports every element of these names, because the subset has none of them. `instead` is the
+/// alternative.
 pub(crate) fn none(scenario: &Scenario<'_>, names: &[&str], instead: &str, found: &mut Sink<'_>) {
     for element in names.iter().flat_map(|name| scenario.elements(name)) {
         outside(element, instead, found);
     }
 }
 
-/// Says that an element is outside the subset.
+/// Reports that an element is outside the subset.
 pub(crate) fn outside(element: Element<'_, '_>, instead: &str, found: &mut Sink<'_>) {
     let text = format!(
         "`{}` is outside the minimum subset: {instead}",
@@ -20,7 +21,7 @@ pub(crate) fn outside(element: Element<'_, '_>, instead: &str, found: &mut Sink<
     found.issue(element.node(), text);
 }
 
-/// Says what stands directly within an element and is none of what the subset allows there.
+/// Reports the children of an element that the subset does not allow there.
 pub(crate) fn only(around: Element<'_, '_>, allowed: &[&str], found: &mut Sink<'_>) {
     for child in around.children() {
         if !allowed.contains(&child.name()) {
@@ -35,7 +36,7 @@ pub(crate) fn only(around: Element<'_, '_>, allowed: &[&str], found: &mut Sink<'
     }
 }
 
-/// Says the attributes of an element that the subset leaves out.
+/// Reports the attributes of an element that the subset excludes.
 pub(crate) fn without(
     scenario: &Scenario<'_>,
     element: &str,

@@ -7,9 +7,9 @@ use qcbus_document::{Document, Node};
 use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Place, Sink};
 
-/// Demands that no two children of one element have the same `name`, whatever they are.
+/// Reports children of one element with the same `name`, of any kind.
 ///
-/// Properties are left out: their names are keys of values, and nobody refers to them.
+/// Properties are left out. Their names are keys of values and not targets of references.
 pub(crate) fn unique_among_siblings(document: &Document<'_>, found: &mut Sink<'_>) {
     let Some(root) = document.root() else { return };
     for parent in std::iter::once(root).chain(root.descendants()) {
@@ -43,9 +43,9 @@ pub(crate) fn unique_among_siblings(document: &Document<'_>, found: &mut Sink<'_
     }
 }
 
-/// Elements that maneuvers of catalogs have, too.
+/// Elements that may also be in maneuvers of catalogs.
 const IN_STORIES: &[&str] = &["Maneuver", "Event", "Action"];
-/// Elements by whose names others refer to them.
+/// Elements that others refer to by name.
 const NAMED: &[&str] = &[
     "ScenarioObject",
     "EntitySelection",
@@ -57,8 +57,9 @@ const NAMED: &[&str] = &[
     "Phase",
 ];
 
-/// The elements by whose names others refer to them, with their names: entities, elements of the
-/// storyboard, catalogs and their entries, traffic signal controllers and their phases.
+/// Returns the elements that others refer to by name, with their names. These are entities,
+/// elements of the storyboard, catalogs and their entries, traffic signal controllers and their
+/// phases.
 pub(crate) fn keys<'m, 'd>(
     scenario: &'m Scenario<'d>,
 ) -> impl Iterator<Item = (Element<'m, 'd>, Cow<'d, str>)> {

@@ -1,4 +1,4 @@
-//! Where entities stand when the run begins, those among them that are placed relative to others.
+//! Start positions of entities, including positions relative to other entities.
 
 use std::cell::RefCell;
 
@@ -10,19 +10,19 @@ use crate::families::placement::{self, Start};
 use crate::families::positions::{AT_END, find_lane, lane_of, road_of, section_of, station};
 use crate::families::relative;
 
-/// Where something stands: in the world, and on the road if it is known which.
+/// Position in the world, and on the road if the road is known.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Whereabouts<'w, 'r> {
     pub(crate) x: f64,
     pub(crate) y: f64,
-    /// `None` where that is not known.
+    /// Height, or `None` if it is unknown.
     pub(crate) z: Option<f64>,
-    /// Which way it looks.
+    /// Direction in which it faces.
     pub(crate) heading: f64,
-    /// Whether every simulator understands the heading like this. On the left of a road some let it look
+    /// Whether all simulators agree on the heading. On the left of a road, some let an entity face
     /// along the road and some against it.
     pub(crate) is_sure: bool,
-    /// Where it stands on a road, if it was placed on one; else [`Origins::on`] looks for it.
+    /// Position on a road, if it was placed on one. Otherwise [`Origins::on`] searches for it.
     on: Option<OnRoad<'w, 'r>>,
 }
 
@@ -32,23 +32,23 @@ pub(crate) struct OnRoad<'w, 'r> {
     pub(crate) road: &'w Road<'r>,
     pub(crate) s: f64,
     pub(crate) t: f64,
-    /// The lane, if it is known which.
+    /// The lane, if it is known.
     pub(crate) lane: Option<i64>,
-    /// Whether what is there surely looks along the road.
+    /// Whether an entity here certainly faces along the road.
     pub(crate) along: bool,
 }
 
 enum Memo<'w, 'r> {
     New,
-    /// It is being computed: who comes here again goes round in a circle.
+    /// The place is being computed. Reaching it again means a cycle.
     Open,
     Done(Option<Whereabouts<'w, 'r>>),
 }
 
-/// The places of all who are teleported in `Init`.
+/// The places of all entities that are teleported in `Init`.
 pub(crate) struct Origins<'m, 'd, 'w, 'r> {
     pub(crate) starts: Vec<Start<'m, 'd>>,
-    /// `None` for who is teleported more than once.
+    /// Index of the start, or `None` if an entity is teleported more than once.
     by_name: HashMap<String, Option<usize>>,
     memo: RefCell<Vec<Memo<'w, 'r>>>,
     map: Option<&'w RoadMap<'r>>,
@@ -64,7 +64,7 @@ const RELATIVE: &[&str] = &[
 ];
 
 impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
-    /// `map` is the scenario's, if it is known.
+    /// Creates the origins. `map` is the scenario's map, if it is known.
     pub(crate) fn of(
         scenario: &'m Scenario<'d>,
         map: Option<&'w RoadMap<'r>>,
@@ -86,14 +86,14 @@ impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
         }
     }
 
-    /// The entity that a position is relative to, and where it stands.
+    /// Returns the entity that a position is relative to, and its place.
     pub(crate) fn base(&self, position: Element<'m, 'd>) -> Option<(String, Whereabouts<'w, 'r>)> {
         let name = relative_to(position)?;
         let at = (*self.by_name.get(&name)?)?;
         Some((name, self.place(at)?))
     }
 
-    /// Where the entity of a start stands.
+    /// Returns the place of the entity of a start.
     pub(crate) fn place(&self, at: usize) -> Option<Whereabouts<'w, 'r>> {
         let mut way = Vec::new();
         let mut next = Some(at);
@@ -124,7 +124,7 @@ impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
         }
     }
 
-    /// Where an entity stands, as far as that is computed.
+    /// Returns the place of an entity, if it is already computed.
     fn known(&self, name: &str) -> Option<Whereabouts<'w, 'r>> {
         let at = (*self.by_name.get(name)?)?;
         match self.memo.borrow().get(at) {
@@ -174,7 +174,7 @@ impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
         }
     }
 
-    /// Where a place is on a road, if there is only one there.
+    /// Returns the position of a place on a road, if there is only one road.
     pub(crate) fn on(&self, place: &Whereabouts<'w, 'r>) -> Option<OnRoad<'w, 'r>> {
         if place.on.is_some() {
             return place.on;
@@ -193,7 +193,7 @@ impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
     }
 }
 
-/// A place by its distances in directions that are turned by an angle.
+/// Returns a place at given distances in directions that are rotated by an angle.
 fn moved<'w, 'r>(
     position: Element<'_, '_>,
     base: Whereabouts<'w, 'r>,
@@ -204,7 +204,7 @@ fn moved<'w, 'r>(
     let place = Whereabouts {
         x: base.x + dx * cos - dy * sin,
         y: base.y + dx * sin + dy * cos,
-        // What stands farther off stands as high as its own ground.
+        // Without `dz` the height is that of the ground at the new place.
         z: position.number("dz").and_then(|dz| Some(base.z? + dz)),
         on: None,
         ..base
@@ -212,7 +212,7 @@ fn moved<'w, 'r>(
     oriented(position, place)
 }
 
-/// Whom a position is relative to.
+/// Returns the entity that a position is relative to.
 fn relative_to(position: Element<'_, '_>) -> Option<String> {
     let name = RELATIVE
         .contains(&position.name())
@@ -220,7 +220,7 @@ fn relative_to(position: Element<'_, '_>) -> Option<String> {
     Some(name.into_owned())
 }
 
-/// A number that need not be there; `None` when it is there and not known.
+/// Returns an optional number. Returns `None` if it exists but is unknown.
 pub(crate) fn or(element: Element<'_, '_>, name: &str, otherwise: f64) -> Option<f64> {
     if element.has(name) {
         element.number(name)
@@ -229,19 +229,19 @@ pub(crate) fn or(element: Element<'_, '_>, name: &str, otherwise: f64) -> Option
     }
 }
 
-/// The middle of a lane.
+/// Returns the middle of a lane.
 fn middle(lane: qcbus_opendrive::LaneRef<'_, '_>, s: f64) -> Option<f64> {
     let ds = s - lane.at.s()?;
     Some(f64::midpoint(lane.inner_t(ds)?, lane.outer_t(ds)?))
 }
 
-/// A station, if the road has it.
+/// Returns a station if it is on the road.
 pub(crate) fn within(road: &Road<'_>, s: f64) -> Option<f64> {
     let length = road.length()?;
     (s >= -AT_END && s <= length + AT_END).then(|| s.clamp(0.0, length))
 }
 
-/// A place beside a road, looking as traffic does.
+/// Returns a place beside a road that faces in the direction of traffic.
 fn on_map<'w, 'r>(
     road: &'w Road<'r>,
     s: f64,
@@ -268,7 +268,7 @@ fn on_map<'w, 'r>(
     })
 }
 
-/// The place with what the position's `Orientation` says.
+/// Returns the place with the position's `Orientation` applied.
 fn oriented<'w, 'r>(
     position: Element<'_, '_>,
     place: Whereabouts<'w, 'r>,
@@ -296,7 +296,7 @@ fn oriented<'w, 'r>(
     })
 }
 
-/// The lane within which a place lies.
+/// Returns the lane that contains a place.
 fn lane_at(road: &Road<'_>, s: f64, t: f64) -> Option<i64> {
     let side = if t > 0.0 { Side::Left } else { Side::Right };
     let section = section_of(road, side, s)?;
@@ -311,7 +311,7 @@ fn lane_at(road: &Road<'_>, s: f64, t: f64) -> Option<i64> {
     lanes.next().is_none().then(|| lane.id())?
 }
 
-/// Where a `RelativeLanePosition` is, if there is only one way to understand it.
+/// Returns the place of a `RelativeLanePosition`, if it is unambiguous.
 fn beside<'w, 'r>(position: Element<'_, '_>, on: OnRoad<'w, 'r>) -> Option<Whereabouts<'w, 'r>> {
     let lanes = relative::lanes(position, on)?;
     let ds = relative::ways(position, on)?;

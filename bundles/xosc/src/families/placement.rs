@@ -1,4 +1,4 @@
-//! Where entities begin: what places them, and in which order.
+//! Start of entities: the elements that place them, and their order.
 
 use foldhash::HashSet;
 use qcbus_openscenario::{Actors, Element, Scenario};
@@ -7,11 +7,11 @@ use qcbus_openscenario::{Actors, Element, Scenario};
 pub(crate) struct Start<'m, 'd> {
     /// The entity.
     pub(crate) name: String,
-    /// `WorldPosition` or the like.
+    /// `WorldPosition` or a similar element.
     pub(crate) position: Element<'m, 'd>,
 }
 
-/// The teleports of `Init` in document order, those of a selection for each of its members.
+/// Returns the teleports of `Init` in document order. A selection gives one for each member.
 pub(crate) fn starts<'m, 'd>(scenario: &'m Scenario<'d>) -> Vec<Start<'m, 'd>> {
     let mut starts = Vec::new();
     let actions = scenario.root().path(&["Storyboard", "Init", "Actions"]);
@@ -37,19 +37,20 @@ pub(crate) fn starts<'m, 'd>(scenario: &'m Scenario<'d>) -> Vec<Start<'m, 'd>> {
     starts
 }
 
-/// The names of all entities that something places at some time; `None` when that is not known.
+/// Returns the names of all entities that are placed at some time. Returns `None` if this is
+/// unknown.
 pub(crate) fn placed(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
     let mut placed = trailers(scenario)?;
-    // That there is no `Init` is the schema's finding.
+    // The schema reports a missing `Init`.
     let init = scenario.root().path(&["Storyboard", "Init"])?;
-    // What a simulator makes of an action of its own nobody else knows.
+    // The effect of a simulator's own action is unknown.
     let is_open = init
         .child("Actions")
         .is_some_and(|actions| actions.child("UserDefinedAction").is_some());
     if is_open || !scenario.storyboard().is_complete() {
         return None;
     }
-    // All actions of a group place the same.
+    // All actions of a group place the same entities.
     let mut groups: HashSet<u32> = HashSet::default();
     for action in ["TeleportAction", "FollowTrajectoryAction"] {
         for action in scenario.elements_everywhere(action) {
@@ -70,7 +71,8 @@ pub(crate) fn placed(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
     Some(placed)
 }
 
-/// What is drawn by another vehicle and stands behind it; `None` when that is not known.
+/// Returns the entities that are towed by a vehicle and stand behind it. Returns `None` if they are
+/// unknown.
 pub(crate) fn trailers(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
     let mut trailers: HashSet<String> = HashSet::default();
     for reference in scenario.elements_everywhere("TrailerRef") {
@@ -85,7 +87,8 @@ pub(crate) fn trailers(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
     Some(trailers)
 }
 
-/// The names of the scenario objects behind a name. One that leads nowhere is said elsewhere.
+/// Returns the names of the scenario objects behind a name. An unresolved name is reported
+/// elsewhere.
 fn expanded(scenario: &Scenario<'_>, name: &str) -> Option<Vec<String>> {
     if !scenario.entities().contains(name) {
         return Some(Vec::new());

@@ -1,4 +1,4 @@
-//! Positions that name a road of the map, and where in the plane a position lies.
+//! Positions that name a road of the map, and their place in the plane.
 
 use std::borrow::Cow;
 
@@ -8,11 +8,11 @@ use qcbus_openscenario::{Actors, Element, Entity, LaneAt};
 /// Positions that name a road.
 pub(crate) const ON_ROAD: &[&str] = &["LanePosition", "RoadPosition"];
 
-/// How far beyond an end of a road a position may lie and still be meant to be on it: digits that
-/// were rounded away.
+/// Tolerance in metres beyond an end of a road. A position within it is still on the road, because
+/// digits may have been rounded away.
 pub(crate) const AT_END: f64 = 1e-3;
 
-/// The road that a position names, where the map has exactly one of this id.
+/// Returns the road that a position names, if the map has exactly one of this id.
 pub(crate) fn road_of<'m, 'r>(
     position: Element<'_, '_>,
     map: &'m RoadMap<'r>,
@@ -23,8 +23,8 @@ pub(crate) fn road_of<'m, 'r>(
     roads.next().is_none().then_some(road)
 }
 
-/// The station that a position names, brought onto the road where it is off by rounding only;
-/// `None` where it is unknown or beyond the road's ends.
+/// Returns the station that a position names. A rounding error at the ends is corrected. Returns
+/// `None` if the station is unknown or beyond the road's ends.
 pub(crate) fn station(position: Element<'_, '_>, road: &Road<'_>) -> Option<f64> {
     let s = position.number("s")?;
     let length = road.length()?;
@@ -32,13 +32,13 @@ pub(crate) fn station(position: Element<'_, '_>, road: &Road<'_>) -> Option<f64>
     (s >= -slack && s <= length + slack).then(|| s.clamp(0.0, length))
 }
 
-/// The id of a lane; `None` for what is no integer.
+/// Parses the id of a lane. Returns `None` if it is no integer.
 pub(crate) fn lane_id(text: &str) -> Option<i64> {
     text.trim_matches([' ', '\t', '\r', '\n']).parse().ok()
 }
 
-/// The lane at a station. Where two lane sections meet, those of both count, and so do those of
-/// temporary layers: a simulator may look at either.
+/// Returns the lane at a station. Where two lane sections meet, the lanes of both count. Lanes of
+/// temporary layers count too. A simulator may use any of them.
 pub(crate) fn find_lane<'m, 'r>(road: &'m Road<'r>, s: f64, id: i64) -> LaneAt<'m, 'r> {
     let found = LaneAt::of(road, s, id);
     let LaneAt::None(section) = found else {
@@ -59,7 +59,7 @@ pub(crate) fn find_lane<'m, 'r>(road: &'m Road<'r>, s: f64, id: i64) -> LaneAt<'
     LaneAt::None(section)
 }
 
-/// The lane that a `LanePosition` names.
+/// Returns the lane that a `LanePosition` names.
 pub(crate) fn lane_of<'m, 'r>(
     position: Element<'_, '_>,
     road: &'m Road<'r>,
@@ -72,7 +72,7 @@ pub(crate) fn lane_of<'m, 'r>(
     }
 }
 
-/// The lane section of a road at a station, for a side of it.
+/// Returns the lane section of a road at a station, for one side.
 pub(crate) fn section_of<'m, 'r>(
     road: &'m Road<'r>,
     side: Side,
@@ -81,27 +81,27 @@ pub(crate) fn section_of<'m, 'r>(
     road.permanent()?.section_at(road, side, s)
 }
 
-/// A place in the plane of the map, or relative to something whose place is not known.
+/// A place in the plane of the map, or relative to an entity at an unknown place.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Spot<'d> {
     frame: Frame<'d>,
     pub(crate) x: f64,
     pub(crate) y: f64,
-    /// `None` where the road's surface decides.
+    /// Height, or `None` if the road surface determines it.
     z: Option<f64>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 enum Frame<'d> {
     World,
-    /// In the directions of the world, seen from an entity.
+    /// Relative to an entity, along the axes of the world.
     Beside(Cow<'d, str>),
-    /// In the directions of an entity.
+    /// Relative to an entity, along the axes of the entity.
     Within(Cow<'d, str>),
 }
 
 impl<'d> Spot<'d> {
-    /// Where a `Position` is.
+    /// Returns the place of a `Position`.
     pub(crate) fn of(position: Element<'_, 'd>) -> Option<Spot<'d>> {
         let kind = position.children().next()?;
         match kind.name() {
@@ -165,8 +165,8 @@ impl<'d> Spot<'d> {
         })
     }
 
-    /// How far two places are apart, where that can be said; in the plane, where a height is not
-    /// known.
+    /// Returns the distance between two places, if it is known. If a height is unknown, it is the
+    /// distance in the plane.
     pub(crate) fn distance(&self, other: &Spot<'d>) -> Option<f64> {
         if self.frame != other.frame {
             return None;
@@ -180,7 +180,7 @@ impl<'d> Spot<'d> {
     }
 }
 
-/// The entities that an action moves; `None` when one of them is not known.
+/// Returns the entities that an action moves. Returns `None` if one of them is unknown.
 pub(crate) fn moved<'m, 'd>(element: Element<'m, 'd>) -> Option<Vec<&'m Entity<'d>>> {
     let names = Actors::of(element)?.names()?;
     let entities = element.scenario().entities();
@@ -191,12 +191,12 @@ pub(crate) fn moved<'m, 'd>(element: Element<'m, 'd>) -> Option<Vec<&'m Entity<'
     Some(moved)
 }
 
-/// The action or element that a position belongs to: what is around its `Position`.
+/// Returns the action or element that a position belongs to: the parent of its `Position`.
 pub(crate) fn owner<'m, 'd>(kind: Element<'m, 'd>) -> Option<Element<'m, 'd>> {
     kind.parent()?.parent()
 }
 
-/// Ids and names in the order in which people look for them: numbers by their value, before words.
+/// Sorts ids and names: numbers by value, then words.
 pub(crate) fn sorted<'i>(ids: impl Iterator<Item = &'i str>) -> Vec<&'i str> {
     let key = |id: &&str| {
         id.parse::<i64>()
@@ -208,7 +208,7 @@ pub(crate) fn sorted<'i>(ids: impl Iterator<Item = &'i str>) -> Vec<&'i str> {
     ids
 }
 
-/// Some ids for a text: the first few, and how many more there are.
+/// Lists the first few ids for a message, and the number of the others.
 pub(crate) fn listed<'i>(ids: impl Iterator<Item = &'i str>) -> String {
     const MOST: usize = 8;
     let mut text = String::new();
@@ -231,7 +231,8 @@ pub(crate) fn listed<'i>(ids: impl Iterator<Item = &'i str>) -> String {
     text
 }
 
-/// A value for a text; where a parameter or an expression led to it, what is written, too.
+/// Formats a value for a message. If it comes from a parameter or an expression, the written text
+/// is added.
 pub(crate) fn shown(element: Element<'_, '_>, attribute: &str, value: &str) -> String {
     match element.written(attribute) {
         Some(written) if written.contains('$') => format!("{value} (`{written}`)"),
@@ -239,7 +240,7 @@ pub(crate) fn shown(element: Element<'_, '_>, attribute: &str, value: &str) -> S
     }
 }
 
-/// A length or a coordinate for a text: millimetres are enough.
+/// Formats a length or a coordinate in metres for a message, rounded to millimetres.
 pub(crate) fn metres(value: f64) -> String {
     let rounded = (value * 1000.0).round() / 1000.0;
     format!("{} m", if rounded == 0.0 { 0.0 } else { rounded })

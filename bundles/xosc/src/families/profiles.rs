@@ -1,28 +1,28 @@
-//! What a simulator does not have. Such rules run only where they are asked for.
+//! Features that a simulator does not support. These rules run only on request.
 
 use qcbus_openscenario::{Element, Scenario};
 use qcbus_sdk::{Place, Sink};
 
-/// What becomes of something that a simulator does not have.
+/// Reaction of a simulator to a feature that it does not support.
 #[derive(Clone, Copy)]
 pub(crate) enum Fate {
-    /// It refuses the scenario or ends the run.
+    /// The simulator refuses the scenario or ends the run.
     Stops,
-    /// It goes on as if it were not there.
+    /// The simulator ignores the feature.
     Ignores,
 }
 
-/// An element that a simulator does not have, or only with this attribute (and this word).
+/// An element that a simulator does not support. It may be limited to an attribute and its word.
 pub(crate) struct Gap {
     /// The element.
     pub(crate) element: &'static str,
-    /// The attribute, where the element alone is no gap.
+    /// The attribute, if the gap is only with this attribute.
     pub(crate) attribute: Option<(&'static str, Option<&'static str>)>,
-    /// What the simulator does.
+    /// Reaction of the simulator.
     pub(crate) fate: Fate,
 }
 
-/// An element that is no use at all.
+/// Creates a gap for an element that is not supported at all.
 pub(crate) const fn gap(element: &'static str, fate: Fate) -> Gap {
     Gap {
         element,
@@ -32,7 +32,7 @@ pub(crate) const fn gap(element: &'static str, fate: Fate) -> Gap {
 }
 
 impl Gap {
-    /// Only where this attribute is there.
+    /// Limits the gap to elements with this attribute.
     pub(crate) const fn with(self, attribute: &'static str) -> Gap {
         Gap {
             attribute: Some((attribute, None)),
@@ -40,7 +40,7 @@ impl Gap {
         }
     }
 
-    /// Only where this attribute says this.
+    /// Limits the gap to elements with this value of the attribute.
     pub(crate) const fn saying(self, attribute: &'static str, word: &'static str) -> Gap {
         Gap {
             attribute: Some((attribute, Some(word))),
@@ -74,7 +74,8 @@ impl Gap {
     }
 }
 
-/// Says the gaps that a scenario runs into: the first place of each kind, and how many more there are.
+/// Reports the gaps that a scenario uses. Each kind is reported at its first place, with the number
+/// of further places.
 pub(crate) fn report(scenario: &Scenario<'_>, simulator: &str, gaps: &[Gap], found: &mut Sink<'_>) {
     for gap in gaps {
         let elements = scenario.elements(gap.element);

@@ -1,4 +1,4 @@
-//! References by name: what names whom, and what to say when nobody bears the name.
+//! References by name: their targets, and the messages for unresolved names.
 
 use foldhash::HashSet;
 use qcbus_openscenario::{Element, Scenario};
@@ -7,7 +7,7 @@ use qcbus_sdk::Sink;
 use super::positions::{listed, sorted};
 use crate::model::About;
 
-/// Attributes that name one entity, after the standard's table of entity type constraints.
+/// Attributes that name one entity, by the standard's table of entity type constraints.
 pub(crate) const SINGLE_ENTITY: &[(&str, &str)] = &[
     ("CentralObject", "entityRef"),
     ("FromCurrentEntity", "entityRef"),
@@ -37,16 +37,16 @@ const ANY_ENTITY: &[(&str, &str)] = &[
     ("SpeedProfileAction", "entityRef"),
 ];
 
-/// All attributes that name entities.
+/// Returns all attributes that name entities.
 pub(crate) fn entity_references() -> impl Iterator<Item = (&'static str, &'static str)> {
     ANY_ENTITY.iter().chain(SINGLE_ENTITY).copied()
 }
 
-/// Findings of one rule that come with a hint.
+/// Maximum number of findings with a hint per rule.
 const MOST_HINTS: u64 = 100;
 
-/// Says that a reference leads nowhere: `what` is the kind of thing that it names, `names` are those
-/// that there are.
+/// Reports an unresolved reference. `what` is the kind of its target, and `names` are the existing
+/// names.
 pub(crate) fn unresolved<'n>(
     reference: Element<'_, '_>,
     attribute: &str,
@@ -55,7 +55,7 @@ pub(crate) fn unresolved<'n>(
     names: impl Iterator<Item = &'n str>,
     found: &mut Sink<'_>,
 ) {
-    // A hint looks at all names; whoever has so many faults has another problem than a slip.
+    // A hint compares all names. With so many faults the cause is probably not a typo.
     let hint = if found.count() < MOST_HINTS {
         hint_or_all(name, names)
     } else {
@@ -69,7 +69,8 @@ pub(crate) fn unresolved<'n>(
     found.about(reference, attribute, text);
 }
 
-/// The name in backticks; where a parameter or an expression led to it, what is written, too.
+/// Formats the name in backticks. If it comes from a parameter or an expression, the written text
+/// is added.
 pub(crate) fn quoted(element: Element<'_, '_>, attribute: &str, value: &str) -> String {
     match element.written(attribute) {
         Some(written) if written != value => format!("`{value}` (`{written}`)"),
@@ -77,7 +78,7 @@ pub(crate) fn quoted(element: Element<'_, '_>, attribute: &str, value: &str) -> 
     }
 }
 
-/// What may have been meant: a name that differs by white space, case or a letter or two.
+/// Suggests a name that differs by white space, case or one or two letters.
 pub(crate) fn hint<'n>(name: &str, names: impl Iterator<Item = &'n str>) -> String {
     match near(name, names) {
         Some(near) if plain(near) == plain(name) => {
@@ -88,12 +89,12 @@ pub(crate) fn hint<'n>(name: &str, names: impl Iterator<Item = &'n str>) -> Stri
     }
 }
 
-/// A name without what is easily overlooked.
+/// Normalises a name: removes white space and case.
 fn plain(name: &str) -> String {
     name.split_whitespace().collect::<String>().to_lowercase()
 }
 
-/// What may have been meant, or else what there is: some of it.
+/// Suggests a similar name. If there is none, lists some of the existing names.
 pub(crate) fn hint_or_all<'n>(name: &str, names: impl Iterator<Item = &'n str>) -> String {
     let names: Vec<&str> = names.filter(|name| !name.is_empty()).collect();
     let hint = hint(name, names.iter().copied());
@@ -108,7 +109,7 @@ pub(crate) fn hint_or_all<'n>(name: &str, names: impl Iterator<Item = &'n str>) 
     }
 }
 
-/// The name that is probably meant by another.
+/// Returns the name that is probably meant by a misspelt one.
 fn near<'n>(name: &str, names: impl Iterator<Item = &'n str>) -> Option<&'n str> {
     let names: Vec<&str> = names.collect();
     if names.is_empty() {
@@ -119,13 +120,13 @@ fn near<'n>(name: &str, names: impl Iterator<Item = &'n str>) -> Option<&'n str>
     spaced.or_else(|| qcbus_openscenario::closest(name, names.iter().copied()))
 }
 
-/// Names that are referred to and lead nowhere, which is said. What they were probably meant to name is
-/// not said to be unused as well.
+/// Names of reported references without a target. A declaration that such a name probably means is
+/// not also reported as unused.
 #[derive(Default)]
 pub(crate) struct Dangling(HashSet<String>);
 
 impl Dangling {
-    /// Adds a name. There is an end to it where thousands of names meet thousands of faults.
+    /// Adds a name. The size is limited, because thousands of names may meet thousands of faults.
     pub(crate) fn add(&mut self, name: &str) {
         const MOST: usize = 100;
         if self.0.len() < MOST && !self.0.contains(name) {
@@ -133,14 +134,14 @@ impl Dangling {
         }
     }
 
-    /// Whether one of them is probably this name misspelt.
+    /// Checks whether one of them is probably this name misspelt.
     pub(crate) fn may_mean(&self, name: &str) -> bool {
         let mut all = self.0.iter();
         all.any(|one| near(one, std::iter::once(name)).is_some())
     }
 }
 
-/// The names of entities that there are not.
+/// Returns the referenced names of entities that do not exist.
 pub(crate) fn dangling_entities(scenario: &Scenario<'_>) -> Dangling {
     let mut dangling = Dangling::default();
     for (element, attribute) in entity_references() {

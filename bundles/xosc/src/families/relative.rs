@@ -1,4 +1,5 @@
-//! Positions beside another on the same road: what lane, what station, and whether there is road enough.
+//! Positions relative to another on the same road: the lane, the station, and the remaining length
+//! of road.
 
 use foldhash::{HashMap, HashMapExt as _};
 use qcbus_opendrive::{ContactPoint, Road, RoadEnd, RoadMap};
@@ -6,8 +7,8 @@ use qcbus_openscenario::Element;
 
 use crate::families::origins::OnRoad;
 
-/// The lanes that a `RelativeLanePosition` may mean: whether the center lane counts is understood in two
-/// ways, and so is which way is left of who looks against the road.
+/// Returns the lanes that a `RelativeLanePosition` may mean. Tools disagree on whether the center
+/// lane counts. Against the road they also disagree on which side is left.
 pub(crate) fn lanes(position: Element<'_, '_>, on: OnRoad<'_, '_>) -> Option<Vec<i64>> {
     let from = on.lane.filter(|lane| *lane != 0)?;
     let by = position.integer("dLane")?;
@@ -27,23 +28,23 @@ pub(crate) fn lanes(position: Element<'_, '_>, on: OnRoad<'_, '_>) -> Option<Vec
     Some(lanes)
 }
 
-/// How far along the road a position may be: against the road it is understood in two ways.
+/// Returns the possible distances along the road. Against the road there are two interpretations.
 pub(crate) fn ways(position: Element<'_, '_>, on: OnRoad<'_, '_>) -> Option<Vec<f64>> {
     let ds = position.number("ds")?;
     let is_plain = on.along || ds == 0.0 || position.is("RelativeRoadPosition");
     Some(if is_plain { vec![ds] } else { vec![ds, -ds] })
 }
 
-/// How far one gets on a map from the ends of its roads.
+/// Maximum distances that can be driven on a map from the ends of its roads.
 pub(crate) struct Reach<'m, 'd> {
     map: &'m RoadMap<'d>,
-    /// The longest way on through a road that is entered at an end; `None` where there is no end to it,
-    /// or it is not known.
+    /// The longest path beyond each end of a road. `None` if it is endless or unknown.
     longest: HashMap<RoadEnd, Option<f64>>,
 }
 
 impl<'m, 'd> Reach<'m, 'd> {
-    /// `None` where roads are left midway.
+    /// Creates the reach. Returns `None` if the map has virtual junctions, where a road can be left
+    /// midway.
     pub(crate) fn of(map: &'m RoadMap<'d>) -> Option<Reach<'m, 'd>> {
         let is_virtual = |kind: Option<&str>| kind == Some("virtual");
         let mut junctions = map.junctions().iter();
@@ -56,7 +57,7 @@ impl<'m, 'd> Reach<'m, 'd> {
         })
     }
 
-    /// How far one gets at most from a station, along the road or against it.
+    /// Returns the maximum distance from a station, along the road or against it.
     pub(crate) fn from(&mut self, road: &Road<'d>, s: f64, along: bool) -> Option<f64> {
         let (end, rest) = if along {
             (ContactPoint::End, road.length()? - s)
@@ -66,9 +67,9 @@ impl<'m, 'd> Reach<'m, 'd> {
         Some(rest + self.beyond(road, end)?)
     }
 
-    /// How far one gets beyond an end of a road.
+    /// Returns the maximum distance beyond an end of a road.
     fn beyond(&mut self, road: &Road<'d>, end: ContactPoint) -> Option<f64> {
-        // Ends that are left, and what is still to be looked at beyond each.
+        // Path of ends that are passed, with the ends that are still to be visited beyond each.
         let start = RoadEnd {
             road: road.index(),
             end,
@@ -111,7 +112,8 @@ impl<'m, 'd> Reach<'m, 'd> {
         }
     }
 
-    /// The ends of other roads that an end touches; `None` where a link leads nobody knows where.
+    /// Returns the ends of other roads that touch an end. Returns `None` if a link cannot be
+    /// resolved.
     fn next(&self, end: RoadEnd) -> Option<Vec<RoadEnd>> {
         let road = self.map.road_at(end.road)?;
         let next = self.map.neighbours(road, end.end);

@@ -1,8 +1,8 @@
-//! What only makes sense with a road network.
+//! Elements that need a road network.
 
 use qcbus_openscenario::{Element, Scenario};
 
-/// Elements that rest on roads, lanes or the map's datum, and those that rest on its signals.
+/// Elements that depend on roads, lanes or the map's datum.
 pub(crate) const ON_ROADS: &[&str] = &[
     "RoadPosition",
     "LanePosition",
@@ -11,7 +11,7 @@ pub(crate) const ON_ROADS: &[&str] = &[
     "EndOfRoadCondition",
     "OffroadCondition",
 ];
-/// Elements that rest on traffic signals.
+/// Elements that depend on traffic signals.
 pub(crate) const ON_SIGNALS: &[&str] = &[
     "TrafficSignalController",
     "TrafficSignalAction",
@@ -19,7 +19,7 @@ pub(crate) const ON_SIGNALS: &[&str] = &[
     "TrafficSignalControllerCondition",
 ];
 
-/// The first element of each kind, and how many there are.
+/// Returns the first element of each kind, and the number of elements.
 pub(crate) fn used<'m, 'd>(
     scenario: &'m Scenario<'d>,
     names: &[&'static str],

@@ -5,7 +5,7 @@ use qcbus_openscenario::{Element, EntityKind, Scenario, Stop};
 
 use crate::families::positions::{lane_of, moved, road_of, station};
 
-/// The positions of a route's waypoints: what is within their `Position`.
+/// Returns the waypoints of a route and the positions in their `Position`.
 pub(crate) fn waypoints<'m, 'd>(
     route: Element<'m, 'd>,
 ) -> impl Iterator<Item = (Element<'m, 'd>, Option<Element<'m, 'd>>)> {
@@ -18,12 +18,12 @@ pub(crate) fn waypoints<'m, 'd>(
     })
 }
 
-/// All routes, in the document and in catalogs.
+/// Returns all routes, in the document and in catalogs.
 pub(crate) fn routes<'m, 'd>(scenario: &'m Scenario<'d>) -> impl Iterator<Item = Element<'m, 'd>> {
     scenario.elements_everywhere("Route")
 }
 
-/// Whether all who take a route are known to be vehicles.
+/// Checks whether all entities on a route are known to be vehicles.
 pub(crate) fn is_for_vehicles(route: Element<'_, '_>) -> bool {
     moved(route).is_some_and(|entities| {
         !entities.is_empty()
@@ -33,7 +33,7 @@ pub(crate) fn is_for_vehicles(route: Element<'_, '_>) -> bool {
     })
 }
 
-/// Where a waypoint is on the map.
+/// Returns the stop of a waypoint on the map.
 pub(crate) fn stop(position: Element<'_, '_>, map: &RoadMap<'_>) -> Option<Stop> {
     let road = road_of(position, map)?;
     if position.is("LanePosition") {

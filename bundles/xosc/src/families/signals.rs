@@ -1,4 +1,4 @@
-//! Traffic signals and the controllers that switch them.
+//! Traffic signals and their controllers.
 
 use std::borrow::Cow;
 
@@ -11,7 +11,7 @@ use crate::families::positions::listed;
 use crate::families::references::{self, quoted};
 use crate::model::About as _;
 
-/// Says which elements of a name refer to signals that the map does not have.
+/// Reports elements of a name that refer to signals that the map does not have.
 pub(crate) fn missing_signals(
     scenario: &Scenario<'_>,
     element: &str,
@@ -58,9 +58,9 @@ fn missing_on(
     }
 }
 
-/// What may have been meant by an id that no signal bears.
+/// Signals of the map, for suggestions on an unknown id.
 struct Known<'r> {
-    /// Ids by names.
+    /// Ids by name.
     by_name: HashMap<&'r str, &'r str>,
     ids: String,
 }
@@ -95,9 +95,9 @@ impl<'r> Known<'r> {
     }
 }
 
-/// The controllers of the scenario by name, the first of each.
+/// The controllers of the scenario by name, the first of each name.
 pub(crate) struct Controllers<'m, 'd> {
-    /// In document order.
+    /// Controllers in document order.
     pub(crate) all: Vec<Element<'m, 'd>>,
     names: Vec<String>,
     by_name: HashMap<String, usize>,
@@ -132,7 +132,7 @@ impl<'m, 'd> Controllers<'m, 'd> {
         }
     }
 
-    /// The place of a controller in `all`.
+    /// Returns the index of a controller in `all`.
     pub(crate) fn find(&self, name: &str) -> Option<usize> {
         self.by_name.get(name).copied()
     }
@@ -141,7 +141,7 @@ impl<'m, 'd> Controllers<'m, 'd> {
         self.names.iter().map(String::as_str)
     }
 
-    /// Says that an attribute names a controller that is not there.
+    /// Reports an attribute that names a missing controller.
     pub(crate) fn resolve(
         &self,
         reference: Element<'_, '_>,
@@ -165,8 +165,8 @@ impl<'m, 'd> Controllers<'m, 'd> {
     }
 }
 
-/// Says which elements of a name refer to phases that their controller does not have. A controller
-/// that is not there is said by the rule about those.
+/// Reports elements of a name that refer to phases that their controller does not have. Another
+/// rule reports missing controllers.
 pub(crate) fn missing_phases(scenario: &Scenario<'_>, element: &str, found: &mut Sink<'_>) {
     let controllers = Controllers::of(scenario);
     let phases: Vec<_> = controllers.all.iter().map(|one| Phases::of(*one)).collect();
@@ -198,7 +198,7 @@ pub(crate) fn missing_phases(scenario: &Scenario<'_>, element: &str, found: &mut
 /// The phases of a controller.
 struct Phases<'d> {
     names: HashSet<Cow<'d, str>>,
-    /// For a text.
+    /// Names of the phases for a message.
     listed: String,
     /// Whether all names are known.
     complete: bool,

@@ -1,4 +1,4 @@
-//! Who stands in whom at the beginning.
+//! Entities that overlap at the start.
 
 use std::collections::BTreeMap;
 
@@ -9,14 +9,14 @@ use qcbus_openscenario::{Element, EntityKind, Scenario};
 use crate::families::origins::{Origins, or};
 use crate::families::placement::{self, Start};
 
-/// A vehicle or pedestrian where `Init` places it at last.
+/// A vehicle or pedestrian at the last place that `Init` gives it.
 pub(crate) struct Body<'m, 'd> {
     pub(crate) name: String,
     pub(crate) position: Element<'m, 'd>,
     place: Standing,
     /// Half the length and half the width.
     half: (f64, f64),
-    /// From the reference point to the middle of the box.
+    /// Vector from the reference point to the center of the box.
     center: (f64, f64),
     height: f64,
 }
@@ -28,7 +28,8 @@ enum Standing {
         z: Option<f64>,
         h: f64,
     },
-    /// `s`, and how far from the middle of the lane; `None` for an angle to the lane.
+    /// `s` and the offset from the middle of the lane. `along` is `None` if the body is at an angle
+    /// to the lane.
     Lane {
         key: (String, String),
         s: f64,
@@ -37,8 +38,9 @@ enum Standing {
     },
 }
 
-/// The bodies whose boxes and places are known, in document order. Trailers stand where their vehicle
-/// is; who is added later may come when the place is free.
+/// Returns the bodies with known boxes and places, in document order. Trailers are left out because
+/// they stand at their vehicle. Entities that are added later are left out because the place may be
+/// free then.
 pub(crate) fn bodies<'m, 'd>(scenario: &'m Scenario<'d>) -> Vec<Body<'m, 'd>> {
     let on_map = scenario.on_map(|map| bodies_on(scenario, Some(map)));
     on_map.unwrap_or_else(|| bodies_on(scenario, None))
@@ -57,7 +59,8 @@ fn bodies_on<'m, 'd>(scenario: &'m Scenario<'d>, map: Option<&RoadMap<'_>>) -> V
     for (at, start) in origins.starts.iter().enumerate() {
         let apart = !trailers.contains(&start.name) && !added.contains(&start.name);
         if apart && last.get(&start.name) == Some(&at) {
-            // On a map all are compared in the world, which roads in a junction share.
+            // On a map all places are compared in world coordinates, because roads overlap in a
+            // junction.
             let standing = match origins.place(at) {
                 Some(place) => Some(Standing::World {
                     x: place.x,
@@ -124,12 +127,12 @@ fn place(position: Element<'_, '_>) -> Option<Standing> {
     }
 }
 
-/// Each body that reaches into an earlier one, with that one.
+/// Returns each body that overlaps an earlier one, with that one.
 pub(crate) fn overlapping<'b, 'm, 'd>(
     bodies: &'b [Body<'m, 'd>],
     tolerance: f64,
 ) -> Vec<(&'b Body<'m, 'd>, &'b Body<'m, 'd>)> {
-    // By lane; in the world there is one.
+    // Groups the bodies by lane. World coordinates form one group.
     let mut lanes: BTreeMap<Option<&(String, String)>, Vec<Reach>> = BTreeMap::new();
     for (at, body) in bodies.iter().enumerate() {
         let reach = body.half.0.hypot(body.half.1) + body.center.0.hypot(body.center.1);
@@ -155,13 +158,14 @@ pub(crate) fn overlapping<'b, 'm, 'd>(
         .collect()
 }
 
-/// The stretch that a body may touch, and the body's place in the list.
+/// The range that a body may touch, and the index of the body.
 type Reach = (f64, f64, usize);
 
-/// So many neighbours of one body are looked at: more only stand in one heap, and that is said.
+/// Maximum number of neighbours that are compared per body. More can only occur in one pile, which
+/// is reported anyway.
 const MOST: usize = 500;
 
-/// Compares those whose reaches share a stretch, from left to right.
+/// Compares the bodies with overlapping ranges, in ascending order.
 fn sweep(
     bodies: &[Body<'_, '_>],
     group: &[Reach],
@@ -217,7 +221,7 @@ fn overlap(one: &Body<'_, '_>, other: &Body<'_, '_>, tolerance: f64) -> bool {
             let (Some(at), Some(other_at)) =
                 (middle(*s, along, one), middle(*other_s, other_along, other))
             else {
-                // Whichever way they look: the same point is the same place.
+                // The angle does not matter: the same point is the same place.
                 return (s - other_s).abs() < tolerance
                     && (offset - other_offset).abs() < tolerance;
             };
@@ -229,8 +233,8 @@ fn overlap(one: &Body<'_, '_>, other: &Body<'_, '_>, tolerance: f64) -> bool {
     }
 }
 
-/// Whether two boxes share more than a strip of the tolerance, seen from above: there is no side of
-/// one of them beside which the other lies.
+/// Checks whether two boxes overlap by more than the tolerance, seen from above. They do so if no
+/// side of either box separates them.
 fn boxes_overlap(one: &Body<'_, '_>, other: &Body<'_, '_>, tolerance: f64) -> bool {
     let (Some(a), Some(b)) = (corners(one), corners(other)) else {
         return false;

@@ -1,4 +1,4 @@
-//! Conditions about the state of storyboard elements: who waits for whom.
+//! Conditions about the state of storyboard elements, and the waits between elements.
 
 use std::borrow::Cow;
 
@@ -17,11 +17,11 @@ pub(crate) struct StateCondition<'m, 'd> {
     pub(crate) state: Cow<'d, str>,
 }
 
-/// The conditions about states in the groups of a trigger.
+/// Conditions about states, by the groups of a trigger.
 pub(crate) type StateGroups<'m, 'd> = Vec<Vec<StateCondition<'m, 'd>>>;
 
-/// Each element with a start trigger of its own: acts and events, and of each group the conditions about
-/// states of known elements. Conditions about anything else are left out.
+/// Returns each act and event with its own start trigger. Each group has its conditions about
+/// states of known elements. Other conditions are left out.
 pub(crate) fn own_triggers<'m, 'd>(
     scenario: &'m Scenario<'d>,
 ) -> impl Iterator<Item = (&'m StoryElement<'d>, StateGroups<'m, 'd>)> {
@@ -39,7 +39,7 @@ pub(crate) fn own_triggers<'m, 'd>(
 
 fn state<'m, 'd>(condition: Element<'m, 'd>) -> Option<StateCondition<'m, 'd>> {
     let element = condition.path(&["ByValueCondition", "StoryboardElementStateCondition"])?;
-    // The end of a state may come at any time.
+    // A state may end at any time, so other edges are left out.
     let edge = condition.word("conditionEdge")?;
     if !matches!(&*edge, "none" | "rising") {
         return None;
@@ -56,7 +56,8 @@ fn state<'m, 'd>(condition: Element<'m, 'd>) -> Option<StateCondition<'m, 'd>> {
             target: target.element(scenario),
             state,
         }),
-        // None is said elsewhere; of several, nobody knows which is meant.
+        // A missing target is reported elsewhere. If there are several, the intended one is
+        // unknown.
         _ => None,
     }
 }
@@ -64,7 +65,7 @@ fn state<'m, 'd>(condition: Element<'m, 'd>) -> Option<StateCondition<'m, 'd>> {
 /// Elements of the storyboard that wait for each other.
 pub(crate) struct Waiting<'m, 'd> {
     elements: &'m [StoryElement<'d>],
-    /// Per element: whether it has a trigger, and the groups of it.
+    /// Condition groups of each element's trigger. An element without any has no entry.
     triggers: HashMap<usize, Vec<Vec<Wait<'m, 'd>>>>,
     starts: Vec<bool>,
 }
@@ -74,13 +75,13 @@ pub(crate) struct Waiting<'m, 'd> {
 pub(crate) struct Wait<'m, 'd> {
     /// The `StoryboardElementStateCondition`.
     pub(crate) condition: Element<'m, 'd>,
-    /// The place of the element that must have started.
+    /// Index of the element that must have started.
     pub(crate) on: usize,
 }
 
 impl<'m, 'd> Waiting<'m, 'd> {
-    /// Finds out what can start: an element can when the one around it can and one group of its trigger
-    /// waits for nothing that cannot. What is not known is taken for true.
+    /// Determines which elements can start. The parent must be able to start. One group of the
+    /// trigger must wait only for elements that can. Unknown conditions count as true.
     pub(crate) fn of(scenario: &'m Scenario<'d>) -> Waiting<'m, 'd> {
         let elements = scenario.storyboard().elements();
         let mut waiting = Waiting {
@@ -94,7 +95,7 @@ impl<'m, 'd> Waiting<'m, 'd> {
             let Some(trigger) = element.child("StartTrigger") else {
                 continue;
             };
-            // An empty trigger is another rule's; here it holds nobody up.
+            // Another rule reports an empty trigger. Here it delays no element.
             let mut own: Vec<Vec<Wait<'m, 'd>>> = Vec::new();
             for group in groups(trigger) {
                 let states = group.into_iter().filter_map(state);
@@ -109,7 +110,8 @@ impl<'m, 'd> Waiting<'m, 'd> {
         waiting
     }
 
-    /// What must have started for a condition of the element at `owner` to become true.
+    /// Returns the element that must start before a condition of the element at `owner` can be
+    /// true.
     fn wait(
         &self,
         scenario: &'m Scenario<'d>,
@@ -129,7 +131,7 @@ impl<'m, 'd> Waiting<'m, 'd> {
         let on = match &*condition.state {
             "runningState" | "startTransition" | "endTransition" => target,
             "standbyState" | "skipTransition" => self.parent(target)?,
-            // What never started is complete, too, once the act around it is stopped.
+            // An element that never started is also complete once the act around it is stopped.
             "completeState" | "stopTransition" => {
                 let around = std::iter::successors(Some(target), |place| self.parent(*place));
                 let stopped = |place: &usize| {
@@ -151,7 +153,7 @@ impl<'m, 'd> Waiting<'m, 'd> {
         self.elements.get(place)?.parent()
     }
 
-    /// Lets everything start that can, until nothing more does.
+    /// Starts every element that can start, until no more can.
     fn settle(&mut self) {
         let mut children: Vec<Vec<usize>> = vec![Vec::new(); self.elements.len()];
         let mut waiters: Vec<Vec<usize>> = vec![Vec::new(); self.elements.len()];
@@ -196,8 +198,8 @@ impl<'m, 'd> Waiting<'m, 'd> {
                 .is_none_or(|groups| groups.iter().any(free))
     }
 
-    /// The elements that hold each other up, cycle by cycle: each with the condition by which it waits
-    /// for the next. What only waits for such elements is not among them.
+    /// Returns the elements that wait for each other, cycle by cycle. Each comes with the condition
+    /// by which it waits for the next. Elements that only wait for such a cycle are left out.
     pub(crate) fn cycles(&self) -> Vec<Vec<(usize, Element<'m, 'd>)>> {
         let mut seen: Vec<usize> = vec![0; self.elements.len()];
         let mut cycles = Vec::new();
@@ -223,8 +225,8 @@ impl<'m, 'd> Waiting<'m, 'd> {
         cycles
     }
 
-    /// The outermost element around `place` that its own trigger holds up, with the first condition that
-    /// does, and what that waits for.
+    /// Returns the outermost element at or around `place` that its own trigger blocks. It comes
+    /// with the first blocking condition and the element that this condition waits for.
     fn held(&self, place: usize) -> Option<(usize, Element<'m, 'd>, usize)> {
         if self.started(place) {
             return None;
@@ -245,7 +247,7 @@ impl<'m, 'd> Waiting<'m, 'd> {
     }
 }
 
-/// Places of the storyboard's elements by the offset of their node.
+/// Returns the indices of the storyboard's elements by the offset of their node.
 fn places(scenario: &Scenario<'_>) -> HashMap<u64, Vec<usize>> {
     let mut places: HashMap<u64, Vec<usize>> = HashMap::new();
     for (place, one) in scenario.storyboard().elements().iter().enumerate() {

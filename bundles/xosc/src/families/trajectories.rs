@@ -1,21 +1,21 @@
-//! Trajectories: who follows them, and which times and places they are made of.
+//! Trajectories: the entities that follow them, and their times and places.
 
 use qcbus_openscenario::Element;
 
 use crate::families::positions::Spot;
 
-/// Whether whoever follows a trajectory keeps to its times.
+/// Whether the follower of a trajectory uses its times.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Timing<'m, 'd> {
-    /// Yes, says this element.
+    /// Yes. This element requests it.
     Asked(Element<'m, 'd>),
-    /// No: its times mean nothing.
+    /// No. The times have no effect.
     Ignored,
-    /// Nobody follows it here: it is an entry of a catalog that is checked itself.
+    /// No follower exists here: it is a catalog entry that is checked by itself.
     Unknown,
 }
 
-/// Whether the times of a trajectory are used.
+/// Checks whether the times of a trajectory are used.
 pub(crate) fn timing_of<'m, 'd>(trajectory: Element<'m, 'd>) -> Timing<'m, 'd> {
     match follower(trajectory) {
         Some(action) => {
@@ -31,7 +31,7 @@ pub(crate) fn timing_of<'m, 'd>(trajectory: Element<'m, 'd>) -> Timing<'m, 'd> {
     }
 }
 
-/// The action by which a trajectory is followed.
+/// Returns the action that follows a trajectory.
 pub(crate) fn follower<'m, 'd>(trajectory: Element<'m, 'd>) -> Option<Element<'m, 'd>> {
     let around = trajectory.parent()?;
     let around = if around.is("TrajectoryRef") {
@@ -42,20 +42,20 @@ pub(crate) fn follower<'m, 'd>(trajectory: Element<'m, 'd>) -> Option<Element<'m
     around.is("FollowTrajectoryAction").then_some(around)
 }
 
-/// The trajectory that an action follows, wherever it is written.
+/// Returns the trajectory that an action follows, wherever it is written.
 pub(crate) fn followed<'m, 'd>(action: Element<'m, 'd>) -> Option<Element<'m, 'd>> {
     let within = action.child("TrajectoryRef");
     let found = within.and_then(|reference| reference.child_or_entry(&["Trajectory"]));
     found.or_else(|| action.child_or_entry(&["Trajectory"]))
 }
 
-/// The shape of a trajectory.
+/// Returns the shape of a trajectory.
 pub(crate) fn shape<'m, 'd>(trajectory: Element<'m, 'd>) -> Option<Element<'m, 'd>> {
     let mut shapes = trajectory.child("Shape")?.children();
     shapes.find(|shape| ["Polyline", "Clothoid", "ClothoidSpline", "Nurbs"].contains(&shape.name()))
 }
 
-/// A place of a shape where a time belongs.
+/// A point of a shape that may have a time.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TimedPoint<'m, 'd> {
     pub(crate) element: Element<'m, 'd>,
@@ -67,13 +67,13 @@ impl<'m, 'd> TimedPoint<'m, 'd> {
         self.element.number(self.attribute)
     }
 
-    /// Where the moving object is then, if a position says so.
+    /// Returns the place of the moving object at this time, if a position gives it.
     pub(crate) fn spot(self) -> Option<Spot<'d>> {
         Spot::of(self.element.child("Position")?)
     }
 }
 
-/// The places of a shape where times belong, in the order in which they are passed.
+/// Returns the points of a shape that may have a time, in the order of travel.
 pub(crate) fn timed_points<'m, 'd>(shape: Element<'m, 'd>) -> Vec<TimedPoint<'m, 'd>> {
     let of = |element, attribute| TimedPoint { element, attribute };
     match shape.name() {
@@ -95,7 +95,7 @@ pub(crate) fn timed_points<'m, 'd>(shape: Element<'m, 'd>) -> Vec<TimedPoint<'m,
     }
 }
 
-/// The name of a trajectory for a text.
+/// Formats the name of a trajectory for a message.
 pub(crate) fn named(trajectory: Element<'_, '_>) -> String {
     match trajectory.text("name") {
         Some(name) => format!("trajectory `{name}`"),
@@ -103,7 +103,7 @@ pub(crate) fn named(trajectory: Element<'_, '_>) -> String {
     }
 }
 
-/// How long a shape is, at most.
+/// Returns the maximum length of a shape.
 pub(crate) fn longest(trajectory: Element<'_, '_>) -> Option<f64> {
     let shape = shape(trajectory)?;
     match shape.name() {
@@ -112,8 +112,8 @@ pub(crate) fn longest(trajectory: Element<'_, '_>) -> Option<f64> {
             let segments = shape.children_named("ClothoidSplineSegment");
             segments.map(|segment| segment.number("length")).sum()
         }
-        // Chords are the length of a polyline unless something rounds its corners (1.4), and no
-        // curve of control points is longer than the line through them.
+        // The chords are the length of a polyline unless its corners are rounded (1.4). A curve of
+        // control points is never longer than the line through them.
         "Polyline" | "Nurbs" if shape.child("Interpolation").is_none() => {
             chords(shape, trajectory.flag("closed")?)
         }

@@ -1,4 +1,4 @@
-//! Triggers: what starts and what stops, and when at the earliest.
+//! Triggers: start and stop conditions, and their earliest time.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -11,7 +11,7 @@ use qcbus_sdk::Sink;
 
 use crate::model::About;
 
-/// Says which elements of a name that matter have a `StartTrigger` without any condition.
+/// Reports the elements of a name that matter and have a `StartTrigger` without any condition.
 pub(crate) fn empty_starts<'d>(
     scenario: &Scenario<'d>,
     owner: &str,
@@ -34,7 +34,7 @@ pub(crate) fn empty_starts<'d>(
     }
 }
 
-/// An element with its name, for texts: "the act `Drive`".
+/// Formats an element with its name for messages: "the act `Drive`".
 pub(crate) fn called(element: Element<'_, '_>) -> String {
     let own = format!("`{}`", element.name());
     let kind = match element.name() {
@@ -52,7 +52,7 @@ pub(crate) fn called(element: Element<'_, '_>) -> String {
     }
 }
 
-/// The conditions of a trigger, group by group.
+/// Returns the conditions of a trigger, group by group.
 pub(crate) fn groups<'m, 'd>(
     trigger: Element<'m, 'd>,
 ) -> impl Iterator<Item = Vec<Element<'m, 'd>>> {
@@ -61,13 +61,13 @@ pub(crate) fn groups<'m, 'd>(
         .map(|group| group.children_named("Condition").collect())
 }
 
-/// The `SimulationTimeCondition` of a condition.
+/// Returns the `SimulationTimeCondition` of a condition.
 pub(crate) fn time<'m, 'd>(condition: Element<'m, 'd>) -> Option<Element<'m, 'd>> {
     condition.path(&["ByValueCondition", "SimulationTimeCondition"])
 }
 
-/// The time at which a condition about the simulation time becomes true at the earliest, its delay
-/// included; `None` when it is about something else or not known.
+/// Returns the earliest time at which a condition about the simulation time is true, including its
+/// delay. Returns `None` if the condition is about something else, or the time is unknown.
 pub(crate) fn earliest(condition: Element<'_, '_>) -> Option<f64> {
     let time = time(condition)?;
     let value = time.number("value")?;
@@ -78,7 +78,7 @@ pub(crate) fn earliest(condition: Element<'_, '_>) -> Option<f64> {
     }
 }
 
-/// Whether a condition is true in the first or second step.
+/// Checks whether a condition is true in the first or second step.
 pub(crate) fn holds_at_once(condition: Element<'_, '_>) -> bool {
     let holds = || {
         let time = time(condition)?;
@@ -102,8 +102,8 @@ pub(crate) fn holds_at_once(condition: Element<'_, '_>) -> bool {
     holds().unwrap_or(false)
 }
 
-/// An element with all that matters of it as one text: what has the same text means the same. Names
-/// of conditions say nothing.
+/// Returns an element with all its significant content as one text. Elements with the same text
+/// mean the same. Names of conditions are left out.
 pub(crate) fn canonical(element: Element<'_, '_>) -> String {
     canonical_but(element, &[])
 }
@@ -115,7 +115,8 @@ pub(crate) fn canonical_but(element: Element<'_, '_>, without: &[&str]) -> Strin
     text
 }
 
-/// Conditions are a few levels deep; what lies deeper than this is no condition of the standard.
+/// Maximum depth of an element. Conditions have only a few levels. Anything deeper is no condition
+/// of the standard.
 const DEEPEST: usize = 64;
 
 fn write_canonical(element: Element<'_, '_>, without: &[&str], deep: usize, out: &mut String) {
@@ -143,16 +144,16 @@ fn write_canonical(element: Element<'_, '_>, without: &[&str], deep: usize, out:
     out.push_str("</>");
 }
 
-/// Numbers for triggers, the same one for those that mean the same.
+/// Numbers of triggers. Triggers with the same meaning have the same number.
 #[derive(Default)]
 pub(crate) struct Kinds<'m, 'd> {
-    /// By fingerprint: nearly all triggers differ, and need not be compared as a whole.
+    /// Numbers by fingerprint. Nearly all triggers differ, so few full comparisons are needed.
     by_print: HashMap<u64, Vec<usize>>,
     firsts: Vec<Option<Element<'m, 'd>>>,
 }
 
 impl<'m, 'd> Kinds<'m, 'd> {
-    /// The number of a trigger; what has none is a kind of its own.
+    /// Returns the number of a trigger. A missing trigger has its own number.
     pub(crate) fn of(&mut self, trigger: Option<Element<'m, 'd>>) -> usize {
         let print = trigger.map_or(0, |trigger| fingerprint(trigger, DEEPEST));
         let same = self.by_print.entry(print).or_default();
@@ -170,7 +171,7 @@ impl<'m, 'd> Kinds<'m, 'd> {
     }
 }
 
-/// Equal for whatever is equal by [`canonical`].
+/// Returns a hash that is equal for elements with an equal [`canonical`] text.
 fn fingerprint(element: Element<'_, '_>, deep: usize) -> u64 {
     let hash = foldhash::fast::FixedState::default();
     let Some(deeper) = deep.checked_sub(1) else {
@@ -189,7 +190,7 @@ fn fingerprint(element: Element<'_, '_>, deep: usize) -> u64 {
         })
 }
 
-/// What a value is compared by.
+/// Form of a value for comparisons.
 #[derive(Hash)]
 enum Plain<'d> {
     Number(u64),
@@ -197,7 +198,7 @@ enum Plain<'d> {
 }
 
 fn plain<'d>(element: Element<'_, 'd>, attribute: Attribute<'d>) -> Plain<'d> {
-    // Minus zero is zero.
+    // Minus zero becomes zero.
     let number = |number: f64| Plain::Number((number + 0.0).to_bits());
     let text = match element.reading(attribute) {
         Reading::Literal(text) => Cow::Borrowed(text),
@@ -216,8 +217,8 @@ fn plain<'d>(element: Element<'_, 'd>, attribute: Attribute<'d>) -> Plain<'d> {
     }
 }
 
-/// A value so that equal ones look alike and no other does: numbers by their bits, texts with their
-/// length.
+/// Writes a value so that only equal values have equal texts. Numbers are written by their bits,
+/// texts with their length.
 fn write_value<'d>(element: Element<'_, 'd>, attribute: Attribute<'d>, out: &mut String) {
     let _ = match plain(element, attribute) {
         Plain::Number(bits) => write!(out, "#{bits:x}"),
@@ -225,7 +226,7 @@ fn write_value<'d>(element: Element<'_, 'd>, attribute: Attribute<'d>, out: &mut
     };
 }
 
-/// The events of an act, those of maneuvers in catalogs among them.
+/// Returns the events of an act, including those of maneuvers in catalogs.
 pub(crate) fn events<'m, 'd>(act: Element<'m, 'd>) -> impl Iterator<Item = Element<'m, 'd>> {
     maneuvers(act)
         .filter_map(|child| match child.name() {
@@ -235,7 +236,7 @@ pub(crate) fn events<'m, 'd>(act: Element<'m, 'd>) -> impl Iterator<Item = Eleme
         .flat_map(|maneuver| maneuver.children_named("Event"))
 }
 
-/// The maneuvers of an act, and its references to maneuvers in catalogs.
+/// Returns the maneuvers of an act, and its references to maneuvers in catalogs.
 pub(crate) fn maneuvers<'m, 'd>(act: Element<'m, 'd>) -> impl Iterator<Item = Element<'m, 'd>> {
     act.children_named("ManeuverGroup")
         .flat_map(Element::children)

@@ -1,4 +1,5 @@
-//! Values that cannot be had as they are written: the model lists them once, each rule says its kinds.
+//! Reports of value faults: values that cannot be resolved as written. The model lists them once,
+//! and each rule reports its kinds.
 
 use foldhash::{HashMap, HashMapExt as _};
 use qcbus_document::Attribute;
@@ -10,7 +11,7 @@ use qcbus_sdk::{Finding, Sink};
 
 use crate::model::About as _;
 
-/// Says every fault of these kinds.
+/// Reports every fault of these kinds.
 pub(crate) fn report(scenario: &Scenario<'_>, kinds: &[ValueFaultKind], found: &mut Sink<'_>) {
     for fault in faults(scenario, kinds) {
         say(fault, found);
@@ -18,7 +19,7 @@ pub(crate) fn report(scenario: &Scenario<'_>, kinds: &[ValueFaultKind], found: &
     report_in_entries(scenario, kinds, found);
 }
 
-/// Says every fault of these kinds that entries of catalogs have by what is assigned to them.
+/// Reports every fault of these kinds in catalog entries that is caused by assigned values.
 pub(crate) fn report_in_entries(
     scenario: &Scenario<'_>,
     kinds: &[ValueFaultKind],
@@ -30,17 +31,18 @@ pub(crate) fn report_in_entries(
     }
 }
 
-/// Uses of a parameter that are shown beside its declaration, or beside the first of them.
+/// Maximum number of uses of a parameter that are shown with its declaration, or with the first
+/// use.
 const MOST_USES: usize = 3;
 
-/// Faults that are one: a parameter has a value that its uses do not take.
+/// Faults with one cause: a parameter has a value that its uses do not accept.
 struct Misfit<'m, 'd> {
     declaration: &'m Declaration<'d>,
     uses: Vec<&'m ValueFault<'d>>,
 }
 
-/// Says of the parameters in the document which values do not fit where they are used, each once: at the
-/// declaration where no use of it fits, else at the first use that does not.
+/// Reports parameter values in the document that do not fit their uses, each once. If no use fits,
+/// the report is at the declaration. Otherwise it is at the first use that does not fit.
 pub(crate) fn report_misfits(scenario: &Scenario<'_>, kind: ValueFaultKind, found: &mut Sink<'_>) {
     let mut misfits: Vec<Misfit<'_, '_>> = Vec::new();
     let mut known: HashMap<(u32, &str), usize> = HashMap::new();
@@ -73,7 +75,7 @@ pub(crate) fn report_misfits(scenario: &Scenario<'_>, kind: ValueFaultKind, foun
     }
 }
 
-/// How often each declared parameter is used in the document.
+/// Counts the uses of each declared parameter in the document.
 fn uses_by_declaration(scenario: &Scenario<'_>) -> HashMap<u32, usize> {
     let mut uses = HashMap::new();
     for (attribute, name) in scenario.parameter_uses() {
@@ -114,7 +116,7 @@ impl Misfit<'_, '_> {
         }
     }
 
-    /// How many uses are neither the place itself nor shown beside it.
+    /// Returns a text about the number of uses that are not shown.
     fn unshown(&self, said: usize) -> String {
         match self.uses.len().saturating_sub(said + MOST_USES) {
             0 => String::new(),
@@ -124,8 +126,8 @@ impl Misfit<'_, '_> {
     }
 }
 
-/// The faults of some kinds, without what the schema's checker says as well. A name that leads nowhere
-/// is a fact of its own, however it is written.
+/// Returns the faults of some kinds, without those that the schema checker also reports. Unresolved
+/// names are always included.
 pub(crate) fn faults<'m, 'd>(
     scenario: &'m Scenario<'d>,
     kinds: &[ValueFaultKind],
@@ -139,17 +141,17 @@ pub(crate) fn faults<'m, 'd>(
     faults.filter(move |fault| !fault.said_by_schema || names.contains(&fault.kind))
 }
 
-/// Says one fault.
+/// Reports one fault.
 pub(crate) fn say<'s, 'd>(fault: &ValueFault<'_>, found: &'s mut Sink<'d>) -> Finding<'s, 'd> {
     let text = match fault.kind {
-        // What is written is what is said.
+        // The text already contains the written value.
         ValueFaultKind::Declared => format!("the declared value {}", fault.text),
         _ => format!("{}: {}", written(fault.attribute), fault.text),
     };
     found.issue(fault.attribute, text)
 }
 
-/// The attribute as it is written, for the beginning of a text.
+/// Formats the attribute as it is written, for the start of a message.
 pub(crate) fn written(attribute: Attribute<'_>) -> String {
     format!(
         "`{}=\"{}\"` of `{}`",
@@ -159,7 +161,7 @@ pub(crate) fn written(attribute: Attribute<'_>) -> String {
     )
 }
 
-/// A value, cut where nobody reads on.
+/// Cuts a long value for a message.
 pub(crate) fn short(value: &str) -> String {
     const MOST: usize = 80;
     match value.char_indices().nth(MOST) {
@@ -168,8 +170,8 @@ pub(crate) fn short(value: &str) -> String {
     }
 }
 
-/// The parameter of type string that keeps an expression from having a value, although its text is a
-/// number.
+/// Returns the parameter of type string that keeps an expression from having a value, although its
+/// text is a number.
 pub(crate) fn numeric_text<'d>(scenario: &Scenario<'d>, fault: &ValueFault<'d>) -> Option<&'d str> {
     let behind = fault.attribute.value().get(fault.at..)?.strip_prefix('$')?;
     let name = qcbus_openscenario::identifier(behind);
@@ -182,8 +184,9 @@ pub(crate) fn numeric_text<'d>(scenario: &Scenario<'d>, fault: &ValueFault<'d>) 
     is_number.then_some(name)
 }
 
-/// An attribute that the schema takes for text as a value of its true type: the value, or why it is none
-/// (a sentence fragment); `None` when it is missing or unknown.
+/// Returns the value in its true type of an attribute that the schema declares as text. If it is no
+/// such value, returns the reason as a sentence fragment. Returns `None` if it is missing or
+/// unknown.
 pub(crate) fn typed<'d>(
     element: Element<'_, 'd>,
     name: &str,
@@ -210,7 +213,8 @@ pub(crate) fn typed<'d>(
     Some(value.ok_or_else(wrong))
 }
 
-/// The integer that is written as a double without a fraction, `5.0`: what reads it as a number takes it.
+/// Returns the integer that is written as a double without a fraction, `5.0`. Tools that read it as
+/// a number accept it.
 pub(crate) fn whole<'d>(text: &str, data_type: DataType) -> Option<Value<'d>> {
     data_type.range()?;
     fitting(
@@ -219,7 +223,7 @@ pub(crate) fn whole<'d>(text: &str, data_type: DataType) -> Option<Value<'d>> {
     )
 }
 
-/// A value of a parameter or an expression as one of the type.
+/// Converts a value of a parameter or an expression to the type.
 fn fitting<'d>(value: &Value<'d>, data_type: DataType) -> Option<Value<'d>> {
     match data_type {
         DataType::Double => value.number().map(Value::Double),
@@ -238,14 +242,15 @@ fn fitting<'d>(value: &Value<'d>, data_type: DataType) -> Option<Value<'d>> {
     }
 }
 
-/// Whether a fault of a declared or used value is said by another rule than that about types.
+/// Checks whether another rule than the one about types reports a fault of a declared or used
+/// value.
 pub(crate) fn is_of_other_rule(scenario: &Scenario<'_>, fault: &ValueFault<'_>) -> bool {
     fault.attribute.node().is("VariableDeclaration")
         || is_about_time(fault)
         || is_empty_default(scenario, fault)
 }
 
-/// Whether a date-time is due.
+/// Checks whether a date-time is expected.
 pub(crate) fn is_about_time(fault: &ValueFault<'_>) -> bool {
     let node = fault.attribute.node();
     match fault.attribute.name() {
@@ -257,8 +262,8 @@ pub(crate) fn is_about_time(fault: &ValueFault<'_>) -> bool {
     }
 }
 
-/// Whether the only fault of a date-time is that its zone has no colon: `+0100`, as the standard itself
-/// writes it in places.
+/// Checks whether the only fault of a date-time is a zone without a colon: `+0100`. The standard
+/// itself uses it in some places.
 pub(crate) fn is_basic_zone<'d>(scenario: &Scenario<'d>, fault: &ValueFault<'d>) -> bool {
     let attribute = fault.attribute;
     let name = attribute.value().trim().strip_prefix('$');
@@ -283,7 +288,7 @@ pub(crate) fn is_basic_zone<'d>(scenario: &Scenario<'d>, fault: &ValueFault<'d>)
         && !clock.ends_with(':')
 }
 
-/// Whether the default of a catalog's parameter is empty.
+/// Checks whether the default of a catalog's parameter is empty.
 pub(crate) fn is_empty_default(scenario: &Scenario<'_>, fault: &ValueFault<'_>) -> bool {
     scenario.form() == Form::Catalog
         && fault.attribute.node().is("ParameterDeclaration")

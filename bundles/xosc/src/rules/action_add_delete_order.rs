@@ -21,7 +21,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let mut deleted: HashSet<String> = HashSet::new();
     for action in scenario.elements_everywhere("EntityAction") {
         if action.child("DeleteEntityAction").is_some() {
-            // It may be any of them.
+            // Any entity may be deleted if the name is unknown.
             let Some(name) = action.text("entityRef") else {
                 return;
             };
@@ -47,7 +47,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The entities that `Init` places, with what places them.
+/// Returns the entities that `Init` places, with the elements that place them.
 fn placed<'m, 'd>(scenario: &'m Scenario<'d>) -> HashMap<String, Element<'m, 'd>> {
     let mut placed = HashMap::new();
     let actions = scenario.root().path(&["Storyboard", "Init", "Actions"]);
@@ -70,7 +70,7 @@ fn placed<'m, 'd>(scenario: &'m Scenario<'d>) -> HashMap<String, Element<'m, 'd>
     placed
 }
 
-/// The names of the scenario objects that a name stands for.
+/// Returns the names of the scenario objects that a name stands for.
 fn members(scenario: &Scenario<'_>, name: &str) -> Vec<String> {
     match scenario.entities().expand(name) {
         Some(entities) => entities.iter().map(|one| one.name().to_owned()).collect(),

@@ -27,13 +27,14 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The number of a gear is a double to the schema.
+/// Checks the number of a gear, which is a double in the schema.
 fn whole_number(gear: Element<'_, '_>, found: &mut Sink<'_>) {
     let Some(number) = gear.double("number") else {
         return;
     };
     if number.fract() != 0.0 || !number.is_finite() {
-        // Simulators round it: files in use have such numbers.
+        // This is a warning only. Simulators round the number, and existing files contain such
+        // numbers.
         let text = format!(
             "`number` of `Gear` is {}, but should be a whole number: 0 is neutral, -1 reverse",
             ranges::shown(gear, "number", number)

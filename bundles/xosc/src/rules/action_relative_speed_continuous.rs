@@ -7,7 +7,7 @@ use crate::model::{About, Scene};
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_action_relative_speed_continuous",
     uids: &["qcbus.dev:xosc:1.0.0:action.relative_speed_continuous"],
-    // Some simulators drop one of the two and go on.
+    // Some simulators drop one of the two and continue.
     level: Level::Warning,
     versions: "1.0.0..",
     after: super::READABLE,
@@ -29,7 +29,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let timed = matches!(&*dimension, "time" | "distance") && shape != "step";
-        // A value of 0 and a step take neither time nor distance.
+        // A value of 0 and a step need neither time nor distance.
         let value = dynamics.number("value").filter(|value| *value > 0.0);
         let (Some(value), true, Some(true)) = (value, timed, target.flag("continuous")) else {
             continue;

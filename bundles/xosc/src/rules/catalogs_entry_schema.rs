@@ -33,7 +33,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let mut known: HashMap<&str, Vec<Breach<'_>>> = HashMap::default();
     let mut older: HashSet<&str> = HashSet::default();
     for (entry, reference, count) in uses {
-        // An entry of the document itself is the schema's own checker's.
+        // The schema checker itself checks entries of the document.
         if entry.document().path() == subject.root().path() {
             continue;
         }
@@ -55,14 +55,14 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         } else if let Some(first) = of(Weight::Later).next()
             && older.insert(document.path())
         {
-            // The header is one fault, whatever uses more than it says.
+            // The version in the header is one fault, however many parts need a newer version.
             say(reference, first, (0, 1), found);
         }
     }
 }
 
-/// Says what is wrong with the entry that a reference leads to: how many faults and references there are
-/// besides.
+/// Reports the fault of the entry that a reference leads to, with the numbers of further faults and
+/// references.
 fn say(
     reference: Element<'_, '_>,
     first: &Breach<'_>,

@@ -16,7 +16,7 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(_: &Scenario<'_>, found: &mut Sink<'_>) {
-    // What cannot be read at all is said by the bus.
+    // The bus reports files that cannot be read at all.
     let subject = found.subject();
     for linked in subject.with_role(DocumentRole::Catalog) {
         let document = &linked.document;
@@ -47,7 +47,7 @@ fn fault(document: &Document<'_>) -> Option<(Level, String)> {
                 (Level::Warning, what.to_owned())
             })
         }
-        // Scenarios beside their catalogs do no harm.
+        // Scenarios in the directory of their catalogs are harmless.
         Form::Scenario => Some((Level::Information, "it is a scenario".to_owned())),
         Form::Distribution => {
             let what = "it is a distribution of parameter values";

@@ -12,7 +12,7 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// The elements that make a document what it is.
+/// Elements that determine the form of a document.
 const FORMS: &[(&[&str], &str)] = &[
     (&["Entities", "Storyboard"], "a scenario"),
     (&["Catalog"], "a catalog"),

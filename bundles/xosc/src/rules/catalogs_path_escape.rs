@@ -23,7 +23,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let Some(path) = directory.text("path") else {
             continue;
         };
-        // Where nothing was found that is what the bus says, and this would be why.
+        // If the directory was not found, the bus reports it. The path would only be the reason.
         if catalogs::missing(found.subject(), directory.node()).is_some() {
             continue;
         }
@@ -35,7 +35,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What keeps a path from being found on another machine.
+/// Returns the reason why a path is not found on another machine.
 fn why(path: &str) -> Option<&'static str> {
     let mut start = path.chars();
     let is_drive = start

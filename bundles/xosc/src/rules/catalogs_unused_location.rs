@@ -33,7 +33,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         .into_iter()
         .filter(|kind| !used.contains(kind))
         .filter_map(|kind| scenario.catalog_directory(kind))
-        // A directory that is not there is what the bus says of it; an empty path means none.
+        // The bus reports a missing directory. An empty path means that there is none.
         .filter(|directory| catalogs::missing(subject, directory.node()).is_none())
         .filter(|directory| {
             directory

@@ -23,7 +23,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     else {
         return;
     };
-    // What is no version of this language is said once, at the header.
+    // An unknown version of the language is reported once, at the header.
     if own.0 > 1 {
         return;
     }

@@ -8,7 +8,7 @@ use crate::model::Scene;
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_data_type_non_negative_transition_time_in_light_state_action",
     uids: &UIDS,
-    // Lights came with this version: an older file has none to look at.
+    // Lights exist since this version, so older files have none.
     versions: "1.2.0..",
     after: super::READABLE,
     page: include_str!("data_type_non_negative_transition_time_in_light_state_action.md"),

@@ -13,8 +13,8 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Element, its type, the attribute that is deprecated, what has replaced it, and how the old value
-/// becomes the new one where it can be computed.
+/// Element, its type, the deprecated attribute and its replacements. The function converts the old
+/// value to the new one if this is possible.
 type Pair = (
     &'static str,
     &'static str,
@@ -166,7 +166,7 @@ fn compare(
     }
 }
 
-/// As exactly as people round.
+/// Checks whether two values agree within the usual rounding.
 fn agree(one: f64, other: f64) -> bool {
     (one - other).abs() <= 1e-4 * one.abs().max(other.abs()).max(1.0)
 }

@@ -56,7 +56,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Bins of a histogram that share values.
+/// Reports bins of a histogram that overlap.
 fn overlap(histogram: Element<'_, '_>, found: &mut Sink<'_>) {
     let mut bins: Vec<_> = histogram
         .children_named("Bin")
@@ -82,7 +82,8 @@ fn overlap(histogram: Element<'_, '_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Every value of one parameter is combined with every value of the others.
+/// Reports the number of runs. Every value of one parameter is combined with every value of the
+/// others.
 fn count(all: Element<'_, '_>, found: &mut Sink<'_>) {
     let single = all.children_named("DeterministicSingleParameterDistribution");
     let singles = single.map(|one| match one.child("DistributionRange") {

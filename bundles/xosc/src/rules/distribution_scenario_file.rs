@@ -24,7 +24,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let Some(path) = file.text("filepath") else {
         return;
     };
-    // That there is nothing is said by the bus.
+    // The bus reports a missing file.
     if catalogs::missing(subject, node).is_some() {
         return;
     }

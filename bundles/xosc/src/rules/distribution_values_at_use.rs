@@ -18,7 +18,8 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// So many elements are read anew in all: large scenarios are tried with fewer values.
+/// Maximum number of elements that are read again in total. Large scenarios are checked with fewer
+/// values.
 const BUDGET: usize = 2_000_000;
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -36,9 +37,9 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Values that hold in one run: one of a distribution, or a set.
+/// Values of one run: one value of a distribution, or a set.
 struct Draw<'m, 'd, 't> {
-    /// What is said is said here, when it is about no single value.
+    /// Place of the report, if it is about more than one value.
     holder: Element<'m, 'd>,
     values: Vec<Drawn<'m, 'd, 't>>,
 }
@@ -51,7 +52,7 @@ struct Drawn<'m, 'd, 't> {
     attribute: &'static str,
 }
 
-/// All values that are sure to be drawn, and that may be drawn at all.
+/// Returns all values that are certain to be drawn and that are allowed.
 fn draws<'m, 'd, 't>(scenario: &'m Scenario<'d>, target: &Scenario<'t>) -> Vec<Draw<'m, 'd, 't>> {
     let mut draws = Vec::new();
     for name in [
@@ -91,7 +92,7 @@ fn draws<'m, 'd, 't>(scenario: &'m Scenario<'d>, target: &Scenario<'t>) -> Vec<D
     draws
 }
 
-/// A value of a parameter, unless another rule finds fault with it.
+/// Returns a value of a parameter, unless another rule reports it as faulty.
 fn drawn<'m, 'd, 't>(
     target: &Scenario<'t>,
     name: &str,
@@ -112,7 +113,7 @@ fn drawn<'m, 'd, 't>(
     })
 }
 
-/// The first and the last value of a range with steps.
+/// Returns the first and the last value of a range with steps.
 fn ends<'m, 'd, 't>(
     target: &Scenario<'t>,
     name: &str,
@@ -151,7 +152,7 @@ fn ends<'m, 'd, 't>(
     both.collect()
 }
 
-/// A value that borrows nothing.
+/// Converts a value to one without borrows.
 fn owned<'t>(value: Value<'_>) -> Value<'t> {
     match value {
         Value::Text(text) => Value::Text(text.into_owned().into()),
@@ -161,13 +162,13 @@ fn owned<'t>(value: Value<'_>) -> Value<'t> {
     }
 }
 
-/// The scenario with other values.
+/// A trial of the scenario with other values.
 struct Trial<'s, 't> {
     inputs: &'s Inputs<'t>,
     target: &'s Scenario<'t>,
-    /// Where it is faulty as it is.
+    /// Offsets of the faults of the scenario with its own values.
     before: HashSet<u32>,
-    /// The parameters that an attribute is written with, by its offset.
+    /// Parameters that occur in an attribute, by its offset.
     uses: HashMap<u32, Vec<&'t str>>,
     /// All parameters that are drawn.
     drawn: HashSet<&'t str>,
@@ -196,7 +197,7 @@ impl<'s, 't> Trial<'s, 't> {
         }
     }
 
-    /// Says what is wrong only with the values of a draw.
+    /// Reports faults that occur only with the values of a draw.
     fn with(&self, draw: &Draw<'_, '_, 't>, found: &mut Sink<'_>) {
         let values: HashMap<&'t str, Declared<'t>> = draw
             .values
@@ -211,7 +212,7 @@ impl<'s, 't> Trial<'s, 't> {
             .filter(|(attribute, _)| !self.before.contains(&attribute.offset()))
             .filter_map(|(attribute, text)| {
                 let behind = self.behind(attribute);
-                // With the values of other distributions it may be right.
+                // With the values of other distributions the place may be correct.
                 let is_own = behind.iter().all(|name| values.contains_key(name));
                 (is_own && !behind.is_empty()).then_some((attribute, text, behind))
             });
@@ -243,7 +244,7 @@ impl<'s, 't> Trial<'s, 't> {
         found.issue(place, text).at(attribute, "where it is used");
     }
 
-    /// The drawn parameters that the value of an attribute rests on.
+    /// Returns the drawn parameters that the value of an attribute depends on.
     fn behind(&self, attribute: Attribute<'t>) -> HashSet<&'t str> {
         let mut seen: HashSet<&'t str> = HashSet::default();
         let mut open = vec![attribute.offset()];
@@ -254,7 +255,7 @@ impl<'s, 't> Trial<'s, 't> {
                 }
                 let declaration = distributions::declaration(self.target, name);
                 let value = declaration.and_then(|one| one.node.attribute("value"));
-                // What is drawn no longer depends on what is declared.
+                // A drawn value does not depend on the declared one.
                 if !self.drawn.contains(name) {
                     open.extend(value.map(|value| value.offset()));
                 }
@@ -265,8 +266,8 @@ impl<'s, 't> Trial<'s, 't> {
     }
 }
 
-/// What breaks the scenario: values that do not fit where they are used, numbers out of range, and names
-/// of entities that there are not.
+/// Returns the faults that break the scenario: values that do not fit their use, numbers out of
+/// range, and unknown names of entities.
 fn problems<'t>(scenario: &Scenario<'t>) -> Vec<(Attribute<'t>, String)> {
     const KINDS: &[ValueFaultKind] = &[
         ValueFaultKind::Evaluation,

@@ -55,9 +55,9 @@ struct Draw<'t, 'd> {
 }
 
 impl Draw<'_, '_> {
-    /// One value, written out.
+    /// Checks one literal value.
     fn value(&mut self, holder: Element<'_, '_>, found: &mut Sink<'_>) {
-        // What is not written out nobody computes here.
+        // Values that are no literals are not computed here.
         let Some(text) = holder.text("value").filter(|text| !text.contains('$')) else {
             return;
         };
@@ -99,7 +99,7 @@ impl Draw<'_, '_> {
         }
     }
 
-    /// Distributions that give numbers.
+    /// Checks distributions of numbers.
     fn numbers(&self, source: Element<'_, '_>, found: &mut Sink<'_>) {
         const NUMBERS: [&str; 6] = [
             "DistributionRange",
@@ -132,7 +132,7 @@ impl Draw<'_, '_> {
         }
     }
 
-    /// The first and the last value of a range with steps, and whether all of them are whole.
+    /// Checks the first and the last value of a range with steps, and whether all values are whole.
     fn range(&self, distribution: Element<'_, '_>, found: &mut Sink<'_>) {
         let range = distribution.child("Range");
         let lower = range.and_then(|range| range.number("lowerLimit"));
@@ -161,8 +161,8 @@ impl Draw<'_, '_> {
         let declaration = self.target.element(self.declaration.node);
         let is_allowed =
             |value: f64| allowed_values::violated(declaration, &Value::Double(value)).is_none();
-        // Generators drop values that the scenario excludes; where one of the ends is none of them, some
-        // runs are left.
+        // Generators drop values that the scenario excludes. If one of the ends is allowed, some
+        // runs remain.
         let level = if ends.clone().any(|(_, end)| is_allowed(end)) {
             Level::Warning
         } else {
@@ -173,7 +173,7 @@ impl Draw<'_, '_> {
         }
     }
 
-    /// What a draw may lead to: the ends of the range that it is cut off at.
+    /// Checks the possible values of a draw: the ends of the range that limits it.
     fn ends(&self, distribution: Element<'_, '_>, found: &mut Sink<'_>) {
         let own = distribution.child("Range").into_iter();
         let bins = distribution
@@ -187,7 +187,7 @@ impl Draw<'_, '_> {
             let middle = Value::Double((lower + upper) / 2.0);
             for (attribute, limit) in [("lowerLimit", lower), ("upperLimit", upper)] {
                 let limit = Value::Double(limit);
-                // The very ends are hardly ever drawn: an open bound may coincide with them.
+                // The exact ends are hardly ever drawn, so an open bound may equal them.
                 let near = Value::Double(match (limit.number(), middle.number()) {
                     (Some(limit), Some(middle)) => limit + (middle - limit) * 1e-6,
                     _ => continue,

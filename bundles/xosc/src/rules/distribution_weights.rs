@@ -14,8 +14,8 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// An attribute that says how a distribution is shaped: element, attribute, the values that it may have
-/// in words, and whether it may be 0.
+/// Attributes of the shape of a distribution: element, attribute, allowed values in words, and
+/// whether 0 is allowed.
 const SHAPES: &[(&str, &str, &str, bool)] = &[
     ("NormalDistribution", "variance", "0 or more", true),
     ("LogNormalDistribution", "variance", "0 or more", true),

@@ -27,7 +27,7 @@ const WHEEL: Param = Param::number(
     "a wheel of more than this diameter is taken for a mistake",
 );
 
-/// Vehicles that have a front axle and a rear axle that are two.
+/// Vehicles with separate front and rear axles.
 const TWO_AXLED: [&str; 4] = ["car", "van", "truck", "bus"];
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -59,7 +59,7 @@ fn wheelbase(axles: Element<'_, '_>, least: f64, found: &mut Sink<'_>) {
     let (Some(x), Some(rear_x)) = (front.number("positionX"), rear.number("positionX")) else {
         return;
     };
-    // A front axle at a negative x is told by the rule about ranges.
+    // The rule about ranges reports a front axle at a negative x.
     if x - rear_x >= least || x < 0.0 {
         return;
     }

@@ -41,7 +41,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether something goes by road, and is of no more than ordinary size.
+/// Checks whether an object moves on roads and has an ordinary size.
 fn is_road_user(object: Element<'_, '_>) -> bool {
     match object.name() {
         "Pedestrian" => true,

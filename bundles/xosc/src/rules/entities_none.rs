@@ -18,7 +18,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let Some(block) = scenario.root().child("Entities") else {
         return;
     };
-    // Traffic may come from elsewhere.
+    // Traffic actions may create entities.
     let has_traffic = scenario
         .elements_everywhere("TrafficAction")
         .next()

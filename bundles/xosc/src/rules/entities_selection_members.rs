@@ -58,7 +58,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The selections by which a selection leads back to itself, the innermost first.
+/// Returns the selections by which a selection leads back to itself, the innermost first.
 fn way_back<'m>(scenario: &'m Scenario<'_>, from: &'m Selection<'_>) -> Option<Vec<&'m str>> {
     let entities = scenario.entities();
     let mut before: Vec<(&str, usize)> = vec![(from.name(), 0)];

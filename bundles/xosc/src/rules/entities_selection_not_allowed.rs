@@ -14,7 +14,7 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Where an `EntityRef` is a reference to one entity.
+/// Elements in which an `EntityRef` refers to one entity.
 const AROUND: [&str; 2] = ["CollisionCondition", "TimeToCollisionConditionTarget"];
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -45,7 +45,7 @@ fn look(reference: Element<'_, '_>, attribute: &str, found: &mut Sink<'_>) {
     if scenario.entities().object(&name).is_some() {
         return;
     }
-    // Of one member it is clear at least who is meant.
+    // With one member the intended entity is clear.
     let clear = scenario
         .entities()
         .expand(&name)

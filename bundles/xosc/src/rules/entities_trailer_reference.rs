@@ -16,9 +16,9 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    // Who has been said to be no trailer, or not to fit to whom: actions may name the same two again.
+    // Entities that are already reported, because actions may name the same pair again.
     let mut told = Told::default();
-    // Who draws whom from the beginning, and the element that says so.
+    // The vehicle that tows each trailer from the start, with the element that states it.
     let mut drawn: HashMap<&str, (&str, Element<'_, '_>)> = HashMap::default();
     for towing in scenario.entities().objects() {
         let Some(vehicle) = towing.object(scenario) else {
@@ -51,7 +51,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     disconnect(scenario, found);
 }
 
-/// Says who is to let go of a trailer and never draws one.
+/// Reports vehicles that disconnect a trailer but never tow one.
 fn disconnect(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let Some(towing) = towing(scenario) else {
         return;
@@ -77,7 +77,8 @@ fn disconnect(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The names of all who draw a trailer at some time; `None` when that is not known.
+/// Returns the names of all vehicles that tow a trailer at some time. Returns `None` if this is
+/// unknown.
 fn towing(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
     if !scenario.storyboard().is_complete() {
         return None;
@@ -99,7 +100,8 @@ fn towing(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
     Some(towing)
 }
 
-/// The trailer that a vehicle's `Trailer` names or is, and where that is said.
+/// Returns the trailer that a vehicle's `Trailer` names or contains, and the attribute that states
+/// it.
 fn trailer_of<'m, 'd>(
     block: Element<'m, 'd>,
 ) -> Option<(&'m Entity<'d>, Element<'m, 'd>, &'static str)> {
@@ -110,12 +112,13 @@ fn trailer_of<'m, 'd>(
     let name = at.text(attribute)?;
     let scenario = block.scenario();
     let entity = scenario.entities().object(&name)?;
-    // A name that is taken leads to another one: that is another fault.
+    // A name that is already taken leads to another entity. This is a separate fault.
     let is_it = at.is("TrailerRef") || entity.element(scenario).node() == at.node();
     is_it.then_some((entity, at, attribute))
 }
 
-/// Pairs of a vehicle and its trailer, and those who are no trailer with nobody.
+/// Reported pairs of a vehicle and its trailer. Entities that are no trailers have an empty second
+/// name.
 #[derive(Default)]
 struct Told<'m>(HashSet<(&'m str, &'m str)>);
 
@@ -142,7 +145,8 @@ impl<'m> Told<'m> {
         }
     }
 
-    /// A hitch on the one and a coupler on the other tell where the two are joined.
+    /// Reports a missing hitch or coupler. The two parts define where vehicle and trailer are
+    /// joined.
     fn coupling<'d>(
         &mut self,
         towing: &'m Entity<'d>,
@@ -178,7 +182,7 @@ impl<'m> Told<'m> {
     }
 }
 
-/// A vehicle that draws itself, with or without others between.
+/// Reports a vehicle that tows itself, directly or through others.
 fn circle(
     towing: &Entity<'_>,
     drawn: &mut HashMap<&str, (&str, Element<'_, '_>)>,

@@ -44,7 +44,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         .any(|selection| selection.types().next().is_some());
     for object in entities.objects() {
         let element = object.element(scenario);
-        // Vehicles and pedestrians must at least be placed, which is a rule of its own.
+        // Vehicles and pedestrians must at least be placed. Another rule checks this.
         let is_other = matches!(object.kind(), EntityKind::MiscObject | EntityKind::External);
         if is_other && !by_type && !element.is("Trailer") && is_unused(object.name()) {
             let text = format!("nothing refers to the entity `{}`", object.name());

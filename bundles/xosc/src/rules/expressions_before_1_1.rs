@@ -16,7 +16,7 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    // Where the schema takes no expression, the version is told by its rule.
+    // If the schema allows no expression here, the rule about the schema reports it.
     if scenario
         .written_expressions()
         .any(|attribute| is_foreign(scenario, attribute))
@@ -46,7 +46,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether the schema demands a value that no expression is.
+/// Checks whether the schema requires a value that no expression can be.
 fn is_foreign<'d>(scenario: &Scenario<'d>, attribute: Attribute<'d>) -> bool {
     let element = scenario.element(attribute.node());
     let value = element.value_type(attribute.name());

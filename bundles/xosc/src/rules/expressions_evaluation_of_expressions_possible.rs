@@ -16,14 +16,14 @@ pub static RULE: Rule<Scene> = Rule {
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for fault in values::faults(scenario, &[ValueFaultKind::Evaluation]) {
-        // A number that is declared as text is said by the rule about conversions.
+        // The rule about conversions reports a number that is declared as text.
         if values::numeric_text(scenario, fault).is_none() {
             values::say(fault, found);
         }
     }
     values::report_in_entries(scenario, &[ValueFaultKind::Evaluation], found);
     for fault in values::faults(scenario, &[ValueFaultKind::Limit]) {
-        // That we do not look does not make it wrong.
+        // An expression beyond the limits is not evaluated, but it may be correct.
         values::say(fault, found).level(Level::Information);
     }
 }

@@ -33,12 +33,14 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether the attribute names something: when nobody bears the name, the rules about references say so.
+/// Checks whether the attribute refers to a name. The rules about references report unresolved
+/// names.
 fn is_reference(attribute: &str) -> bool {
     attribute.ends_with("Ref") || matches!(attribute, "catalogName" | "entryName")
 }
 
-/// Whether somebody may have meant to compute something; what cannot be read is a text in braces.
+/// Checks whether the text is probably meant as an expression. Text that cannot be parsed is a text
+/// in braces.
 fn reads_as_expression(text: &str, version: (u16, u16)) -> bool {
     use expr::{FaultKind, Operand};
     match expr::evaluate(text, version, &|_| Operand::Unresolved) {

@@ -17,7 +17,7 @@ pub static RULE: Rule<Scene> = Rule {
 /// Elements whose `value` is a speed in m/s.
 const SPEEDS: &[&str] = &["AbsoluteTargetSpeed", "AbsoluteSpeed", "SpeedCondition"];
 
-/// A speed beyond this stands for "as fast as you can", in whatever unit.
+/// Speed from which a value means "as fast as possible", in any unit.
 const UNLIMITED: f64 = 1e4;
 
 const FASTEST: Param = Param::number(
@@ -49,7 +49,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// With three digits behind the point at most.
+/// Formats a number with at most three decimals.
 fn short(number: f64) -> String {
     let rounded = (number * 1000.0).round() / 1000.0;
     rounded.to_string()

@@ -16,7 +16,7 @@ pub static RULE: Rule<Scene> = Rule {
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for animation in scenario.elements_everywhere("PedestrianAnimation") {
-        // What an external object is only the simulator knows.
+        // Only the simulator knows the kind of an external object.
         let other = acting(animation)
             .unwrap_or_default()
             .into_iter()

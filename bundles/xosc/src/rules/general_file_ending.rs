@@ -17,7 +17,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let document = scenario.document();
     let path = document.path();
     let name = path.rsplit(['/', '\\']).next().unwrap_or(path);
-    // Archives of modular scenarios are files of their own kind.
+    // Archives of modular scenarios have their own file kind.
     if name.ends_with(".xosc") || name.ends_with(".mosc") {
         return;
     }

@@ -20,7 +20,7 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// What vehicles and pedestrians do, after the standard's table of entity type constraints.
+/// Actions of vehicles and pedestrians, by the standard's table of entity type constraints.
 const OF_THE_LIVING: &[&str] = &[
     "ActivateControllerAction",
     "AssignControllerAction",
@@ -33,7 +33,7 @@ const OF_THE_LIVING: &[&str] = &[
     "SpeedProfileAction",
     "SynchronizeAction",
 ];
-/// What only vehicles do.
+/// Actions of vehicles only.
 const OF_VEHICLES: &[&str] = &["OverrideControllerValueAction"];
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -61,24 +61,24 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What is wrong with the actors of a group, for the actions of some kinds of entities.
+/// Fault of the actors of a group, for actions of some kinds of entities.
 #[derive(Clone)]
 enum Verdict<'m, 'd> {
     Fine,
-    /// One who is none for them, by name or as a member of the selection that is named.
+    /// An actor of a wrong kind. It is named itself or is a member of the named selection.
     Wrong {
         actor: Element<'m, 'd>,
         named: String,
         wrong: &'m Entity<'d>,
     },
-    /// A selection acts as one: of vehicles or of pedestrians.
+    /// A selection acts as one and must not mix vehicles and pedestrians.
     Mixed {
         actor: Element<'m, 'd>,
         named: String,
     },
 }
 
-/// The verdicts by group and number of allowed kinds: a group has the same for all its actions.
+/// The verdicts by group and number of allowed kinds. All actions of a group have the same verdict.
 #[derive(Default)]
 struct Verdicts<'m, 'd> {
     known: HashMap<(u32, usize), Verdict<'m, 'd>>,
@@ -165,7 +165,7 @@ fn say(action: Element<'_, '_>, verdict: &Verdict<'_, '_>, who: &str, found: &mu
     }
 }
 
-/// What an external object is, only the simulator knows.
+/// Checks whether the kind is not allowed. Only the simulator knows an external object.
 fn is_wrong(entity: &Entity<'_>, allowed: &[EntityKind]) -> bool {
     let known = !matches!(entity.kind(), EntityKind::External | EntityKind::Unknown);
     known && !allowed.contains(&entity.kind())

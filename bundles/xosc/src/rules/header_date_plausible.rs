@@ -25,7 +25,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let Some(header) = scenario.root().child("FileHeader") else {
         return;
     };
-    // What is no date at all is the schema's finding.
+    // The schema reports a text that is no date.
     let date = header.text("date");
     let year = date
         .and_then(|date| DateTime::parse(&date).ok())

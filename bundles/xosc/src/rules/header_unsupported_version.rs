@@ -12,7 +12,7 @@ pub static RULE: Rule<Document> = Rule {
 };
 
 fn run(document: &Document<'_>, found: &mut Sink<'_>) {
-    // A version that is missing or no number is the finding of the rule about the header.
+    // The rule about the header reports a missing version or one that is no number.
     let header = document.root().and_then(|root| root.child("FileHeader"));
     let (Some(header), Some(version)) = (header, found.version()) else {
         return;

@@ -17,7 +17,7 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    // The other two have rules of their own.
+    // Other rules check the remaining two.
     let passed = ["Vehicle", "ObjectController", "CatalogReference"];
     for object in scenario.elements("ScenarioObject") {
         for kind in object.children() {

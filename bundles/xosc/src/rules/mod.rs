@@ -217,10 +217,10 @@ mod xml_valid_schema;
 mod xml_valid_xml_document;
 mod xml_version_is_defined;
 
-/// The precondition of rules that need no more than a file that could be read: see `after`.
+/// Precondition of rules that only need a readable file: see `after`.
 pub(crate) const READABLE: &[&str] = &["check_asam_xosc_xml_root_tag_is_openscenario"];
 
-/// Every rule; one that depends on another comes after it.
+/// All rules. A rule that depends on another comes after it.
 pub static RULES: &[&dyn AnyRule] = &[
     &xml_valid_xml_document::RULE,
     &xml_root_tag_is_openscenario::RULE,

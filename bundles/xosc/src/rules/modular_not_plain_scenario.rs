@@ -21,7 +21,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     if found.subject().is_expanded() {
         return must_be_expanded(found);
     }
-    // Why no plain scenario can be made of it is said by who tried.
+    // The failed expansion is already reported.
     let missing = found.subject().missing();
     if missing.iter().any(|it| it.role == DocumentRole::Expanded) {
         return;
@@ -39,7 +39,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         found.issue(first.node(), text);
         return;
     }
-    // Most files do not have the attribute at all, and need not be walked.
+    // Most files do not have the attribute at all, so the elements need not be visited.
     let mut names = scenario.document().names();
     if !names.any(|name| name == "parameterAttributes") {
         return;
@@ -59,7 +59,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What was checked is not the file but what it is expanded to.
+/// Reports that the expansion was checked and not the file itself.
 fn must_be_expanded(found: &mut Sink<'_>) {
     let written = found.subject().written();
     let mut references = written.elements("ScenarioReference");

@@ -37,7 +37,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether a run goes well without the name: who is never referred to needs none.
+/// Checks whether the name is optional, because an element that is never referred to needs none.
 fn may_be_nameless(element: Element<'_, '_>) -> bool {
     let in_catalog = element
         .node()

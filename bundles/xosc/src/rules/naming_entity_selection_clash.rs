@@ -37,7 +37,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Equal names of siblings are found by comparing what is written.
+/// Checks whether another rule reports it. Equal written names of siblings are found there.
 fn is_said_elsewhere(one: Element<'_, '_>, other: Element<'_, '_>) -> bool {
     one.node().parent() == other.node().parent() && one.written("name") == other.written("name")
 }

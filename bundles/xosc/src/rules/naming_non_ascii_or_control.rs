@@ -29,7 +29,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Control characters, blanks that look like a space or like nothing, marks of direction.
+/// Checks for control characters, invisible or unusual spaces, and marks of direction.
 fn is_invisible(sign: char) -> bool {
     sign.is_control()
         || matches!(sign, '\u{a0}' | '\u{ad}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202f}' | '\u{2060}' | '\u{feff}')

@@ -23,7 +23,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let (level, why) = match name.strip_prefix('$') {
-            // Many files have it, and most simulators take it off.
+            // Many files have the `$`, and most simulators remove it.
             Some(rest) if is_identifier(rest) => (
                 Level::Warning,
                 format!("the `$` belongs where the parameter is used; it is declared as `{rest}`"),

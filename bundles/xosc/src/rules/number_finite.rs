@@ -13,7 +13,7 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// What is neither part of a position nor has a range of its own.
+/// Numbers that are not part of a position and have no range of their own.
 const NUMBERS: &Numbers = &[
     ("AbsoluteTargetLaneOffset", &["value"]),
     ("AbsoluteTargetSpeed", &["value"]),

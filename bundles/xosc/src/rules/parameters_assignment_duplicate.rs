@@ -13,7 +13,7 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Where assignments stand, what stands there, and the attribute that names the parameter.
+/// Holders of assignments, the assigning elements, and the attribute that names the parameter.
 const HOLDERS: &[(&str, &[&str], &str)] = &[
     (
         "ParameterAssignments",
@@ -47,8 +47,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Distributions of one `Deterministic` that set a parameter which another sets already, one of them by
-/// sets of values.
+/// Reports distributions of one `Deterministic` that set a parameter which another one already
+/// sets. At least one of the two sets it by sets of values.
 fn across(block: Element<'_, '_>, found: &mut Sink<'_>) {
     let mut first: HashMap<&str, Element<'_, '_>> = HashMap::default();
     for distribution in block.children() {
@@ -70,7 +70,7 @@ fn across(block: Element<'_, '_>, found: &mut Sink<'_>) {
             if other == distribution || !said.insert(name) {
                 continue;
             }
-            // Of two single ones the other check tells.
+            // The other check reports two single distributions.
             if !is_multi && !other.is("DeterministicMultiParameterDistribution") {
                 continue;
             }

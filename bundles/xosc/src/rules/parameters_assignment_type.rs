@@ -19,7 +19,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let name = assignment.written("parameterRef").unwrap_or("");
         let name = name.strip_prefix('$').unwrap_or(name);
         let text = format!("the value for `{name}` does not fit: {text}");
-        // Where the default does not fit, either, the type is what is wrong, and the catalog's fault.
+        // If the default does not fit either, the type is wrong. This is a fault of the catalog.
         match misdeclared(assignment, name) {
             Some(declaration) => found
                 .about(assignment, "value", text)
@@ -34,7 +34,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     constraints(scenario, found);
 }
 
-/// The declaration of a parameter, when the value that it declares is not of its type.
+/// Returns the declaration of a parameter if its declared value is not of its type.
 fn misdeclared<'d>(assignment: Element<'_, 'd>, name: &str) -> Option<Node<'d>> {
     let reference = assignment.parent()?.parent()?;
     let entry = assignment.scenario().entry(reference)?;
@@ -44,7 +44,7 @@ fn misdeclared<'d>(assignment: Element<'_, 'd>, name: &str) -> Option<Node<'d>> 
     (!fits).then_some(declaration.node)
 }
 
-/// Values that have the type, and are none that the entry allows.
+/// Reports values of the right type that the entry does not allow.
 fn constraints(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for (reference, _) in catalogs::references(scenario) {
         let Some(entry) = scenario.entry(reference) else {

@@ -42,7 +42,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What the condition is with the value that is declared.
+/// Returns the result of the condition with the declared value.
 fn outcome(condition: Element<'_, '_>, declaration: &Declaration<'_>) -> Option<bool> {
     let Declared::Value(value) = &declaration.declared else {
         return None;

@@ -50,7 +50,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether the condition is one of those by which CARLA's ScenarioRunner judges a run.
+/// Checks whether the condition is a criterion by which CARLA's ScenarioRunner judges a run.
 fn is_criterion(element: Element<'_, '_>) -> bool {
     let condition = element.ancestor("Condition");
     let name = condition.and_then(|condition| condition.text("name"));

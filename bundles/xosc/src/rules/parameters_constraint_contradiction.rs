@@ -22,7 +22,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let groups = constraints::groups(declaration, data_type);
-        // One group is enough: without any there is no value at all that the parameter may have.
+        // One group is enough. Without any, the parameter can have no value at all.
         let none_left = groups
             .iter()
             .all(|group| group.contradiction(data_type).is_some());

@@ -36,7 +36,7 @@ fn check(node: Element<'_, '_>, declaration: &Declaration<'_>, found: &mut Sink<
     for group in &groups {
         match group.violated(&operand) {
             Ok(Some(constraint)) => violated.push((group, constraint)),
-            // One satisfied group is enough, and of one that is not understood nobody knows.
+            // One satisfied group is enough. An unknown group may be satisfied.
             Ok(None) | Err(()) => return,
         }
     }
@@ -47,7 +47,7 @@ fn check(node: Element<'_, '_>, declaration: &Declaration<'_>, found: &mut Sink<
         .iter()
         .all(|(group, _)| group.contradiction(data_type).is_some())
     {
-        // That no value satisfies them is said by another rule.
+        // Another rule reports that no value satisfies them.
         return;
     }
     let others: Vec<String> = rest.iter().map(|(_, one)| one.shown()).collect();

@@ -16,7 +16,7 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    // What is undeclared in a catalog is said by the rule about catalogs.
+    // The rule about catalogs reports undeclared parameters in a catalog.
     if scenario.form() != Form::Catalog {
         values::report(scenario, &[ValueFaultKind::Undeclared], found);
     }

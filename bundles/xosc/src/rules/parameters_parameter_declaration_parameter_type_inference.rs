@@ -26,7 +26,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let level = match fault.kind {
             ValueFaultKind::Parameter => Level::Error,
             _ if values::is_about_time(fault) => continue,
-            // An error in the catalog's own result; here the default may only be used as a text.
+            // It is an error in the result of the catalog itself. Here the default may be used as
+            // text only.
             _ => Level::Warning,
         };
         let text = format!("{}: {}", values::written(fault.attribute), fault.text);
@@ -48,7 +49,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     run_time(scenario, found);
 }
 
-/// Most simulators read `5.0` as 5.
+/// Returns the level. It is a warning for `5.0`, because most simulators read it as 5.
 fn level(fault: &ValueFault<'_>) -> Level {
     let attribute = fault.attribute;
     let declared = attribute.node().attr("parameterType");
@@ -61,7 +62,7 @@ fn level(fault: &ValueFault<'_>) -> Level {
     }
 }
 
-/// Values that a parameter is set to or compared with while the scenario runs.
+/// Checks values that a parameter is set to or compared with at run time.
 fn run_time(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let declared = declared::PARAMETERS.by_name(scenario);
     let references =

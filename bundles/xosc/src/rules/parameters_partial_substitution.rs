@@ -28,7 +28,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
     for fault in values::faults(scenario, &[ValueFaultKind::Embedded]) {
         let element = scenario.element(fault.attribute.node());
-        // Else it is a text with a `$` in it.
+        // Otherwise it is a text that contains a `$`.
         if element.parameter(&fault.name).is_some() {
             let level = if is_number(element, fault.attribute) {
                 Level::Error
@@ -40,8 +40,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether a number, or true or false, is due, which a text with a parameter in it never is, replaced
-/// or not.
+/// Checks whether a number or a boolean is expected. A text with a parameter in it is neither, even
+/// if the parameter is replaced.
 fn is_number(element: Element<'_, '_>, attribute: Attribute<'_>) -> bool {
     let declared = match element.name() {
         _ if !attribute.is("value") => None,
@@ -52,13 +52,13 @@ fn is_number(element: Element<'_, '_>, attribute: Attribute<'_>) -> bool {
         _ => None,
     };
     let value = attribute.value().trim();
-    // `-$speed` is a number where the text is replaced.
+    // `-$speed` is a number if the text is replaced.
     let value = value.strip_prefix(['-', '+']).unwrap_or(value);
     declared.is_some_and(|declared| !matches!(declared, DataType::String | DataType::DateTime))
         && value.contains(['*', '/', '+', '-', '(', ' '])
 }
 
-/// The type of the entry's parameter that an assignment is for.
+/// Returns the type of the entry's parameter that an assignment sets.
 fn assigned(assignment: Element<'_, '_>) -> Option<DataType> {
     let reference = assignment.parent()?.parent()?;
     let entry = assignment.scenario().entry(reference)?;

@@ -29,7 +29,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             };
             let value = declaration.node.attr("value").unwrap_or("");
             if declared::bare(value) == declaration.name && value.starts_with('$') {
-                // The outer value is handed on, on purpose.
+                // The outer value is passed on intentionally.
                 continue;
             }
             let text = format!(

@@ -15,12 +15,12 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// What refers to a parameter by its name alone.
+/// Elements that refer to a parameter by its name.
 const USES: &[&str] = &["ParameterAction", "ParameterCondition"];
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     if scenario.form() == Form::Scenario && !scenario.storyboard().is_complete() {
-        // What could not be read may use it.
+        // A file that could not be read may use it.
         return;
     }
     let used = used(scenario);
@@ -49,7 +49,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The declarations that a `$name` leads to, wherever in a value it stands.
+/// Returns the declarations that a `$name` leads to, at any position of a value.
 fn used(scenario: &Scenario<'_>) -> HashSet<u32> {
     let mut used = HashSet::new();
     for attribute in scenario.with_dollar() {

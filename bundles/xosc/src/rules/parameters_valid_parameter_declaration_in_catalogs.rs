@@ -46,7 +46,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The parameters of entries that have an empty default, are used, and get nothing by a reference.
+/// Reports parameters of entries that have an empty default, are used, and are not assigned by a
+/// reference.
 fn without_value(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let mut said: HashSet<Node<'_>> = HashSet::default();
     for (reference, _) in catalogs::references(scenario) {
@@ -60,7 +61,7 @@ fn without_value(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 .data_type
                 .is_none_or(|data_type| data_type == DataType::String);
             let is_open = declaration.declared == Declared::Faulty && is_empty && !is_text;
-            // What was assigned and does not fit is said there.
+            // An assigned value that does not fit is reported at the assignment.
             if !is_open || assigns(reference, declaration.name) || !said.insert(declaration.node) {
                 continue;
             }
@@ -93,7 +94,7 @@ fn assigns(reference: Element<'_, '_>, name: &str) -> bool {
     })
 }
 
-/// The first attribute within an entry that is written with a parameter.
+/// Returns the first attribute in an entry that contains a parameter.
 fn first_use<'d>(entry: Node<'d>, name: &str) -> Option<Attribute<'d>> {
     let uses = |text: &str| text.split('$').skip(1).any(|rest| identifier(rest) == name);
     let all = std::iter::once(entry).chain(entry.descendants());

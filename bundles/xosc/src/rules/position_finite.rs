@@ -13,7 +13,7 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// What positions are made of, with the attributes that are numbers.
+/// Elements of positions, with their numeric attributes.
 const NUMBERS: &Numbers = &[
     ("WorldPosition", &["x", "y", "z", "h", "p", "r"]),
     ("RelativeWorldPosition", &["dx", "dy", "dz"]),

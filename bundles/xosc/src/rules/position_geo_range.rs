@@ -21,13 +21,14 @@ const UIDS: [&str; OWN.len() + GEO.len()] = ranges::uids(&OWN, GEO);
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     ranges::report_as_own(scenario, GEO, found);
-    // Before, the schema demands both.
+    // Before 1.2 the schema requires both.
     if scenario.version() >= (1, 2) {
         both_given(scenario, found);
     }
 }
 
-/// Since each may be given in radians or in degrees, no schema can demand that one of them is there.
+/// Checks that latitude and longitude are given. Each may be given in radians or in degrees, so no
+/// schema can require one of them.
 fn both_given(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for position in scenario.elements_everywhere("GeoPosition") {
         for (degrees, radians) in [("latitudeDeg", "latitude"), ("longitudeDeg", "longitude")] {

@@ -25,7 +25,7 @@ const TURNS: Param = Param::number(
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    // Rounded to three digits, a full turn may be 6.284.
+    // The tolerance accepts 6.284, a full turn rounded to three digits.
     let most = found.number(&TURNS) * std::f64::consts::TAU + 1e-3;
     let mut said = HashSet::new();
     for name in ["WorldPosition", "Orientation"] {
@@ -40,12 +40,12 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                     trajectory.node().document().path(),
                     trajectory.node().index(),
                 );
-                // Thousands of vertices have the same fault: the first one is said.
+                // Thousands of vertices may have the same fault, so only the first one is reported.
                 if value.abs() <= 5.0 * most || !said.insert(key) {
                     continue;
                 }
             }
-            // Angles that were added up may be a little more than a full turn.
+            // Accumulated angles may be a little more than a full turn.
             let level = if value.abs() > 2.0 * most {
                 Level::Warning
             } else {

@@ -63,11 +63,11 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Looks at what a place has besides `pathS`, where the station is known.
+/// Checks the attributes of a place besides `pathS`, if the station is known.
 fn beside(place: Element<'_, '_>, road: &Road<'_>, s: f64, found: &mut Sink<'_>) {
     if let Some(text) = place.text("laneId") {
         let id = lane_id(&text).filter(|id| *id != 0);
-        // A lane that no road has is said elsewhere.
+        // A lane that exists nowhere is reported elsewhere.
         let is_somewhere = road
             .sections()
             .any(|section| id.is_some_and(|id| section.lane(id).is_some()));
@@ -105,17 +105,18 @@ fn beside(place: Element<'_, '_>, road: &Road<'_>, s: f64, found: &mut Sink<'_>)
     }
 }
 
-/// How long a route may be.
+/// Maximum length of a route.
 struct Length<'w, 'r> {
     most: f64,
     is_exact: bool,
-    /// The road that it runs on, where it begins there, and in which direction it goes on.
+    /// The road of the route, its start station and its direction.
     line: Option<(&'w Road<'r>, f64, f64)>,
 }
 
 impl<'w, 'r> Length<'w, 'r> {
-    /// The length, where it does not depend on the way that a simulator finds because all waypoints
-    /// follow each other in one direction of one road; else no leg passes any road twice.
+    /// Returns the length. It is exact if all waypoints follow each other in one direction of one
+    /// road. Then it does not depend on the path that a simulator finds. Otherwise no leg passes
+    /// any road twice.
     fn of(
         route: Element<'_, '_>,
         map: &'w RoadMap<'r>,
@@ -157,9 +158,9 @@ impl<'w, 'r> Length<'w, 'r> {
     }
 }
 
-/// How far one gets at most from the first waypoint to the last: the farthest that one gets at all from the
-/// first, without what is left of the last one's road. `None` where roads lead round in a circle, or where
-/// it is not known which way one sets out.
+/// Returns the maximum distance from the first waypoint to the last. It is the farthest distance
+/// from the first waypoint, without the rest of the last one's road. Returns `None` if roads form a
+/// circle, or if the initial direction is unknown.
 fn onward<'d>(route: Element<'_, 'd>, map: &RoadMap<'_>) -> Option<f64> {
     let ends = |position: Element<'_, 'd>| {
         let road = road_of(position, map).filter(|_| position.is("LanePosition"))?;

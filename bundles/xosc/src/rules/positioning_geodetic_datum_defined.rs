@@ -27,7 +27,7 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
         return;
     }
     let mut positions = scenario.elements_everywhere("GeoPosition");
-    // One map lacks one thing, however many positions rest on it.
+    // The map has one fault, however many positions depend on it.
     let Some(first) = positions.next() else {
         return;
     };

@@ -63,7 +63,7 @@ fn look(scenario: &Scenario<'_>, map: Option<&RoadMap<'_>>, found: &mut Sink<'_>
     }
 }
 
-/// The positions of `Init` that are relative to where another entity begins.
+/// Checks the positions of `Init` that are relative to the start of another entity.
 fn relative_to_others(
     scenario: &Scenario<'_>,
     map: &RoadMap<'_>,
@@ -92,7 +92,7 @@ fn relative_to_others(
             beside_after_all(position, place, slack, found);
             continue;
         }
-        // The farthest that one gets on any way on which it is understood.
+        // The maximum distance for each interpretation of the position.
         let missing = ways.iter().map(|ds| {
             let reach = reach.as_mut()?;
             let most = reach.from(on.road, on.s, *ds > 0.0)?;
@@ -120,7 +120,7 @@ fn relative_to_others(
     }
 }
 
-/// Looks whether a relative position lies within its lane or its road's lanes.
+/// Checks whether a relative position lies within its lane or its road's lanes.
 fn beside_after_all(
     position: Element<'_, '_>,
     place: OnRoad<'_, '_>,
@@ -198,7 +198,7 @@ fn beside_lane(position: Element<'_, '_>, road: &Road<'_>, slack: f64, found: &m
     }
 }
 
-/// Says that an offset leads out of a lane.
+/// Reports an offset that leads out of a lane.
 fn wide_of(
     position: Element<'_, '_>,
     offset: f64,
@@ -207,7 +207,7 @@ fn wide_of(
     slack: f64,
     found: &mut Sink<'_>,
 ) {
-    // The center lane has no width: that it is named at all is what matters.
+    // The center lane has no width. The fault is that it is named at all.
     if lane.id() == Some(0) {
         return;
     }

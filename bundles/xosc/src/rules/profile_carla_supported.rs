@@ -42,7 +42,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         profiles::report(scenario, NAME, GAPS, found);
         return;
     }
-    // Catalogs are read whatever their version.
+    // Catalogs are read in any version.
     let header = scenario.root().child("FileHeader");
     if let Some(header) = header.filter(|_| scenario.form() == Form::Scenario) {
         let text = format!(

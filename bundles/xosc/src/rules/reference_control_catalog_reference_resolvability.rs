@@ -28,7 +28,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let kinds = catalogs::kinds(reference);
         let names = (reference.text("catalogName"), reference.text("entryName"));
         match to {
-            // That nothing is in the directory is one fault, and said there.
+            // A directory without catalogs is one fault and is reported there.
             Resolution::NoCatalog if !has(kinds, &[Fault::Said, Fault::Empty]) => {
                 no_catalog.add((names.0, kinds), reference);
             }
@@ -107,7 +107,7 @@ fn entry(reference: Element<'_, '_>, count: u32, found: &mut Sink<'_>) {
         .at(*catalog, "the catalog");
 }
 
-/// The other catalog that has the entry.
+/// Returns the other catalog that contains the entry.
 fn elsewhere(reference: Element<'_, '_>, name: &str) -> Option<String> {
     let kinds = catalogs::kinds(reference);
     let fits = |entry: Node<'_>| {

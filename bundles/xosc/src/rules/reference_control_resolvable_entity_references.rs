@@ -16,7 +16,7 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    // A catalog knows no entities: those are the business of whoever refers to it.
+    // A catalog has no entities. They are checked in the scenario that refers to it.
     if scenario.form() != Form::Scenario {
         return;
     }
@@ -26,7 +26,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             let Some(name) = reference.text(attribute) else {
                 continue;
             };
-            // Catalogs have parameters for trailers that a vehicle may have: empty, it has none.
+            // Catalogs have parameters for optional trailers of a vehicle. An empty value means no
+            // trailer.
             let left_out = name.is_empty() && reference.written(attribute) != Some("");
             if !left_out && !entities.contains(&name) {
                 let names = entities.names();

@@ -33,7 +33,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What is around the elements that a name and a kind may mean.
+/// Ancestors of the elements that a name and a kind may mean.
 type Known = HashMap<(String, StoryKind), Around>;
 
 fn look_up<'d>(
@@ -46,7 +46,7 @@ fn look_up<'d>(
     let storyboard = scenario.storyboard();
     let matches = storyboard.find(name);
     if matches.is_empty() {
-        // A name with `::` in it is the fault of the name.
+        // A name that contains `::` is a fault of the name itself.
         let named_so = name.contains("::") && storyboard.names().any(|other| other == name);
         if storyboard.is_complete() && !named_so {
             nowhere(scenario, condition, name, found);
@@ -87,7 +87,8 @@ fn look_up<'d>(
                 .entry((name.to_owned(), kind))
                 .or_insert_with(|| around(scenario, &of_kind));
             let level = match nearest(condition, around) {
-                // A maneuver of a catalog that is used twice cannot name its own elements otherwise.
+                // A maneuver of a catalog that is used twice has no other way to name its own
+                // elements.
                 1 if condition.reference().is_some() => Level::Information,
                 1 => Level::Warning,
                 _ => Level::Error,
@@ -102,7 +103,8 @@ fn look_up<'d>(
     }
 }
 
-/// How two elements of one name can be told apart, where their names and those around them do.
+/// Suggests paths that distinguish two elements of one name, if their names and those of their
+/// ancestors do so.
 fn paths(scenario: &Scenario<'_>, first: &StoryElement<'_>, second: &StoryElement<'_>) -> String {
     let paths = path(scenario, first).zip(path(scenario, second));
     paths.map_or_else(String::new, |(first, second)| {
@@ -110,7 +112,7 @@ fn paths(scenario: &Scenario<'_>, first: &StoryElement<'_>, second: &StoryElemen
     })
 }
 
-/// The shortest path that leads to an element alone.
+/// Returns the shortest path that leads to this element only.
 fn path(scenario: &Scenario<'_>, one: &StoryElement<'_>) -> Option<String> {
     let storyboard = scenario.storyboard();
     let mut path = one.name()?.to_owned();
@@ -155,10 +157,10 @@ fn nowhere<'d>(
     found.about(condition, "storyboardElementRef", text);
 }
 
-/// Where an element stands: its offset, and that of the reference to the catalog that it is in.
+/// Position of an element: its offset, and the offset of the reference to its catalog.
 type Spot = (u64, Option<u64>);
 
-/// Of elements of one name and kind: how many lie in each element around them.
+/// Number of elements of one name and kind within each ancestor.
 type Around = HashMap<Spot, usize>;
 
 fn spot(element: Element<'_, '_>) -> Spot {
@@ -177,8 +179,9 @@ fn around<'d>(scenario: &Scenario<'d>, elements: &[&StoryElement<'d>]) -> Around
     around
 }
 
-/// How many of the elements lie nearest to the condition: within the innermost element around it that
-/// has any of them. Simulators that look there first find one when it is the only one.
+/// Returns the number of elements that are nearest to the condition. These are in its innermost
+/// ancestor that contains any. Simulators that search there first find the element if it is the
+/// only one.
 fn nearest(condition: Element<'_, '_>, around: &Around) -> usize {
     condition
         .ancestors()

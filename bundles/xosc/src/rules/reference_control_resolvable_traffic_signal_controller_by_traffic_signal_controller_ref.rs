@@ -20,7 +20,7 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    // A maneuver in a catalog may be meant for scenarios that have the controller.
+    // A maneuver in a catalog may be meant for scenarios with the controller.
     if scenario.form() != Form::Scenario {
         return;
     }

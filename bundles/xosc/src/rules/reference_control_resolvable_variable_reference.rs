@@ -15,7 +15,7 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    // A catalog's maneuver may be used by any scenario.
+    // Any scenario may use a catalog's maneuver.
     if scenario.form() == Form::Scenario {
         declared::VARIABLES.resolve(scenario, found);
     }

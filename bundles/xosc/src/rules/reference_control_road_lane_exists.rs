@@ -21,7 +21,7 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Roads that are named in a text.
+/// Maximum number of roads in a message.
 const MOST_ROADS: usize = 8;
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -61,7 +61,7 @@ fn look(scenario: &Scenario<'_>, network: &RoadNetwork, map: &RoadMap<'_>, found
     }
 }
 
-/// Lanes of roads that are not named: some road of the map must have such a lane.
+/// Checks lanes without a road: some road of the map must have such a lane.
 fn on_any_road(
     scenario: &Scenario<'_>,
     network: &RoadNetwork,
@@ -101,7 +101,7 @@ fn on_any_road(
     }
 }
 
-/// Changes by more lanes than any road has.
+/// Reports changes by more lanes than any road has.
 fn too_many(
     scenario: &Scenario<'_>,
     network: &RoadNetwork,
@@ -113,7 +113,7 @@ fn too_many(
             continue;
         };
         let most = network.most_lanes();
-        // Whether the center lane counts is understood in two ways.
+        // Tools disagree on whether the center lane counts.
         if by.unsigned_abs() <= most {
             continue;
         }
@@ -128,8 +128,8 @@ fn too_many(
     }
 }
 
-/// Says that there is no lane where a position relative to an entity's first place would be, however
-/// lanes are counted.
+/// Reports a position relative to an entity's first place if no lane exists there, however lanes
+/// are counted.
 fn beside<'m, 'd>(
     position: Element<'m, 'd>,
     origins: &Origins<'m, 'd, '_, '_>,
@@ -172,7 +172,7 @@ fn beside<'m, 'd>(
         .at(on.road.node(), "the road");
 }
 
-/// The first of the roads, with their names.
+/// Lists the first of the roads, with their names.
 fn roads(map: &RoadMap<'_>) -> String {
     let ids = sorted(map.roads().iter().map(Road::id));
     let named = ids.iter().take(MOST_ROADS).map(|id| {
@@ -189,8 +189,8 @@ fn roads(map: &RoadMap<'_>) -> String {
     }
 }
 
-/// Without the map nobody knows whether its roads would be there: said once, so that whoever mends the
-/// map's path knows what hangs on it.
+/// Reports once that roads could not be looked up without the map. The author then knows what
+/// depends on the map's path.
 fn not_looked_for(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let positions = ON_ROAD
         .iter()
@@ -242,7 +242,7 @@ fn lane(position: Element<'_, '_>, road: &Road<'_>, found: &mut Sink<'_>) {
         return;
     };
     let Some(id) = lane_id(&text) else {
-        // Tools that write such names write them into the map as well.
+        // Tools that write such names also write them into the map.
         let is_written = road
             .sections()
             .flat_map(|section| section.lanes())
@@ -276,7 +276,7 @@ fn lane(position: Element<'_, '_>, road: &Road<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What lanes there are instead.
+/// Lists the existing lanes.
 fn lanes_of(section: SectionRef<'_, '_>) -> String {
     let mut ids: Vec<i64> = section.lanes().filter_map(|lane| lane.id()).collect();
     ids.retain(|id| *id != 0);

@@ -45,7 +45,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Why a path leads somewhere on one machine only.
+/// Returns the reason why a path is valid on one machine only.
 fn only_here(path: &str) -> Option<&'static str> {
     let path = path.trim();
     let path = path.strip_prefix("file://").unwrap_or(path);
@@ -64,7 +64,7 @@ fn only_here(path: &str) -> Option<&'static str> {
     is_private.then_some("leads into one person's directory")
 }
 
-/// What the text alone tells of a scene graph: files of this kind are not opened.
+/// Checks the path of a scene graph by its text only, because files of this kind are not opened.
 fn scene(file: Element<'_, '_>, path: &str, found: &mut Sink<'_>) {
     let path = path.trim();
     if path.ends_with(['/', '\\']) || path == "." || path == ".." {

@@ -18,15 +18,15 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     if scenario.form() != Form::Scenario || !matches!(scenario.network(), Network::Unnamed) {
         return;
     }
-    // An empty path is said where files are looked for, and that there is no `RoadNetwork` at all by
-    // the schema.
+    // An empty path is reported where files are looked up. The schema reports a missing
+    // `RoadNetwork`.
     let Some(network) = scenario.root().child("RoadNetwork") else {
         return;
     };
     let is_named = ["LogicFile", "Logics"]
         .iter()
         .any(|name| network.child(name).is_some());
-    // What cannot work without is an error, and said as one.
+    // Elements that need a road network are reported as an error by another rule.
     let is_missed = [ON_ROADS, ON_SIGNALS]
         .iter()
         .any(|names| !used(scenario, names).is_empty());

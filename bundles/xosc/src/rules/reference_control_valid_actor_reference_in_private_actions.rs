@@ -17,7 +17,7 @@ pub static RULE: Rule<Scene> = Rule {
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for group in scenario.elements("ManeuverGroup") {
-        // A missing `Actors` is the schema's finding.
+        // The schema reports a missing `Actors`.
         let Some(block) = group.child("Actors") else {
             continue;
         };
@@ -40,7 +40,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The private actions of a group, those in maneuvers of catalogs included.
+/// Returns the private actions of a group, including those in maneuvers of catalogs.
 fn private_actions<'m, 'd>(group: Element<'m, 'd>) -> impl Iterator<Item = Element<'m, 'd>> {
     let scenario = group.scenario();
     let entries = group

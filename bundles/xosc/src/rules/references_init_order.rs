@@ -34,7 +34,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let Some(later) = later.and_then(|later| starts.get(*later)) else {
             continue;
         };
-        // A selection's members are placed by one action.
+        // One action places all members of a selection.
         if said.contains(start.name.as_str()) || later.position == start.position {
             continue;
         }
@@ -49,14 +49,14 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whom a position is relative to.
+/// Returns the entity that a position is relative to.
 fn relative_to(position: Element<'_, '_>) -> Option<String> {
     let is_relative = position.name().starts_with("Relative");
     let name = position.text("entityRef").filter(|_| is_relative)?;
     Some(name.into_owned())
 }
 
-/// Entities whose places depend on one another: nobody can compute them.
+/// Reports entities with cyclic relative positions, which cannot be computed.
 fn circle<'s, 'm, 'd>(
     start: &'s Start<'m, 'd>,
     starts: &'s [Start<'m, 'd>],
@@ -71,7 +71,7 @@ fn circle<'s, 'm, 'd>(
         if let Some(begin) = way.iter().position(|one| one.name == at.name) {
             let members = way.get(begin..).unwrap_or(&[]);
             said.extend(members.iter().map(|one| one.name.as_str()));
-            // Relative to itself is a fault of its own.
+            // Another rule reports a position relative to the entity itself.
             if members.len() > 1 {
                 say(members, found);
             }

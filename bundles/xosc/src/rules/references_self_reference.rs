@@ -16,8 +16,8 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Actions that need another one than their actor. That a lane or a single change of speed is counted
-/// from the actor itself is common, and well defined. Synchronising is a rule of its own.
+/// Actions that need an entity other than their actor. A lane or a single change of speed relative
+/// to the actor itself is common and well defined. Another rule checks synchronisation.
 const ACTIONS: &[(&str, &str, &str)] = &[
     (
         "LongitudinalDistanceAction",
@@ -31,7 +31,7 @@ const ACTIONS: &[(&str, &str, &str)] = &[
     ),
 ];
 
-/// Conditions about two, and what is always so with one.
+/// Conditions about two entities, and their constant result if both are the same.
 const CONDITIONS: &[(&str, &str)] = &[
     (
         "RelativeDistanceCondition",
@@ -113,7 +113,8 @@ fn triggering(condition: Element<'_, '_>, always: &str, found: &mut Sink<'_>) {
     let Some(entities) = around.and_then(|around| around.child("TriggeringEntities")) else {
         return;
     };
-    // One of several may be the other one's partner: there it is merely superfluous.
+    // With several entities, each one may be the partner of another one. The reference is then only
+    // superfluous.
     let mut names = entities
         .children_named("EntityRef")
         .map(|one| one.text("entityRef"));
@@ -131,7 +132,7 @@ fn triggering(condition: Element<'_, '_>, always: &str, found: &mut Sink<'_>) {
     }
 }
 
-/// Who has no place yet cannot be placed relative to it.
+/// Reports an entity that is placed relative to itself before it has a place.
 fn first_positions(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let mut seen: foldhash::HashSet<String> = foldhash::HashSet::default();
     for start in placement::starts(scenario) {

@@ -25,7 +25,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         if action.child("TrafficStopAction").is_some() {
             stops.push(action);
         } else if action.has("trafficName") {
-            // A name that is not known may be any.
+            // An unknown name may be any name.
             let Some(name) = action.text("trafficName") else {
                 return;
             };

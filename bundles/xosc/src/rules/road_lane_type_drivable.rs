@@ -17,12 +17,12 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Lanes that no motor vehicle drives or stands on.
+/// Lane types on which no motor vehicle drives or stands.
 const NOT_FOR_VEHICLES: &[&str] = &[
     "none", "border", "median", "curb", "sidewalk", "walking", "biking", "rail", "tram",
 ];
 
-/// Where a pedestrian is in the way of vehicles from the beginning.
+/// Lane types on which a pedestrian obstructs vehicles from the start.
 const FOR_VEHICLES: &[&str] = &[
     "driving",
     "entry",
@@ -77,7 +77,8 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
     relative_to_others(scenario, map, unfit_there, found);
 }
 
-/// Who begins on a lane that the place of another leads to, unless that one is said to be wrong there.
+/// Reports entities that start on an unfit lane because of a relative position. An entity in the
+/// same lane as a reported one is left out.
 fn relative_to_others(
     scenario: &Scenario<'_>,
     map: &RoadMap<'_>,
@@ -154,7 +155,7 @@ fn say(
         .at(lane.node(), "the lane");
 }
 
-/// How bad it is that an entity is on a lane of this type; `None` where it belongs.
+/// Returns the level of an entity on a lane of this type. Returns `None` if it belongs there.
 fn unfit<'d>(
     scenario: &Scenario<'d>,
     entity: &Entity<'d>,
@@ -168,12 +169,12 @@ fn unfit<'d>(
             let fits = match &*category {
                 "bicycle" => kind != "rail",
                 "tram" | "train" => kind == "rail" || kind == "tram",
-                // Lanes that bicycles share with others.
+                // Bicycles may share such lanes with other vehicles.
                 _ => kind == "biking" && lane.advisory().is_some_and(|word| word != "none"),
             };
             (!fits).then_some(Level::Warning)
         }
-        // Who is sent to a driving lane later crosses the road.
+        // A pedestrian that goes to a driving lane later crosses the road.
         EntityKind::Pedestrian if is_init && FOR_VEHICLES.contains(&kind) => {
             Some(Level::Information)
         }

@@ -61,7 +61,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     network.with(|map| relative_to_others(scenario, (network, map), distance, found));
 }
 
-/// Who begins beside all roads, where the place of another leads to.
+/// Reports vehicles that start away from all roads because of a relative position.
 fn relative_to_others(
     scenario: &Scenario<'_>,
     (network, map): (&RoadNetwork, &RoadMap<'_>),
@@ -96,7 +96,8 @@ fn relative_to_others(
     }
 }
 
-/// Beside a road there may be a yard; what is far from all of them is on another map.
+/// Returns the level. There may be a yard beside a road. A place far from all roads is on another
+/// map.
 fn level(nearby: &RoadsNearby, x: f64, y: f64, distance: f64) -> Level {
     if nearby.is_near(x, y, 5.0 * distance) {
         Level::Information

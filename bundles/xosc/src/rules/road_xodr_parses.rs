@@ -25,7 +25,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             let file = files().find(|file| file.node().offset() == linked.referred_at);
             (file, linked.document.root())
         }
-        // What is a catalog of the scenario already, or the scenario itself, is not read a second time.
+        // A file that is already read as a catalog, and the scenario itself, are not read again.
         Network::Unnamed => {
             let file = files().find(|file| file.is("LogicFile"));
             let path = file.and_then(|file| file.text("filepath"));
@@ -43,7 +43,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let (Some(file), Some(root)) = (file, root) else {
         return;
     };
-    // Maps of other formats, such as Lanelet2, are XML too; their names say so.
+    // Maps of other formats, such as Lanelet2, are also XML. Their file names show this.
     let path = root.document().path().to_ascii_lowercase();
     let is_called_map = [".xodr", ".xodrz"]
         .iter()
@@ -61,7 +61,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         .at(root, "the root element of that file");
 }
 
-/// Whether a reference from the scenario's directory leads to a file, as far as its text tells.
+/// Checks by its text whether a reference from the scenario's directory leads to a file.
 fn is_path_of(absolute: &str, reference: &str) -> bool {
     let reference = reference.trim().replace('\\', "/");
     let mut rest = &*reference;

@@ -15,7 +15,7 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Stretches of road that are looked at for all routes of a scenario.
+/// Maximum number of road stretches that are visited for all routes of a scenario.
 const MOST: usize = 4_000_000;
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

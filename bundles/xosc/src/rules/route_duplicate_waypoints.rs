@@ -34,7 +34,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether two positions are one place, as far as they say.
+/// Checks whether two positions are the same place, as far as they state it.
 fn is_same(one: Element<'_, '_>, other: Element<'_, '_>) -> bool {
     if one.name() != other.name() {
         return false;

@@ -13,12 +13,13 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// The last version whose schema counts waypoints.
+/// Last version with a schema that counts waypoints.
 const LAST_SCHEMA: Version = (1, 3);
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for route in routes(scenario) {
-        // Each file has the schema of its own header, and entries of catalogs are held against theirs.
+        // Each file is checked with the schema of its own header, including files with catalog
+        // entries.
         let stated = route.stated_version();
         if stated.is_some_and(|version| version <= LAST_SCHEMA) {
             continue;

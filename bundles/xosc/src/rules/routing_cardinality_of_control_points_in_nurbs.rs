@@ -17,7 +17,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let order = nurbs
             .integer("order")
             .and_then(|order| u64::try_from(order).ok());
-        // Orders below two are out of their range.
+        // Orders below two are out of range.
         if let Some(order) = order.filter(|order| *order >= 2) {
             count(nurbs, order, found);
         }

@@ -44,7 +44,7 @@ fn look_at(element: Element<'_, '_>, attribute: &str, found: &mut Sink<'_>) {
     let Some(length) = longest(trajectory) else {
         return;
     };
-    // One may stand at the end, but not go on from there.
+    // An entity may stand at the end, but cannot continue from there.
     let (is_beyond, lost) = if element.is("TrajectoryPosition") {
         (offset > length + 1e-3, "it ends before that")
     } else {

@@ -24,7 +24,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let Some(shape) = shape(trajectory) else {
             continue;
         };
-        // In 1.0 the schema demands it of vertices.
+        // In 1.0 the schema requires a time for vertices.
         if shape.is("Polyline") && scenario.version() < (1, 1) {
             continue;
         }

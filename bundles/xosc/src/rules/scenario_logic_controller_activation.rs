@@ -25,19 +25,19 @@ const DOMAINS: &[(&str, &str, &str)] = &[
     ("animation", "activateAnimation", "appearance"),
 ];
 
-/// A controller that an entity has.
+/// A controller that is assigned to an entity.
 #[derive(Clone)]
 struct Assigned<'d> {
     name: Option<String>,
     /// The name of its `ObjectController`.
     object_name: Option<String>,
-    /// `None` when it is not said.
+    /// Domains, or `None` if they are not stated.
     domains: Option<String>,
     node: Node<'d>,
 }
 
 impl Assigned<'_> {
-    /// Whether it controls a domain; what is not said is not denied.
+    /// Checks whether it controls a domain. If no domain is stated, the answer is yes.
     fn covers(&self, domain: &str, group: &str) -> bool {
         self.domains
             .as_deref()
@@ -63,7 +63,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The controllers within an action or an `ObjectController`; `None` when one is not known.
+/// Returns the controllers within an action or an `ObjectController`. Returns `None` if one is
+/// unknown.
 fn controllers<'d>(holder: Element<'_, 'd>) -> Option<Vec<Assigned<'d>>> {
     let object = holder.child("ObjectController");
     let around = object.unwrap_or(holder);
@@ -89,7 +90,7 @@ fn controllers<'d>(holder: Element<'_, 'd>) -> Option<Vec<Assigned<'d>>> {
     }])
 }
 
-/// The controllers of each entity at any time; `None` when that is not known of all.
+/// Returns the controllers of each entity at any time. Returns `None` if one of them is unknown.
 fn assigned<'d>(scenario: &Scenario<'d>) -> Option<HashMap<String, Vec<Assigned<'d>>>> {
     let mut all: HashMap<String, Vec<Assigned<'d>>> = HashMap::default();
     for entity in scenario.entities().objects() {
@@ -156,7 +157,7 @@ fn activate(
     }
 }
 
-/// The controllers that an activation is about.
+/// Returns the controllers that an activation is about.
 fn meant<'c, 'd>(
     action: Element<'_, '_>,
     entity: &str,
@@ -178,7 +179,7 @@ fn meant<'c, 'd>(
             .filter(|one| own_name(one) == Some(&*name))
             .collect();
         if meant.is_empty() {
-            // A controller's name and that of its `ObjectController` are mistaken for each other.
+            // Authors confuse a controller's name with that of its `ObjectController`.
             let bears = |one: &Assigned<'_>| {
                 one.name.as_deref() == Some(&*name) || one.object_name.as_deref() == Some(&*name)
             };

@@ -21,7 +21,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let is_named = ["LogicFile", "Logics"].iter().any(|name| {
         let file = network.and_then(|network| network.child(name));
         let path = file.map(|file| file.written("filepath"));
-        // A file without its path is the schema's finding.
+        // The schema reports a file without a path.
         path.is_some_and(|path| path.is_none_or(|path| !path.trim().is_empty()))
     });
     if is_named {

@@ -26,7 +26,7 @@ const TOLERANCE: Param = Param::number(
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);
     for action in scenario.elements_everywhere("SpeedProfileAction") {
-        // With a reference entity the speeds are relative to its own.
+        // With a reference entity the speeds are relative to its speed.
         let follows = action
             .word("followingMode")
             .is_some_and(|mode| mode == "follow");

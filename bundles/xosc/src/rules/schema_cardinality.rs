@@ -15,12 +15,12 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Elements that the schema lets be empty: what they must have any of to do something, and what happens
-/// if they do not.
+/// Elements that may be empty by the schema: children of which they need at least one to have an
+/// effect, and the effect of an empty element.
 const CONTAINERS: &[(&str, &[&str], &str)] = &[
     (
         "ManeuverGroup",
-        // The last one belongs to modular scenarios: that it is there is said by another rule.
+        // The last one belongs to modular scenarios. Another rule reports it.
         &["Maneuver", "CatalogReference", "ScenarioReference"],
         "has neither a `Maneuver` nor a `CatalogReference`: nothing happens in it, and it is over at once",
     ),
@@ -45,7 +45,7 @@ const CONTAINERS: &[(&str, &[&str], &str)] = &[
 ];
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    // Scenarios that only place entities have an empty group because older schemas demand one.
+    // Scenarios that only place entities have an empty group because older schemas require one.
     let groups = scenario.elements("ManeuverGroup");
     let only_places = !groups
         .into_iter()
@@ -54,7 +54,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for (name, contents, effect) in CONTAINERS {
         let silent = match *name {
             "ManeuverGroup" => only_places,
-            // Before that the schema demands all parts of these.
+            // Before 1.1 the schema requires all parts of these elements.
             _ => scenario.version() < (1, 1),
         };
         if silent {

@@ -12,8 +12,8 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Types of which an element must have one of several children, and what these are. The schemas up to
-/// 1.2 let them be empty; from 1.3 on the schema says so itself.
+/// Types of elements that must have one of several children, and a list of these. The schemas up to
+/// 1.2 allow them to be empty. From 1.3 on the schema requires a child.
 const CHOICES: &[(&str, &str)] = &[
     ("Action", "a private, a global or a user-defined action"),
     ("AssignRouteAction", "a `Route` or a `CatalogReference`"),
@@ -98,14 +98,14 @@ const CHOICES: &[(&str, &str)] = &[
     ("VariableModifyRule", "an `AddValue` or a `MultiplyByValue`"),
 ];
 
-/// Children of which the schema demands none, though one alone is due.
+/// Children of which exactly one is required, although the schema requires none.
 struct OneOf {
     element: &'static str,
     alternatives: &'static [&'static str],
     level: Level,
-    /// The versions whose schemas leave it open: from this one to before that one.
+    /// Versions with schemas that do not check this: from the first to before the second.
     versions: ((u16, u16), (u16, u16)),
-    /// Whether the schema leaves several open, too.
+    /// Whether the schema also allows several.
     several: bool,
 }
 

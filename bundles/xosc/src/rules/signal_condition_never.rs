@@ -42,12 +42,13 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The states that the scenario gives each signal that is in a phase; `None` when that is not known.
+/// Returns the states that the scenario gives to each signal that is in a phase. Returns `None` if
+/// they are unknown.
 fn states(scenario: &Scenario<'_>) -> Option<HashMap<String, BTreeSet<String>>> {
     if !scenario.storyboard().is_complete() {
         return None;
     }
-    // Which signals a group has only the road network's own controllers say.
+    // Only the controllers of the road network define the signals of a group.
     if scenario
         .elements_everywhere("TrafficSignalGroupState")
         .next()
@@ -63,7 +64,7 @@ fn states(scenario: &Scenario<'_>) -> Option<HashMap<String, BTreeSet<String>>> 
     }
     for action in scenario.elements_everywhere("TrafficSignalStateAction") {
         let signal = action.text("name")?;
-        // Without a phase it begins as the simulator likes.
+        // Without a phase the simulator chooses the first state.
         if let Some(own) = states.get_mut(&*signal) {
             own.insert(trimmed(action)?);
         }

@@ -30,7 +30,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
 }
 
 fn delay_alone(controller: Element<'_, '_>, found: &mut Sink<'_>) {
-    // No delay at all is what a controller without reference has.
+    // A controller without a reference has no delay.
     let Some(delay) = controller.number("delay").filter(|delay| *delay != 0.0) else {
         return;
     };

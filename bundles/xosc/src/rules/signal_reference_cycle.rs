@@ -20,7 +20,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         .iter()
         .map(|one| controllers.find(&one.text("reference")?))
         .collect();
-    // Every controller has one reference at most, so each walk ends where an earlier one went.
+    // Every controller has at most one reference. Each walk therefore ends where an earlier one
+    // passed.
     let mut walked_by: Vec<Option<usize>> = vec![None; next.len()];
     for start in 0..next.len() {
         let mut at = start;
@@ -39,7 +40,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Says the cycle that a controller is part of.
+/// Reports the cycle that a controller is part of.
 fn report(
     controllers: &Controllers<'_, '_>,
     next: &[Option<usize>],
@@ -50,7 +51,7 @@ fn report(
     let along = |at: &usize| next.get(*at).copied().flatten();
     let mut cycle = vec![first];
     cycle.extend(std::iter::successors(along(&first), along).take_while(|at| *at != first));
-    // The cycle begins where a reader of the file comes upon it.
+    // The report begins with the first controller of the cycle in the file.
     let least = cycle.iter().enumerate().min_by_key(|(_, at)| **at);
     let turn = least.map_or(0, |(turn, _)| turn);
     cycle.rotate_left(turn);

@@ -21,7 +21,7 @@ const WITH_STATE: &[&str] = &[
     "TrafficSignalGroupState",
 ];
 
-/// Words that simulators are known to understand, alone or joined.
+/// Words that simulators are known to understand, alone or combined.
 const WORDS: &[&str] = &[
     "on",
     "off",

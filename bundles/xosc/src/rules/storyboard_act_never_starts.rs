@@ -15,8 +15,8 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Whether anything is in the act: scenarios that only place entities have an empty one because older
-/// schemas demand an act.
+/// Checks whether the act has any content. Scenarios that only place entities have an empty act
+/// because older schemas require one.
 fn has_content(act: Element<'_, '_>) -> bool {
     triggers::maneuvers(act).next().is_some()
 }

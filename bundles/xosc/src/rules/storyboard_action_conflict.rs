@@ -17,7 +17,7 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// An action with the event around it.
+/// An action and its event.
 type Taken<'m, 'd> = (Element<'m, 'd>, Element<'m, 'd>);
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -90,8 +90,8 @@ fn take<'m, 'd>(
     }
 }
 
-/// Whether the two events are of one maneuver and their priorities are the question, which another rule
-/// asks.
+/// Checks whether both events are in one maneuver and depend on their priorities. Another rule
+/// checks these.
 fn by_priority<'d>(event: Element<'_, 'd>, other: Element<'_, 'd>) -> bool {
     let parallel = |one: Element<'_, 'd>| one.word("priority").as_deref() == Some("parallel");
     event != other && event.parent() == other.parent() && !(parallel(event) && parallel(other))

@@ -7,7 +7,7 @@ pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_storyboard_empty",
     uids: &["qcbus.dev:xosc:1.0.0:storyboard.empty"],
     level: Level::Warning,
-    // Before that the schema demands a story.
+    // Before 1.2 the schema requires a story.
     versions: "1.2.0..",
     after: super::READABLE,
     page: include_str!("storyboard_empty.md"),

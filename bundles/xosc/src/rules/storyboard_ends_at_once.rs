@@ -19,7 +19,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let Some(storyboard) = scenario.root().child("Storyboard") else {
         return;
     };
-    // Without anything to happen there is nothing to miss.
+    // Without a story the early end has no effect.
     if storyboard.child("Story").is_none() {
         return;
     }

@@ -18,7 +18,7 @@ pub static RULE: Rule<Scene> = Rule {
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for group in scenario.elements("ManeuverGroup") {
         let actor = group.path(&["Actors", "EntityRef"]);
-        // What a maneuver of a catalog does may be private.
+        // A maneuver of a catalog may have private actions.
         let (Some(actor), None) = (actor, group.child("CatalogReference")) else {
             continue;
         };

@@ -33,15 +33,15 @@ fn run<'d>(scenario: &Scenario<'d>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether the condition cannot be true before the element starts.
+/// Checks whether the condition cannot be true before the element starts.
 fn waits_for_itself<'d>(element: Element<'_, 'd>, condition: &StateCondition<'_, 'd>) -> bool {
     let before = ["standbyState", "skipTransition"];
     (condition.target == element && !before.contains(&&*condition.state))
         || ends_around(element, condition)
 }
 
-/// Whether the condition waits for the end of an element around this one, after which nothing in it
-/// starts.
+/// Checks whether the condition waits for the end of an ancestor of this element. After this end,
+/// no element in it starts.
 fn ends_around<'d>(element: Element<'_, 'd>, condition: &StateCondition<'_, 'd>) -> bool {
     let over = ["completeState", "endTransition", "stopTransition"];
     over.contains(&&*condition.state)

@@ -34,8 +34,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Whether the start trigger of the act or that of an event has a condition about entities; `None` when
-/// a maneuver is not known, or there is none.
+/// Checks whether the start trigger of the act or of an event has a condition about entities.
+/// Returns `None` if a maneuver is unknown, or there is none.
 fn triggered_by_entities(group: Element<'_, '_>) -> Option<bool> {
     let by_entity = |owner: Element<'_, '_>| {
         owner.child("StartTrigger").is_some_and(|trigger| {

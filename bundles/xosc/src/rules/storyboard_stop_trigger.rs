@@ -24,7 +24,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                         a `SimulationTimeCondition` would";
             found.about(trigger, "", text);
         }
-        // Before 1.3 the schema demands one.
+        // Before 1.3 the schema requires one.
         None if scenario.version() >= (1, 3) => {
             let text = "the storyboard has no `StopTrigger`: nothing ends the run; a `SimulationTimeCondition` \
                         would";

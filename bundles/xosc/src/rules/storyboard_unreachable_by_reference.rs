@@ -53,7 +53,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// The names one after the other, the middle of a long list left out.
+/// Joins the names. The middle of a long list is left out.
 fn chain(names: &[String]) -> String {
     const MOST: usize = 6;
     let join = |names: &[String]| names.join(", which waits for ");

@@ -19,7 +19,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let times = clothoid
             .number("startTime")
             .zip(clothoid.number("stopTime"));
-        // To stop at zero or before is out of range already.
+        // A stop time of zero or below is already out of range.
         let wrong = times.filter(|(start, stop)| start >= stop && *stop > 0.0);
         let Some((start, stop)) = wrong else {
             continue;
@@ -27,7 +27,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let timing = clothoid.ancestor("Trajectory").map(timing_of);
         let level = match timing {
             Some(Timing::Asked(_)) => Level::Error,
-            // Two zeros are what exporters write when there are no times.
+            // Exporters write two zeros if there are no times.
             _ if start <= stop => continue,
             _ => Level::Warning,
         };

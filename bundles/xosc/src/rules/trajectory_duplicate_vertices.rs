@@ -20,7 +20,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let Some(shape) = shape(trajectory).filter(|shape| shape.is("Polyline")) else {
             continue;
         };
-        // Who keeps to times may stand still; and that times do not increase is a fault of its own.
+        // An entity that keeps to times may stand still. Another rule reports times that do not
+        // increase.
         let may_wait = match timing_of(trajectory) {
             Timing::Asked(_) => continue,
             Timing::Ignored => false,

@@ -24,7 +24,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             _ => None,
         });
         let falls: Vec<_> = falls.collect();
-        // A fall back to the beginning makes every later knot wrong; the first one is to be mended.
+        // A fall back to the start makes every later knot wrong. The first one must be fixed.
         let Some((one, two, before, after)) = falls.first() else {
             continue;
         };

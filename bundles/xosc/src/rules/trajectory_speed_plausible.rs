@@ -58,7 +58,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What the weakest of the vehicles that follow the trajectory can do.
+/// Limits of the slowest vehicle that follows the trajectory.
 struct Limits<'m, 'd> {
     performance: Element<'m, 'd>,
     name: &'m str,
@@ -91,7 +91,7 @@ impl<'m, 'd> Limits<'m, 'd> {
     }
 }
 
-/// A vertex with the time and the distance from the first one.
+/// A vertex with its time and its distance from the first one.
 type Point<'m, 'd> = (Element<'m, 'd>, f64, f64);
 
 fn points<'m, 'd>(polyline: Element<'m, 'd>, scale: f64) -> Vec<Point<'m, 'd>> {
@@ -109,7 +109,7 @@ fn points<'m, 'd>(polyline: Element<'m, 'd>, scale: f64) -> Vec<Point<'m, 'd>> {
             way += distance;
         }
         let time = time * scale;
-        // Times that do not increase are a fault of their own.
+        // Another rule reports times that do not increase.
         if points.last().is_some_and(|(_, last, _)| time <= *last) {
             return Vec::new();
         }
@@ -119,7 +119,7 @@ fn points<'m, 'd>(polyline: Element<'m, 'd>, scale: f64) -> Vec<Point<'m, 'd>> {
     points
 }
 
-/// Says where the vehicle would have to be faster than it can be.
+/// Reports where the vehicle would have to exceed its maximum speed.
 fn speed(
     action: Element<'_, '_>,
     points: &[Point<'_, '_>],
@@ -143,7 +143,7 @@ fn speed(
     true
 }
 
-/// Says where the vehicle would have to accelerate more than it can.
+/// Reports where the vehicle would have to exceed its maximum acceleration or deceleration.
 fn acceleration(
     action: Element<'_, '_>,
     points: &[Point<'_, '_>],
@@ -181,8 +181,8 @@ fn acceleration(
     say(action, vertex, limits, text, found);
 }
 
-/// The mean speeds over pieces of at least `least` seconds: where a piece ends, the middle of its
-/// time, and the speed.
+/// Returns the mean speeds over pieces of at least `least` seconds. Each has the end of the piece,
+/// the middle of its time, and the speed.
 fn spans<'m, 'd>(points: &[Point<'m, 'd>], least: f64) -> Vec<Point<'m, 'd>> {
     let mut spans = Vec::new();
     let mut begin: Option<Point<'m, 'd>> = None;
@@ -213,7 +213,7 @@ fn say(
     let finding = found
         .about(vertex, "time", text)
         .at(limits.performance.node(), "what the vehicle can do");
-    // A trajectory of a catalog is said where it is referred to.
+    // A trajectory of a catalog is already reported at its reference.
     if vertex.reference().is_none() {
         finding.at(action.node(), "who follows the trajectory");
     }

@@ -19,7 +19,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let is_asked = match timing_of(trajectory) {
             Timing::Asked(_) => true,
             Timing::Unknown => false,
-            // Older exporters write `0` for every vertex, and nobody looks at it.
+            // Older exporters write `0` for every vertex, and these times are not used.
             Timing::Ignored => continue,
         };
         let Some(shape) = shape(trajectory).filter(|shape| !shape.is("Clothoid")) else {
@@ -29,7 +29,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// A time that does not come after the one before it.
+/// A time that is not after the previous one.
 #[derive(Clone, Copy)]
 struct Step<'m, 'd> {
     from: (TimedPoint<'m, 'd>, f64),
@@ -37,7 +37,8 @@ struct Step<'m, 'd> {
 }
 
 impl Step<'_, '_> {
-    /// How bad it is; `None` where time does go on.
+    /// Returns the level of the fault, or `None` if the time increases. Equal times are no fault if
+    /// the times are unused.
     fn level(&self, is_asked: bool) -> Option<Level> {
         let ((from, before), (to, after)) = (self.from, self.to);
         if after > before {
@@ -53,7 +54,7 @@ impl Step<'_, '_> {
         if !is_asked {
             return None;
         }
-        // To be at two places at one time is impossible; to be named twice is not.
+        // Two places at the same time are impossible. The same place may be listed twice.
         let distance = from.spot().zip(to.spot());
         let distance = distance.and_then(|(from, to)| from.distance(&to));
         let is_jump = distance.is_some_and(|distance| distance > 1e-3) && from.element.is("Vertex");

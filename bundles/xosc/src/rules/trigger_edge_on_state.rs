@@ -33,7 +33,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// What is odd about an edge of a condition about time, which only ever grows, from 0 on.
+/// Checks the edge of a condition about time. Time starts at 0 and only increases.
 fn of_time(time: Element<'_, '_>, edge: &str) -> Option<(Level, String)> {
     let value = time.number("value")?;
     let rule = time.word("rule")?;
@@ -64,7 +64,7 @@ fn of_time(time: Element<'_, '_>, edge: &str) -> Option<(Level, String)> {
     }
 }
 
-/// What is odd about an edge of a condition about a transition, which lasts for one step.
+/// Checks the edge of a condition about a transition. A transition lasts for one step.
 fn of_state(state: Element<'_, '_>, edge: &str) -> Option<(Level, String)> {
     let name = state.word("state")?;
     let transition = name.ends_with("Transition");

@@ -21,7 +21,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             if condition.word("rule").as_deref() != Some("equalTo") {
                 continue;
             }
-            // Standing still, and no distance between bounding boxes, come out as 0 exactly.
+            // A standstill and a zero distance between bounding boxes are exactly 0.
             let Some(value) = condition.number("value").filter(|value| *value != 0.0) else {
                 continue;
             };

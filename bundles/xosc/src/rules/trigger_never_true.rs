@@ -14,7 +14,7 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// Conditions about what is never below zero, and what that is.
+/// Conditions about quantities that are never below zero, and their names.
 const NEVER_NEGATIVE: &[(&str, &str)] = &[
     ("SimulationTimeCondition", "the simulation time"),
     ("TimeHeadwayCondition", "a time headway"),
@@ -35,7 +35,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 "lessOrEqual" | "equalTo" => value < 0.0,
                 _ => false,
             };
-            // Numbers below zero are out of range elsewhere, and an edge that never comes is said there.
+            // Other rules report numbers below zero and edges that never occur.
             let is_time = condition.is("SimulationTimeCondition");
             if !never || (value < 0.0 && !is_time) || (is_time && rises(condition, &rule)) {
                 continue;

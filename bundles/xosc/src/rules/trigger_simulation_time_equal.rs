@@ -25,7 +25,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         if time.word("rule").as_deref() != Some("equalTo") {
             continue;
         }
-        // The run begins at 0: that moment is there in any case.
+        // The run begins at 0, so this moment always occurs.
         let Some(value) = time.number("value").filter(|value| *value > 0.0) else {
             continue;
         };

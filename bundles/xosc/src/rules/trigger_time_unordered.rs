@@ -16,17 +16,17 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// A moment that a condition about time names.
+/// A time that a condition names.
 type Moment<'m, 'd> = (f64, Element<'m, 'd>);
 
-/// From how many times the end on a start is so late that it is late on purpose.
+/// Factor of the end time from which a late start is intentional.
 const FAR: f64 = 10.0;
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let Some(storyboard) = scenario.root().child("Storyboard") else {
         return;
     };
-    // That nothing starts in a run that ends at once need not be said of everything.
+    // If the run ends at once, a report about each element would be redundant.
     let run_ends = end(storyboard)
         .filter(|_| !ends_at_once(storyboard))
         .map(|moment| (moment, "the run"));
@@ -38,7 +38,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             else {
                 continue;
             };
-            // What lies in an act that never starts need not be said, too.
+            // Elements in an act that never starts need no report of their own.
             if too_late(act, at, what, by, found) {
                 continue;
             }
@@ -57,7 +57,7 @@ fn ends_at_once(storyboard: Element<'_, '_>) -> bool {
     trigger.is_some_and(|trigger| groups(trigger).any(at_once))
 }
 
-/// Says that an element cannot start before the end.
+/// Reports that an element cannot start before the end.
 fn too_late(
     element: Element<'_, '_>,
     end: f64,
@@ -84,7 +84,7 @@ fn too_late(
         short(start),
         short(end)
     );
-    // Who writes a time so far away means never.
+    // A time this far away means never.
     let on_purpose = start >= FAR * end;
     let level = if on_purpose {
         Level::Information
@@ -98,8 +98,8 @@ fn too_late(
     true
 }
 
-/// When the stop trigger of an element is true for certain: it has a group that asks for nothing but the
-/// time.
+/// Returns the time at which the stop trigger of an element is certainly true. It needs a group
+/// with only one condition about the time.
 fn end<'m, 'd>(element: Element<'m, 'd>) -> Option<Moment<'m, 'd>> {
     let alone = |group: Vec<Element<'m, 'd>>| match group.as_slice() {
         [condition] => {
@@ -115,7 +115,8 @@ fn end<'m, 'd>(element: Element<'m, 'd>) -> Option<Moment<'m, 'd>> {
         .min_by(|(one, _), (other, _)| one.total_cmp(other))
 }
 
-/// Before when the start trigger of an element cannot be true; `None` when it can be at any time.
+/// Returns the time before which the start trigger of an element cannot be true. Returns `None` if
+/// it can be true at any time.
 fn start<'m, 'd>(element: Element<'m, 'd>) -> Option<Moment<'m, 'd>> {
     let mut first: Option<Moment<'m, 'd>> = None;
     for group in groups(element.child("StartTrigger")?) {

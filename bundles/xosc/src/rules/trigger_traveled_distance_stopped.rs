@@ -52,7 +52,7 @@ fn run<'d>(scenario: &Scenario<'d>, found: &mut Sink<'_>) {
     }
 }
 
-/// The entities that a condition is about; `None` when one is not known.
+/// Returns the entities that a condition is about. Returns `None` if one is unknown.
 fn entities<'m, 'd>(triggering: Element<'m, 'd>) -> Option<Vec<&'m Entity<'d>>> {
     let known = triggering.scenario().entities();
     let mut entities = Vec::new();
@@ -62,7 +62,7 @@ fn entities<'m, 'd>(triggering: Element<'m, 'd>) -> Option<Vec<&'m Entity<'d>>> 
     Some(entities)
 }
 
-/// Whether nothing moves an entity.
+/// Checks whether an entity is never moved.
 fn stays<'d>(scenario: &Scenario<'d>, entity: &Entity<'d>, moved: &HashSet<String>) -> bool {
     let controlled = entity.element(scenario).child("ObjectController");
     let known = matches!(
@@ -74,9 +74,10 @@ fn stays<'d>(scenario: &Scenario<'d>, entity: &Entity<'d>, moved: &HashSet<Strin
         && controlled.is_none_or(|controller| controller.children().next().is_none())
 }
 
-/// The names of the entities that any action moves; `None` when it is not known of one of them.
+/// Returns the names of the entities that any action moves. Returns `None` if one of them is
+/// unknown.
 fn moved(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
-    // Trailers go where their vehicle goes; a group without a known maneuver may do anything.
+    // Trailers move with their vehicle. A group with an unknown maneuver may do anything.
     let trailers = ["Trailer", "TrailerAction"];
     let towed = trailers
         .iter()
@@ -86,7 +87,7 @@ fn moved(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
     }
     let mut moved = HashSet::new();
     for action in scenario.elements_everywhere("PrivateAction") {
-        // In catalogs that are looked at for themselves nobody acts.
+        // Catalogs that are checked by themselves have no actors.
         if moves(action) {
             let acting = acting(action)?;
             moved.extend(acting.into_iter().map(|entity| entity.name().to_owned()));
@@ -95,7 +96,7 @@ fn moved(scenario: &Scenario<'_>) -> Option<HashSet<String>> {
     Some(moved)
 }
 
-/// Whether an action may move somebody. Setting the speed to 0 does not.
+/// Checks whether an action may move an entity. Setting the speed to 0 does not.
 fn moves(action: Element<'_, '_>) -> bool {
     action.children().any(|kind| match kind.name() {
         "VisibilityAction" | "AppearanceAction" | "TeleportAction" => false,

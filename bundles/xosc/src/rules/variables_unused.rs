@@ -15,7 +15,7 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-/// What uses a variable.
+/// Elements that use a variable.
 const USES: &[&str] = &["VariableAction", "VariableCondition"];
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

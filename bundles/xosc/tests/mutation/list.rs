@@ -1,47 +1,47 @@
-//! The list of edits; its form is described at its top.
+//! The list of edits. The beginning of the list describes its format.
 
 use std::path::{Path, PathBuf};
 
 use qcbus_sdk::mutate::{Edit, Target};
 
-/// A rule and what should make it fire.
+/// A rule and the edits that should make it fire.
 #[derive(Debug)]
 pub struct Entry {
     pub family: String,
     /// The checker's id without its prefix.
     pub rule: String,
     pub edits: Vec<Mutation>,
-    /// Why there is none.
+    /// Reason if there are no edits.
     pub without: Option<String>,
 }
 
-/// A violation: edits that belong together.
+/// A violation: a set of edits that belong together.
 #[derive(Debug)]
 pub struct Mutation {
-    /// As it stands in the list.
+    /// Text in the list.
     pub text: String,
     /// The scenario that is edited.
     pub base: String,
     pub edits: Vec<Edit>,
-    /// Where it must be found; where the edits are, when there is none.
+    /// Places of the expected finding. If empty, the places of the edits.
     pub at: Vec<Target>,
-    /// Another name for the scenario.
+    /// Another file name for the scenario.
     pub name: Option<PathBuf>,
-    /// How many findings the rule has.
+    /// Expected number of findings of the rule.
     pub times: usize,
-    /// Other rules that fire, and why.
+    /// Other rules that fire, with the reasons.
     pub also: Vec<(String, String)>,
 }
 
 impl Mutation {
-    /// The file that is looked at.
+    /// Returns the file that is checked.
     pub fn file(&self) -> PathBuf {
         let base = || Path::new(&self.base).with_added_extension("xosc");
         self.name.clone().unwrap_or_else(base)
     }
 }
 
-/// Reads the list; the text of an error begins with the line's number.
+/// Parses the list. An error text begins with the line number.
 pub fn read(text: &str) -> Result<Vec<Entry>, String> {
     let (mut family, mut all) = (String::new(), Vec::<Entry>::new());
     for (number, line) in text.lines().enumerate() {
@@ -74,13 +74,13 @@ pub fn read(text: &str) -> Result<Vec<Entry>, String> {
     Ok(all)
 }
 
-/// The entries by family, in the list's order.
+/// Returns the entries by family, in the list's order.
 pub fn families(entries: &[Entry]) -> impl Iterator<Item = (&str, &[Entry])> {
     let same = entries.chunk_by(|one, other| one.family == other.family);
     same.filter_map(|entries| Some((entries.first()?.family.as_str(), entries)))
 }
 
-/// One for every scenario that the line names.
+/// Returns one mutation for every scenario that the line names.
 fn mutations(line: &str) -> Result<Vec<Mutation>, String> {
     let (bases, rest) = line.split_once(" | ").ok_or("no edit")?;
     let bases = bases.split(' ');

@@ -1,4 +1,4 @@
-//! What came of the edits, as tables.
+//! Results of the edits, as tables.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -11,10 +11,10 @@ pub const PATH: &str = concat!(
     "/../../docs/evidence/mutation-openscenario.md"
 );
 
-/// What marks a further finding that should not be one.
+/// Marker of a further finding that should not exist.
 const DOUBLED: &str = "doubled:";
 
-/// What came of some edits.
+/// Results of some edits.
 #[derive(Default)]
 struct Row<'e> {
     bases: BTreeSet<&'e str>,
@@ -123,7 +123,7 @@ fn by_rule(entries: &[Entry], trials: &[Trial<'_>]) -> String {
     text
 }
 
-/// The trials of a rule's edits.
+/// Returns the trials of a rule's edits.
 fn of<'t>(entry: &Entry, trials: &'t [Trial<'t>]) -> impl Iterator<Item = &'t Trial<'t>> {
     let rule = entry.rule.clone();
     trials.iter().filter(move |trial| trial.entry.rule == rule)

@@ -1,4 +1,4 @@
-//! What an edit leads to, and whether that is what it should.
+//! The result of an edit, compared with the expected one.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -12,10 +12,10 @@ use super::list::{Entry, Mutation};
 
 pub const WORLD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mutation/world");
 
-/// A scenario with which nothing is wrong.
+/// A scenario without faults.
 pub struct Base {
     pub name: &'static str,
-    /// Beginnings of the names of rules that are on though they are off by default.
+    /// Prefixes of the names of rules that are on here, although they are off by default.
     with: &'static [&'static str],
 }
 
@@ -43,19 +43,19 @@ pub const BASES: [Base; 11] = [
     base("catalogs/vehicles/vehicles"),
 ];
 
-/// A checker's rule: its id without what is in front of the name and without what marks a backport.
+/// Returns the rule of a checker: its id without the prefix and without the backport suffix.
 pub fn rule_of(id: &str) -> &str {
     let name = id.split_once("_xosc_").map_or(id, |(_, name)| name);
     name.strip_suffix(BACKPORT_SUFFIX).unwrap_or(name)
 }
 
-/// What came of an edit.
+/// Result of an edit.
 pub struct Trial<'e> {
     pub entry: &'e Entry,
     pub edit: &'e Mutation,
     pub said: Vec<Said>,
     spots: Spots,
-    /// Why it could not be tried.
+    /// Reason why the edit could not be tried.
     error: Option<String>,
 }
 
@@ -70,7 +70,7 @@ impl Trial<'_> {
         self.said.iter().filter(other)
     }
 
-    /// Whether the rule says it, at the place of the edit and as often as it should.
+    /// Returns whether the rule reports the fault at the place of the edit, as often as expected.
     pub fn is_found(&self) -> bool {
         let here = |said: &Said| {
             let spot = said.rows.first();
@@ -79,7 +79,7 @@ impl Trial<'_> {
         self.own().count() == self.edit.times && self.own().all(here)
     }
 
-    /// Findings of rules that the edit does not name.
+    /// Returns findings of rules that the edit does not name.
     pub fn unrelated(&self) -> impl Iterator<Item = &Said> {
         let allowed = |it: &Said| {
             let mut also = self.edit.also.iter();
@@ -88,7 +88,7 @@ impl Trial<'_> {
         self.others().filter(move |it| !allowed(it))
     }
 
-    /// What is wrong.
+    /// Returns the deviations from the expected result, or `None`.
     pub fn fault(&self) -> Option<String> {
         let mut what = Vec::new();
         what.extend(
@@ -111,7 +111,7 @@ impl Trial<'_> {
         (!what.is_empty()).then(|| format!("{}{}", what.join("; "), self.told()))
     }
 
-    /// All about it.
+    /// Returns a full description of the trial.
     pub fn told(&self) -> String {
         let (rule, base, text) = (&self.entry.rule, &self.edit.base, &self.edit.text);
         let mut told = format!("\n  {rule} in {base}: {text}\n");
@@ -125,15 +125,15 @@ impl Trial<'_> {
     }
 }
 
-/// What one thread works with.
-pub struct Cli {
+/// Files and plans of one thread.
+pub struct Bench {
     overlay: Overlay,
-    /// By the base's name.
+    /// Plans by the name of the base.
     plans: BTreeMap<&'static str, Plan>,
 }
 
-impl Default for Cli {
-    fn default() -> Cli {
+impl Default for Bench {
+    fn default() -> Bench {
         let plan = |base: &Base| {
             let with = |rule: &str| base.with.iter().any(|start| rule.starts_with(start));
             Plan::new(
@@ -142,15 +142,15 @@ impl Default for Cli {
                 |_, _| None,
             )
         };
-        Cli {
+        Bench {
             overlay: Overlay::of(Path::new(WORLD)).unwrap(),
             plans: BASES.iter().map(|base| (base.name, plan(base))).collect(),
         }
     }
 }
 
-impl Cli {
-    /// What is said of a base as it is.
+impl Bench {
+    /// Returns the findings in an unedited base.
     pub fn unedited(&mut self, base: &Base) -> Result<Vec<Said>, String> {
         let file = format!("{}.xosc", base.name);
         self.said(base.name, Path::new(&file), &Changed::new())

@@ -1,4 +1,4 @@
-//! The end of building: moving the sections together and deriving postings and line checkpoints.
+//! Completion of an image: moves the sections together and derives postings and line checkpoints.
 
 use bytemuck::Pod;
 
@@ -11,11 +11,11 @@ use crate::layout::{
 use crate::lines;
 
 impl ImageBuilder<'_> {
-    /// Closes what is still open, completes the image and returns its length: the buffer's first
-    /// so many bytes. `content_hash` is that of the source bytes.
+    /// Closes the open elements, completes the image and returns its length from the start of the
+    /// buffer. `content_hash` is the hash of the source bytes.
     ///
     /// # Errors
-    /// When an open element cannot be closed, which the checks on the way have excluded.
+    /// Fails if an open element cannot be closed, which earlier checks exclude.
     pub fn finish(mut self, content_hash: [u8; 32]) -> Result<usize, BuildError> {
         while !self.open.is_empty() {
             self.close_element(self.text_len())?;
@@ -79,7 +79,7 @@ impl ImageBuilder<'_> {
         }
     }
 
-    /// One pass over the nodes, each element put behind the last of its name.
+    /// Writes the postings in one pass over the nodes, in document order for each name.
     fn write_postings(&mut self, places: &[usize; SECTIONS], names: &[NameRecord]) {
         let mut next: Vec<u32> = names.iter().map(|name| name.first_posting.get()).collect();
         let (head, tail) = self.out.split_at_mut(places[Section::Postings as usize]);
@@ -116,7 +116,7 @@ impl ImageBuilder<'_> {
         }
     }
 
-    /// What lies between two sections is zero, so that equal files make equal images.
+    /// Fills the gaps between sections with zeros, so that equal files produce equal images.
     fn clear_gaps(&mut self, places: &[usize; SECTIONS], lens: &[usize; SECTIONS]) {
         for number in 1..SECTIONS {
             self.out[places[number - 1] + lens[number - 1]..places[number]].fill(0);

@@ -1,4 +1,4 @@
-//! How the sections of an image grow, each within its capacity.
+//! Growth of the sections of an image, each within its capacity.
 
 use bytemuck::Pod;
 
@@ -32,7 +32,7 @@ impl ImageBuilder<'_> {
         Ok(index)
     }
 
-    /// Appends a value to the heap, with where the text has it, and returns its place.
+    /// Appends a value with its position in the text to the heap, and returns its place.
     pub(super) fn push_resolved(
         &mut self,
         offset: u32,
@@ -71,7 +71,7 @@ impl ImageBuilder<'_> {
         )
     }
 
-    /// The id of a name that stands at `written_at`, if the text really has it there.
+    /// Returns the id of a name. A new name refers to `written_at` if the text contains it there.
     #[inline]
     pub(super) fn name(&mut self, name: &str, written_at: u32) -> Result<u16, BuildError> {
         if let Some(id) = self.names.find(name) {
@@ -88,7 +88,7 @@ impl ImageBuilder<'_> {
         self.names.add(name, offset, in_heap)
     }
 
-    /// Where the next `len` bytes of a section go in the buffer.
+    /// Returns the buffer offset for the next `len` bytes of a section.
     #[inline]
     pub(super) fn room(&self, section: Section, len: usize) -> Result<usize, BuildError> {
         let (used, limit) = (self.used[section as usize], self.limits[section as usize]);
@@ -116,7 +116,7 @@ impl ImageBuilder<'_> {
         }
         self.out[at..at + bytes.len()].copy_from_slice(bytes);
         self.used[section as usize] += bytes.len();
-        // Offsets matter in the text and the heap only, whose lengths have just been checked.
+        // Offsets are only needed for the text and the heap, and their lengths were just checked.
         Ok(offset.unwrap_or(u32::MAX))
     }
 

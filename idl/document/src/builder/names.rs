@@ -1,23 +1,23 @@
-//! The distinct names of a document while it is built: a small hash table made for the two
-//! look-ups per tag that building consists of.
+//! The distinct names of a document during building: a small hash table for the two lookups that
+//! each tag needs.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 
 use super::BuildError;
 use crate::layout::{NAME_IN_HEAP, NameRecord, U32};
 
-/// As many names as ids of 16 bits can tell apart, less the mark of a free slot.
+/// Maximum number of names: all 16-bit ids except the marker of a free slot.
 pub(super) const MAX_NAMES: usize = FREE as usize;
 const FREE: u16 = u16::MAX;
 
 pub(super) struct Names {
-    /// Ids in open addressing; a power of two, at most half full.
+    /// Ids with open addressing. The length is a power of two, and the table is at most half full.
     slots: Vec<u16>,
     names: Vec<Name>,
-    /// The letters of all names.
+    /// The bytes of all names.
     letters: Vec<u8>,
     capacity: usize,
-    /// Different in every builder, so that nobody can prepare a file whose names all collide.
+    /// Random seed of each builder, so that a prepared file cannot make all names collide.
     seed: u64,
 }
 
@@ -51,7 +51,7 @@ impl Names {
                 return None;
             }
             let known = &self.names[usize::from(id)];
-            // Up to eight letters the key says all.
+            // For up to eight bytes, the key alone identifies the name.
             if known.key == key
                 && (name.len() <= 8
                     || self.letters[known.start..known.start + known.len] == *name.as_bytes())
@@ -62,7 +62,7 @@ impl Names {
         }
     }
 
-    /// Adds a name that [`find`](Names::find) does not know, with one place where it is written.
+    /// Adds a name that [`find`](Names::find) does not know, with one position where it is written.
     pub(super) fn add(
         &mut self,
         name: &str,
@@ -113,7 +113,7 @@ impl Names {
         self.names.len()
     }
 
-    /// The records with their ranges of postings filled in.
+    /// Returns the records with their ranges of postings.
     pub(super) fn records(&self) -> Vec<NameRecord> {
         let mut first = 0;
         let place = |name: &Name| {
@@ -127,7 +127,7 @@ impl Names {
         self.names.iter().map(place).collect()
     }
 
-    /// The ids in the order of their names' bytes.
+    /// Returns the ids sorted by the bytes of their names.
     pub(super) fn order(&self) -> Vec<u16> {
         let mut order: Vec<u16> = (0..self.names.len())
             .map_while(|id| u16::try_from(id).ok())
@@ -161,7 +161,7 @@ fn take_slot(slots: &mut [u16], id: u16, hash: u64) {
     slots[slot] = id;
 }
 
-/// What names are compared by first: length, eight of the letters, and a hash of all.
+/// Key for a quick comparison of names: length, eight of the bytes, and a hash of all.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Key {
     len: usize,
@@ -170,7 +170,7 @@ struct Key {
 }
 
 impl Key {
-    /// Folds eight bytes at a time with a wide multiplication; names have four to twenty bytes.
+    /// Hashes eight bytes at a time with a wide multiplication; names have four to twenty bytes.
     #[inline]
     fn of(name: &[u8], seed: u64) -> Key {
         let mut state = seed ^ name.len() as u64;
@@ -196,7 +196,7 @@ impl Key {
 
 #[inline]
 fn fold(state: u64, word: u64) -> u64 {
-    // An odd number without pattern: the fraction of the golden ratio.
+    // The factor is an odd number without a pattern: the fraction of the golden ratio.
     let wide = u128::from(state ^ word) * 0x9E37_79B9_7F4A_7C15;
     (wide as u64) ^ (wide >> 64) as u64
 }

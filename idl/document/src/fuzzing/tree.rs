@@ -1,4 +1,5 @@
-//! A plain tree, written as XML and as an image at once: what it holds is known without parsing.
+//! A plain tree that is written as XML and as an image at once, so its content is known without
+//! parsing.
 
 use crate::{BuildError, Capacities, ImageBuilder};
 
@@ -9,11 +10,11 @@ pub struct Tree {
     pub name: String,
     /// Names and values.
     pub attributes: Vec<(String, String)>,
-    /// What it holds.
+    /// Children of the element.
     pub children: Vec<Child>,
 }
 
-/// What an element holds.
+/// A child of an element.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Child {
     /// Another element.
@@ -23,7 +24,7 @@ pub enum Child {
 }
 
 impl Tree {
-    /// An element without attributes and children.
+    /// Creates an element without attributes and children.
     pub fn new(name: &str) -> Tree {
         Tree {
             name: name.to_owned(),
@@ -31,38 +32,38 @@ impl Tree {
         }
     }
 
-    /// The same with one more attribute.
+    /// Returns the same element with one more attribute.
     #[must_use]
     pub fn with(mut self, name: &str, value: &str) -> Tree {
         self.attributes.push((name.to_owned(), value.to_owned()));
         self
     }
 
-    /// The same with one more child element.
+    /// Returns the same element with one more child element.
     #[must_use]
     pub fn holding(mut self, child: Tree) -> Tree {
         self.children.push(Child::Element(child));
         self
     }
 
-    /// The same with more character data.
+    /// Returns the same element with more character data.
     #[must_use]
     pub fn saying(mut self, text: &str) -> Tree {
         self.children.push(Child::Text(text.to_owned()));
         self
     }
 
-    /// The XML, one element per line.
+    /// Returns the XML, one element per line.
     pub fn xml(&self) -> String {
         let mut writer = Writer::default();
         writer.element(self);
         writer.xml
     }
 
-    /// The image of a document at `path` that holds this.
+    /// Returns the image of a document at `path` with this content.
     ///
     /// # Errors
-    /// When it has more distinct names than fit, or is larger than 4 GiB.
+    /// If it has too many distinct names, or is larger than 4 GiB.
     pub fn image(&self, path: &str) -> Result<Vec<u8>, BuildError> {
         let mut writer = Writer::default();
         writer.element(self);
@@ -191,7 +192,7 @@ impl Writer {
         });
     }
 
-    /// Writes a value and returns it if it had to be escaped.
+    /// Writes a value. Returns it if it had to be escaped.
     fn escape(&mut self, value: &str) -> Option<String> {
         let start = self.xml.len();
         for character in value.chars() {
@@ -205,7 +206,7 @@ impl Writer {
         (self.xml.len() - start != value.len()).then(|| value.to_owned())
     }
 
-    /// An exact count, but for names.
+    /// Returns exact capacities, except for names.
     fn capacities(&self, path: &str) -> Capacities {
         let mut capacities = Capacities {
             text: self.xml.len(),

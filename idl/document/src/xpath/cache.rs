@@ -1,4 +1,4 @@
-//! Printing the XPaths of many elements without walking their siblings each time.
+//! Cache for printing the XPaths of many elements without walking their siblings each time.
 
 use foldhash::{HashMap, HashSet};
 
@@ -7,18 +7,18 @@ use crate::attribute::Attribute;
 use crate::document::Document;
 use crate::node::Node;
 
-/// Remembers, for one document, what tells elements from their siblings. The siblings of an
-/// element are walked once, when the first of them is asked for; nothing is written to the image.
+/// Cache of the ids and numbers that distinguish the siblings of one document. The siblings of an
+/// element are walked once, when the first of them is requested. The image is not modified.
 ///
-/// It borrows nothing, so that it can be kept beside the document; for the elements of any other
-/// document it is no faster than [`Node::xpath`]. It is of no use beyond the life of the image:
-/// another one may come to lie at the same place.
+/// The cache borrows nothing, so it can be stored beside the document. For elements of any other
+/// document it is no faster than [`Node::xpath`]. It must not be used after the image is freed,
+/// because another image may later have the same address.
 #[derive(Clone, Debug)]
 pub struct XPaths {
-    /// Where the document's image begins: what images are told apart by.
+    /// Start address of the document's image, which identifies the image.
     document: usize,
     ids: &'static [&'static str],
-    /// Elements whose children are in `steps`; the root's parent is not among them.
+    /// Elements with their children in `steps`; the document node above the root is not included.
     known: HashSet<u32>,
     steps: HashMap<u32, Known>,
 }
@@ -29,7 +29,7 @@ struct Known {
     by: By,
 }
 
-/// What tells an element from its siblings; [`Step`] without the attribute itself.
+/// How an element is distinguished from its siblings: a [`Step`] without the attribute itself.
 #[derive(Clone, Copy, Debug)]
 enum By {
     Nothing,
@@ -53,7 +53,7 @@ impl Known {
 }
 
 impl XPaths {
-    /// Remembers nothing yet.
+    /// Creates an empty cache.
     pub fn new(document: Document<'_>) -> XPaths {
         XPaths {
             document: document.address().addr(),
@@ -63,7 +63,7 @@ impl XPaths {
         }
     }
 
-    /// The same as [`Node::xpath`].
+    /// Returns the same as [`Node::xpath`].
     pub fn xpath(&mut self, node: Node<'_>) -> String {
         self.learn(node).map_or_else(
             || print::xpath(node),
@@ -71,7 +71,7 @@ impl XPaths {
         )
     }
 
-    /// The same as [`Node::positional_xpath`].
+    /// Returns the same as [`Node::positional_xpath`].
     pub fn positional_xpath(&mut self, node: Node<'_>) -> String {
         self.learn(node).map_or_else(
             || print::positional(node),
@@ -84,7 +84,7 @@ impl XPaths {
         known.unwrap_or(Known::ROOT)
     }
 
-    /// Walks the siblings of `node` and of its ancestors; `None` for a node of another document.
+    /// Walks the siblings of `node` and its ancestors; `None` for a node of another document.
     fn learn(&mut self, node: Node<'_>) -> Option<()> {
         let document = node.document();
         if document.address().addr() != self.document {
@@ -92,7 +92,7 @@ impl XPaths {
         }
         for parent in node.ancestors() {
             if !self.known.insert(parent.index()) {
-                // Whoever learnt about it learnt about all above it.
+                // A known parent implies that all its ancestors are known too.
                 break;
             }
             self.learn_children(parent);
@@ -141,7 +141,7 @@ impl XPaths {
     }
 }
 
-/// What tells elements apart among all children of one parent.
+/// Returns the key that distinguishes the ids of all children of one parent.
 fn key<'n>(child: Node<'n>, id: Attribute<'n>) -> (u16, u16, &'n str) {
     (child.name_number(), id.name_number(), id.value())
 }

@@ -1,10 +1,10 @@
-//! From an XPath back to the elements that it means.
+//! Evaluation of an XPath to the elements that it selects.
 
 use super::parse::{Condition, Predicate, Step};
 use crate::document::Document;
 use crate::node::Node;
 
-/// Where a step starts from: an element, or (`None`) the document that holds the root.
+/// Start of a step: an element, or `None` for the document that contains the root.
 type Context<'a> = Option<Node<'a>>;
 
 pub(super) fn evaluate<'a>(
@@ -29,7 +29,7 @@ pub(super) fn evaluate<'a>(
         found.dedup();
         contexts = found.into_iter().map(Some).collect();
     }
-    // `/` alone is the document, for which its root element stands.
+    // `/` alone selects the document, and its root element represents it.
     contexts
         .into_iter()
         .filter_map(|context| context.or(document.root()))
@@ -37,7 +37,7 @@ pub(super) fn evaluate<'a>(
 }
 
 impl Step<'_> {
-    /// Whether a predicate depends on the order of siblings.
+    /// Checks whether a predicate depends on the order of siblings.
     fn counts(&self) -> bool {
         self.predicates
             .iter()
@@ -49,7 +49,7 @@ impl Step<'_> {
     }
 }
 
-/// The children that a step leads to, context by context, as positions count within each.
+/// Returns the children that a step selects. Positions count within each context.
 fn select<'a>(document: Document<'a>, contexts: &[Context<'a>], step: &Step<'_>) -> Vec<Node<'a>> {
     let mut found = Vec::new();
     for context in contexts {
@@ -93,7 +93,7 @@ impl Condition<'_> {
     }
 }
 
-/// `//name` without positions, by way of the postings.
+/// Evaluates `//name` without positions, with the postings.
 fn named_below<'a>(
     document: Document<'a>,
     contexts: &[Context<'a>],
@@ -113,7 +113,7 @@ fn named_below<'a>(
     found
 }
 
-/// Without those that lie within another, whose descendants would be visited twice.
+/// Removes contexts within another one, because their descendants would be visited twice.
 fn outermost<'a>(contexts: &[Context<'a>]) -> Vec<Context<'a>> {
     let mut outside = 0;
     let keep = |context: &&Context<'a>| match context {

@@ -1,24 +1,24 @@
-//! The part of XPath 1.0 that tools use to name an element.
+//! Parser for the part of XPath 1.0 that tools use to name an element.
 
 use thiserror::Error;
 
-/// Why an XPath cannot be followed.
+/// Reason why an XPath cannot be evaluated.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("follow the XPath '{xpath}': expected {expected} at character {at}")]
 pub struct XPathError {
     /// The expression.
     pub xpath: String,
-    /// Where it stops making sense, in characters from 1.
+    /// Position of the error, in characters from 1.
     pub at: usize,
-    /// What could stand there.
+    /// Description of a valid input at this position.
     pub expected: &'static str,
 }
 
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Step<'x> {
-    /// After `//` rather than `/`.
+    /// Whether the step follows `//` rather than `/`.
     pub(super) anywhere: bool,
-    /// The local name; `None` is `*`.
+    /// The local name; `None` stands for `*`.
     pub(super) name: Option<&'x str>,
     pub(super) predicates: Vec<Predicate<'x>>,
 }
@@ -54,7 +54,7 @@ struct Parser<'x> {
     rest: &'x str,
 }
 
-/// What was expected instead.
+/// Description of the expected input.
 type Expected = &'static str;
 
 impl<'x> Parser<'x> {
@@ -83,7 +83,8 @@ impl<'x> Parser<'x> {
         }
     }
 
-    /// A last step to an attribute or to text, which leads to the element that bears it.
+    /// Checks for a last step to an attribute or to text, which selects the element that contains
+    /// it.
     fn ends_beside_an_element(&mut self) -> Result<bool, Expected> {
         self.skip_space();
         if self.take("text()") {
@@ -179,7 +180,7 @@ impl<'x> Parser<'x> {
         Ok(value)
     }
 
-    /// A name as written, prefix included; `prefix:*` too.
+    /// Parses a name as written, including its prefix; also accepts `prefix:*`.
     fn name(&mut self, expected: Expected) -> Result<&'x str, Expected> {
         let ends = |c: char| c.is_whitespace() || "/[]@'\"=()|,<>!+$".contains(c);
         let len = self.rest.find(ends).unwrap_or(self.rest.len());

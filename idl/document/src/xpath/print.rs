@@ -1,4 +1,4 @@
-//! From an element to its XPath.
+//! Conversion of an element to its XPath.
 
 use std::fmt::Write;
 
@@ -22,7 +22,7 @@ pub(super) fn positional(node: Node<'_>) -> String {
     })
 }
 
-/// The steps from the root to `node`, each as `step_of` says.
+/// Joins the steps from the root to `node`; `step_of` returns each step.
 pub(super) fn join<'a>(node: Node<'a>, mut step_of: impl FnMut(Node<'a>) -> Step<'a>) -> String {
     let mut path = String::new();
     if !node.is_element() {
@@ -38,14 +38,14 @@ pub(super) fn join<'a>(node: Node<'a>, mut step_of: impl FnMut(Node<'a>) -> Step
     path
 }
 
-/// What tells an element from its equally named siblings.
+/// How an element is distinguished from its equally named siblings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Step<'a> {
-    /// It has none.
+    /// It has no equally named sibling.
     Alone,
-    /// Its number among them, from 1.
+    /// Its number among the siblings, from 1.
     Number(u64),
-    /// An attribute with a value that no other has.
+    /// An attribute with a value that no sibling has.
     Id(Attribute<'a>),
 }
 
@@ -92,7 +92,7 @@ impl<'a> Step<'a> {
     }
 }
 
-/// The attributes that tell elements apart: `id` in roads, `name` in scenarios, either elsewhere.
+/// Returns the attributes that identify elements: `id` in roads, `name` in scenarios, else both.
 pub(super) fn id_attributes(document: Document<'_>) -> &'static [&'static str] {
     match document.root().map_or("", |root| root.name()) {
         "OpenDRIVE" => &["id"],
@@ -101,7 +101,7 @@ pub(super) fn id_attributes(document: Document<'_>) -> &'static [&'static str] {
     }
 }
 
-/// The attribute, if its value can be quoted in XPath (which has no escapes) and read by people.
+/// Returns the attribute if it is readable and can be quoted in XPath (which has no escapes).
 pub(super) fn usable_id<'a>(node: Node<'a>, name: &str) -> Option<Attribute<'a>> {
     const LONGEST: usize = 120;
     let attribute = node.attribute(name)?;
@@ -114,7 +114,7 @@ pub(super) fn usable_id<'a>(node: Node<'a>, name: &str) -> Option<Attribute<'a>>
     usable.then_some(attribute)
 }
 
-/// The elements of the same name and parent, the node itself included, in document order.
+/// Returns the elements of the same name and parent, with the node itself, in document order.
 fn siblings<'a>(node: Node<'a>) -> impl Iterator<Item = Node<'a>> {
     let parent = node.parent();
     let alone = parent.is_none().then_some(node);

@@ -1,4 +1,4 @@
-//! Comparing a configuration with what is really there.
+//! Comparison of a configuration with the known bundles and reporters.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use super::{
 };
 use crate::distance::{DID_YOU_MEAN, did_you_mean};
 
-/// What is there: the catalogues of the bundles and the names of the reporters.
+/// The catalogues of the known bundles and the names of the known reporters.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Known {
     /// The bundles.
@@ -18,18 +18,18 @@ pub struct Known {
     pub reporters: Vec<String>,
 }
 
-/// What is known about a bundle.
+/// Known data of a bundle.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct KnownBundle {
     /// Its name, such as `xodrBundle`.
     pub name: String,
     /// Its short name, such as `xodr`.
     pub alias: String,
-    /// Its checkers; `None` when only the bundle itself can tell, once it has joined.
+    /// Its checkers; `None` when only the bundle itself knows them and has not joined yet.
     pub checkers: Option<Vec<KnownChecker>>,
 }
 
-/// What is known about a checker.
+/// Known data of a checker.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct KnownChecker {
     /// Its identifier.
@@ -38,19 +38,19 @@ pub struct KnownChecker {
     pub params: Vec<KnownParam>,
 }
 
-/// What is known about a parameter of a checker.
+/// Known data of a parameter of a checker.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KnownParam {
     /// Its name, such as `tolerance`.
     pub name: String,
-    /// What its value can be.
+    /// Type of its value.
     pub value: ParamType,
 }
 
-/// The parameters that are read at some place, by name; a name may be read in several ways.
+/// The parameters that one part reads, by name. The same name may be read with several types.
 type Names<'a> = BTreeSet<(&'a str, ParamType)>;
 
-/// Parameters of bundles that ASAM's framework reads, and those that reports read.
+/// Bundle parameters that ASAM's framework reads. The next constant is for reports.
 const FRAMEWORK_PARAMS: [&str; 4] = ["resultFile", "strResultFile", "InputFile", LEVEL_PARAM];
 const REPORT_PARAMS: [&str; 8] = [
     "InputFile",
@@ -64,9 +64,8 @@ const REPORT_PARAMS: [&str; 8] = [
 ];
 
 impl Parsed {
-    /// All that is to be said of a configuration before it is used: what is odd about the file,
-    /// and what it names that nobody knows; in the order of the file. A warning stands for
-    /// something that is not done as the file says.
+    /// Returns all oddities of a configuration before it is used, in the order of the file: odd
+    /// content and unknown names. A warning means that something is not done as the file says.
     pub fn all_oddities(&self, known: &Known) -> Vec<Oddity> {
         let mut oddities = self.oddities.clone();
         oddities.extend(self.config.check(known));
@@ -77,8 +76,8 @@ impl Parsed {
 }
 
 impl Config {
-    /// What the configuration names and nobody knows: bundles, checkers, parameters, reports;
-    /// in the order of the file.
+    /// Returns the unknown names in the configuration: bundles, checkers, parameters, reports; in
+    /// the order of the file.
     pub fn check(&self, known: &Known) -> Vec<Oddity> {
         let mut oddities = Vec::new();
         self.check_global_params(known, &mut oddities);
@@ -98,7 +97,7 @@ impl Config {
         oddities
     }
 
-    /// A global parameter may be meant for any bundle or report.
+    /// Checks the global parameters, which may be meant for any bundle or report.
     fn check_global_params(&self, known: &Known, oddities: &mut Vec<Oddity>) {
         let mut names: Names<'_> = FRAMEWORK_PARAMS
             .into_iter()
@@ -110,8 +109,8 @@ impl Config {
         names.retain(|(name, _)| *name != LEVEL_PARAM);
         names.extend(known.bundles.iter().flat_map(KnownBundle::params));
         let what = "no bundle or report reads a global parameter";
-        // A bundle whose parameters are not known may read any, but hardly one that is so near to
-        // another's.
+        // A bundle with unknown parameters may read any name. A name very similar to a known
+        // parameter is still probably a typing error.
         let all_known = known.bundles.iter().all(|it| it.checkers.is_some());
         let mut found = Vec::new();
         check_params(&self.params, &names, what, &mut found);
@@ -173,7 +172,7 @@ fn unknown_catalogue(bundle: &BundleConfig) -> Oddity {
     Oddity::information(bundle.position, text)
 }
 
-/// Two names of one bundle that only its catalogue tells to be the same.
+/// Returns a warning if an earlier entry names the same bundle, according to its catalogue.
 fn named_before(bundle: &BundleConfig, before: &[BundleConfig], known: &Known) -> Option<Oddity> {
     let found = known
         .bundles
@@ -257,7 +256,7 @@ fn check_params(params: &[ConfigParam], names: &Names<'_>, what: &str, oddities:
         .iter()
         .filter(|param| names.iter().all(|(name, _)| *name != param.name))
     {
-        // Sorted, so that of several equally near names always the same one is offered.
+        // Sorted, so that the hint is always the same when several names are equally near.
         let near: BTreeSet<&str> = names.iter().map(|(name, _)| *name).collect();
         let hint = did_you_mean(&param.name, near);
         oddities.push(Oddity::warning(
@@ -267,7 +266,7 @@ fn check_params(params: &[ConfigParam], names: &Names<'_>, what: &str, oddities:
     }
 }
 
-/// A checker that cannot read its parameter checks nothing.
+/// Checks parameter values. A checker that cannot read its parameter checks nothing.
 fn check_values(params: &[ConfigParam], names: &Names<'_>, oddities: &mut Vec<Oddity>) {
     for param in params {
         let unread = names

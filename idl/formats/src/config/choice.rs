@@ -1,23 +1,23 @@
-//! What somebody wants to be asked or left out in one run, beside any configuration.
+//! Selection of checkers for one run, in addition to any configuration.
 
 use std::fmt;
 
 use super::same_bundle;
 use crate::Text;
 
-/// Checkers by name: only those selected, and of them none that is ignored.
+/// Selection of checkers by name: the selected ones without the ignored ones. Empty: everything.
 ///
-/// A name is a checker's id or a rule's UID, whole or their beginning, their last part, a family
-/// (`ids` or `ids.` for every rule `ids.…`), or a bundle's name or alias. Empty: everything.
+/// A name is a checker's id or a rule's UID, complete, its beginning or its last part. It may also
+/// be a family (`ids` or `ids.` for every rule `ids.…`), or a bundle's name or alias.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Choice {
-    /// Only what one of these names.
+    /// Only checkers that match one of these names run; empty selects all.
     pub select: Vec<String>,
-    /// Nothing that one of these names.
+    /// Checkers that match one of these names do not run.
     pub ignore: Vec<String>,
 }
 
-/// By what a checker is known.
+/// The names of a checker.
 #[derive(Debug, Clone, Copy)]
 pub struct Names<'n> {
     /// Name of its bundle.
@@ -31,12 +31,12 @@ pub struct Names<'n> {
 }
 
 impl Choice {
-    /// Whether nothing is left out.
+    /// Checks whether the selection leaves nothing out.
     pub fn is_everything(&self) -> bool {
         self.select.is_empty() && self.ignore.is_empty()
     }
 
-    /// Whether a checker is asked. One that is off by default is when it is named in full.
+    /// Checks whether a checker runs. One that is off by default must be selected by its full name.
     pub fn asks(&self, names: Names<'_>, default_on: bool) -> bool {
         let named = |patterns: &[String]| patterns.iter().any(|it| names.match_pattern(it));
         let in_full = || self.select.iter().any(|it| names.are(it));
@@ -46,7 +46,7 @@ impl Choice {
 }
 
 impl Names<'_> {
-    /// Whether the pattern names this checker.
+    /// Checks whether the pattern matches this checker.
     pub fn match_pattern(self, pattern: &str) -> bool {
         if pattern.is_empty() {
             return false;
@@ -66,13 +66,13 @@ impl Names<'_> {
             })
     }
 
-    /// Whether the pattern is the checker's whole id or one of its UIDs.
+    /// Checks whether the pattern is the checker's whole id or one of its UIDs.
     fn are(self, pattern: &str) -> bool {
         self.id == pattern || self.uids.iter().any(|uid| **uid == *pattern)
     }
 }
 
-/// Whether a name is the pattern, goes on from it with a new word, or ends with it as a part.
+/// Checks whether a name equals the pattern, continues it with a new word, or ends with it.
 fn belongs_to(name: &str, pattern: &str) -> bool {
     let (name, pattern) = (&name.to_ascii_lowercase(), pattern.to_ascii_lowercase());
     let pattern = pattern.as_str();
@@ -86,7 +86,7 @@ fn belongs_to(name: &str, pattern: &str) -> bool {
 }
 
 impl fmt::Display for Choice {
-    /// As it is typed: `--select ids --ignore road.lane`.
+    /// Writes the selection as command line arguments: `--select ids --ignore road.lane`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut said = Vec::new();
         for (flag, names) in [("--select", &self.select), ("--ignore", &self.ignore)] {

@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::xqar::Level;
 
-/// Which levels are kept: from the mildest to the worst, both included.
+/// The levels to keep: from the mildest to the worst, both included.
 ///
-/// In files `minLevel` is the mildest and `maxLevel` the worst (3 and 1 keep everything, because
-/// a smaller number is worse); in 2023 it was the other way round. Both mean the interval.
+/// In files `minLevel` is the mildest and `maxLevel` the worst level. 3 and 1 keep everything, as a
+/// smaller number is worse. In 2023 the order was reversed. Both mean the same interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Levels {
     worst: Level,
@@ -15,13 +15,13 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// Every level.
+    /// All levels.
     pub const ALL: Levels = Levels {
         worst: Level::Error,
         mildest: Level::Information,
     };
 
-    /// The interval between two levels, in either order.
+    /// Returns the interval between two levels, in either order.
     pub fn between(one: Level, other: Level) -> Levels {
         Levels {
             worst: one.min(other),
@@ -29,17 +29,17 @@ impl Levels {
         }
     }
 
-    /// Whether issues of this level are kept.
+    /// Checks whether issues of this level are kept.
     pub fn contains(self, level: Level) -> bool {
         (self.worst..=self.mildest).contains(&level)
     }
 
-    /// The worst level kept.
+    /// Returns the worst level kept.
     pub fn worst(self) -> Level {
         self.worst
     }
 
-    /// The mildest level kept.
+    /// Returns the mildest level kept.
     pub fn mildest(self) -> Level {
         self.mildest
     }

@@ -1,4 +1,4 @@
-//! The questions that a broker or a bundle asks a configuration.
+//! Lookups in a configuration for brokers and bundles.
 
 use super::{
     BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, Levels, Oddity, ReportConfig,
@@ -6,8 +6,8 @@ use super::{
 };
 use crate::xqar::{Level, Param};
 
-/// ASAM's published bundles: the name in manifests and results, the alias here, and the other
-/// names under which configurations know them.
+/// ASAM's published bundles: the name in manifests and results, the alias in qcbus, and the other
+/// names in configurations.
 const PUBLISHED: [(&str, &str, &[&str]); 2] = [
     (
         "xodrBundle",
@@ -27,12 +27,12 @@ const PUBLISHED: [(&str, &str, &[&str]); 2] = [
     ),
 ];
 
-/// What a configuration says about one checker of one bundle.
+/// Selection state of one checker of one bundle in a configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Selection {
     /// The configuration names the checker.
     Selected(Selected),
-    /// The configuration names the bundle and no checker of it: whatever runs by default does.
+    /// The configuration names the bundle and none of its checkers: its default checkers run.
     ByDefault,
     /// The configuration names the bundle and other checkers of it.
     CheckerNotConfigured,
@@ -40,17 +40,17 @@ pub enum Selection {
     BundleNotConfigured,
 }
 
-/// How a configured checker's issues are treated: first re-levelled, then kept or removed.
+/// Treatment of a checker's issues: they first get a new level, then are kept or removed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Selected {
     /// The levels that are kept.
     pub levels: Levels,
-    /// The level that every issue gets.
+    /// The level that all issues get, if configured.
     pub relevel: Option<Level>,
 }
 
 impl Selection {
-    /// Whether a checker with this selection is to run.
+    /// Checks whether a checker with this selection runs.
     pub fn runs(self, default_on: bool) -> bool {
         match self {
             Selection::Selected(_) => true,
@@ -60,8 +60,8 @@ impl Selection {
     }
 }
 
-/// Whether an `application` in a configuration means the bundle of this name and alias: by name,
-/// by alias, or by a name of ASAM's published bundle that it stands for.
+/// Checks whether an `application` in a configuration means the bundle of this name and alias. It
+/// may be the name, the alias, or any name of the ASAM bundle that this bundle replaces.
 pub fn same_bundle(application: &str, name: &str, alias: &str) -> bool {
     if application.is_empty() {
         return false;
@@ -74,12 +74,12 @@ pub fn same_bundle(application: &str, name: &str, alias: &str) -> bool {
         })
 }
 
-/// The name of ASAM's published bundle that an `application` means, if it means one.
+/// Returns the name of ASAM's published bundle that an `application` means, if any.
 pub fn published_name(application: &str) -> Option<&'static str> {
     canonical_bundle(application).map(|(name, _)| name)
 }
 
-/// Name and alias of the published bundle that is meant.
+/// Returns name and alias of the published bundle that an `application` means.
 pub(super) fn canonical_bundle(application: &str) -> Option<(&'static str, &'static str)> {
     PUBLISHED
         .iter()
@@ -89,14 +89,14 @@ pub(super) fn canonical_bundle(application: &str) -> Option<(&'static str, &'sta
         .map(|(name, alias, _)| (*name, *alias))
 }
 
-/// Whether an `application` in a configuration means the reporter of this name: as it is, or as
-/// [`reporter_named`] reads it.
+/// Checks whether an `application` in a configuration means the reporter of this name, either
+/// directly or after [`reporter_named`].
 pub fn same_reporter(application: &str, name: &str) -> bool {
     application == name || reporter_named(application) == name
 }
 
-/// The name of ours that an `application` stands for: `TextReport`, ASAM's `qc_report_text` and
-/// plain `text` are `qc-report-text`. Whether there is such a reporter is another question.
+/// Returns the qcbus reporter name for an `application`: `TextReport`, ASAM's `qc_report_text` and
+/// plain `text` become `qc-report-text`. It does not check whether the reporter exists.
 pub fn reporter_named(application: &str) -> String {
     let lower = application.to_ascii_lowercase().replace('_', "-");
     let stem = lower.strip_prefix(REPORTER).unwrap_or(&lower);
@@ -106,12 +106,12 @@ pub fn reporter_named(application: &str) -> String {
     format!("{REPORTER}{stem}")
 }
 
-/// What the names of our reporters begin with.
+/// Prefix of the names of qcbus reporters.
 const REPORTER: &str = "qc-report-";
 
 impl Config {
-    /// The file to check: `InputFile`, else `XodrFile`, else `XoscFile`; global before a
-    /// bundle's. Never empty. Relative paths are as written.
+    /// Returns the file to check: `InputFile`, else `XodrFile`, else `XoscFile`; global parameters
+    /// before those of a bundle. The result is never empty. Relative paths stay as written.
     pub fn input_file(&self) -> Option<&str> {
         let sections = std::iter::once(&self.params).chain(self.bundles.iter().map(|b| &b.params));
         sections
@@ -119,14 +119,14 @@ impl Config {
             .find(|path| !path.is_empty())
     }
 
-    /// The entry for the bundle of this name and alias.
+    /// Returns the entry for the bundle of this name and alias.
     pub fn bundle(&self, name: &str, alias: &str) -> Option<&BundleConfig> {
         self.bundles
             .iter()
             .find(|bundle| same_bundle(&bundle.application, name, alias))
     }
 
-    /// What the configuration says about a checker.
+    /// Returns the configured selection of a checker.
     pub fn selects(&self, bundle_name: &str, alias: &str, checker_id: &str) -> Selection {
         match self.bundle(bundle_name, alias) {
             None => Selection::BundleNotConfigured,
@@ -134,8 +134,8 @@ impl Config {
         }
     }
 
-    /// The parameters of a checker: each default with the value that counts (checker before
-    /// bundle before global before default), then what the checker's own section has besides.
+    /// Returns the parameters of a checker. Each default gets its effective value: the first of
+    /// checker, bundle, global and default. Further parameters of the checker's own section follow.
     pub fn effective_params(
         &self,
         bundle: Option<&BundleConfig>,
@@ -160,26 +160,27 @@ impl Config {
         params
     }
 
-    /// The parameters of a bundle: its own, then the global ones that it does not set itself.
-    /// The names of the file to check are left out: see [`Config::input_file`].
+    /// Returns the parameters of a bundle: its own, then the global ones that it does not set
+    /// itself. The parameters of [`Config::input_file`] are left out.
     pub fn bundle_params(&self, bundle: Option<&BundleConfig>) -> Vec<Param> {
         let mut params = merged(bundle.map_or(&[], |bundle| &bundle.params), &self.params);
         params.retain(|param| !INPUT_PARAMS.contains(&param.name.as_str()));
         params
     }
 
-    /// The directories in which referenced scenarios are looked for, as they are written.
+    /// Returns the search directories for referenced scenarios, as written.
     pub fn scenario_path(&self) -> Option<&str> {
         value(&self.params, SCENARIO_PATH_PARAM)
     }
 
-    /// The parameters of a report: its own, then the global ones that it does not set itself.
+    /// Returns the parameters of a report: its own, then the global ones that it does not set
+    /// itself.
     pub fn report_params(&self, report: &ReportConfig) -> Vec<Param> {
         merged(&report.params, &self.params)
     }
 
-    /// The information that the old order of `minLevel` and `maxLevel` was read as an interval,
-    /// one for each checker concerned.
+    /// Returns one information for each checker with `minLevel` and `maxLevel` in the old order,
+    /// which was read as an interval.
     pub fn old_order_oddities(&self) -> Vec<Oddity> {
         let checkers = self.bundles.iter().flat_map(|bundle| &bundle.checkers);
         checkers
@@ -190,7 +191,7 @@ impl Config {
 }
 
 impl BundleConfig {
-    /// What the entry says about a checker.
+    /// Returns the selection of a checker in this entry.
     pub fn selects(&self, checker_id: &str) -> Selection {
         if self.checkers.is_empty() {
             return Selection::ByDefault;
@@ -201,14 +202,14 @@ impl BundleConfig {
         }
     }
 
-    /// The entry of a checker.
+    /// Returns the entry of a checker.
     pub fn checker(&self, id: &str) -> Option<&CheckerConfig> {
         self.checkers.iter().find(|checker| checker.id == id)
     }
 }
 
 impl CheckerConfig {
-    /// How its issues are treated.
+    /// Returns how its issues are treated.
     pub fn selected(&self) -> Selected {
         Selected {
             levels: self.levels,

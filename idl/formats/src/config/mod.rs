@@ -1,9 +1,8 @@
-//! Configuration files (`.xml`): which bundles, which checkers, at which levels, with which
-//! parameters, and which reports.
+//! Configuration files (`.xml`): bundles, checkers, levels, parameters and reports.
 //!
-//! [`Config::parse`] reads a file and says what is odd about it; [`Config::check`] compares it
-//! with what is really there. The lookups ([`Config::selects`], [`Config::effective_params`])
-//! answer the questions that a broker or a bundle asks while it works.
+//! [`Config::parse`] reads a file and returns its oddities. [`Config::check`] compares it with the
+//! known bundles and reporters. The lookups ([`Config::selects`], [`Config::effective_params`])
+//! serve brokers and bundles at run time.
 
 mod check;
 mod choice;
@@ -22,16 +21,16 @@ pub use levels::Levels;
 pub use lookup::{Selected, Selection, published_name, same_bundle, same_reporter};
 pub use value::{ParamType, ParamValue};
 
-/// The name of the checker parameter that gives a checker's issues another level.
+/// Name of the checker parameter that gives a checker's issues another level.
 pub const LEVEL_PARAM: &str = "qcbus.level";
 
-/// The names under which a configuration gives the file to check, the current one first.
+/// Parameter names for the file to check, the current name first.
 pub const INPUT_PARAMS: [&str; 3] = ["InputFile", "XodrFile", "XoscFile"];
 
-/// The global parameter that names the directories in which referenced scenarios are looked for.
+/// Global parameter with the search directories for referenced scenarios.
 pub const SCENARIO_PATH_PARAM: &str = "qcbus.scenarioPath";
 
-/// A configuration. Serialises, so that it can be published in its parsed form.
+/// A configuration. It is serialisable, so that it can be published in its parsed form.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Config {
     /// Global parameters.
@@ -49,9 +48,9 @@ pub struct BundleConfig {
     pub application: String,
     /// Its parameters.
     pub params: Vec<ConfigParam>,
-    /// Its checkers, in order, each id once; empty means: whatever the bundle runs by default.
+    /// Its checkers, in order, each id once. If empty, the bundle's default checkers run.
     pub checkers: Vec<CheckerConfig>,
-    /// Where it stands in the file.
+    /// Position in the file.
     pub position: TextPosition,
 }
 
@@ -62,35 +61,35 @@ pub struct CheckerConfig {
     pub id: String,
     /// The levels whose issues are kept.
     pub levels: Levels,
-    /// `minLevel` and `maxLevel` are written in the order of 2023, the smaller number first.
+    /// Whether `minLevel` and `maxLevel` are in the order of 2023, the smaller number first.
     pub old_order: bool,
     /// The level that all issues get, from the parameter `qcbus.level`.
     pub relevel: Option<Level>,
     /// Its parameters.
     pub params: Vec<ConfigParam>,
-    /// Where it stands in the file.
+    /// Position in the file.
     pub position: TextPosition,
 }
 
 /// A configured report.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ReportConfig {
-    /// As written, such as `TextReport`.
+    /// Name as written, such as `TextReport`.
     pub application: String,
     /// Its parameters.
     pub params: Vec<ConfigParam>,
-    /// Where it stands in the file.
+    /// Position in the file.
     pub position: TextPosition,
 }
 
-/// A parameter and where it stands.
+/// A parameter and its position.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct ConfigParam {
     /// Name; never empty.
     pub name: String,
     /// Value; empty when the file gives none.
     pub value: String,
-    /// Where it stands in the file.
+    /// Position in the file.
     pub position: TextPosition,
 }
 
@@ -105,25 +104,25 @@ pub struct TextPosition {
     pub column: u64,
 }
 
-/// What [`Config::parse`] gives.
+/// Result of [`Config::parse`].
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Parsed {
     /// The configuration.
     pub config: Config,
-    /// What is odd about the file, in the order of the file.
+    /// Oddities of the file, in the order of the file.
     pub oddities: Vec<Oddity>,
 }
 
-/// Something odd about a configuration that does not keep it from being used.
+/// An oddity of a configuration that can still be used.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Oddity {
-    /// [`Level::Warning`], or [`Level::Information`] for older ways to write things.
+    /// [`Level::Warning`], or [`Level::Information`] for outdated spellings.
     pub level: Level,
     /// Line, from 1.
     pub row: u64,
     /// Column in characters, from 1.
     pub column: u64,
-    /// What was found, what it means, and what may have been meant.
+    /// The finding, its meaning, and possibly the intended text.
     pub text: String,
 }
 
@@ -135,9 +134,9 @@ pub struct ConfigError {
     pub row: u64,
     /// Column in characters, from 1.
     pub column: u64,
-    /// What is wrong.
+    /// Description of the error.
     pub text: String,
-    /// What to do about it; may be empty.
+    /// How to fix it; may be empty.
     pub hint: String,
 }
 
@@ -150,7 +149,7 @@ fn hint_line(hint: &str) -> String {
 }
 
 impl ConfigParam {
-    /// The parameter without its position.
+    /// Returns the parameter without its position.
     pub fn to_param(&self) -> Param {
         Param {
             name: self.name.clone(),
@@ -160,7 +159,7 @@ impl ConfigParam {
 }
 
 impl Oddity {
-    /// As a line: `FILE:ROW:COLUMN: LEVEL: TEXT`.
+    /// Formats the oddity as a line: `FILE:ROW:COLUMN: LEVEL: TEXT`.
     pub fn line(&self, file: &std::path::Path) -> String {
         let Oddity {
             level,

@@ -1,4 +1,4 @@
-//! From bytes to a configuration, with what is odd about it.
+//! Parsing of configuration files, with a list of their oddities.
 
 use super::lookup::canonical_bundle;
 use super::{
@@ -13,7 +13,7 @@ impl Config {
     /// Reads a configuration file: children in any order, levels in either order or missing.
     ///
     /// # Errors
-    /// The file is not well-formed XML, its root is not `Config`, or a bundle, checker, report or
+    /// The file is not well-formed XML, or its root is not `Config`. A bundle, checker, report or
     /// parameter has no name. Everything else that is odd becomes an oddity.
     pub fn parse(bytes: &[u8]) -> Result<Parsed, ConfigError> {
         let document = xml::parse(bytes).map_err(|error| ConfigError {
@@ -162,7 +162,7 @@ impl Parser<'_> {
         Ok(())
     }
 
-    /// A level by number. What is no level is told and then as if it were missing.
+    /// Reads a level by number. An invalid level causes a warning and is treated as missing.
     fn level(&mut self, element: &Element, name: &str) -> Option<Level> {
         let attribute = element.attribute(name)?;
         let text = attribute.value.trim();
@@ -193,7 +193,7 @@ impl Parser<'_> {
         level
     }
 
-    /// `qcbus.level` has a meaning for a checker only.
+    /// Warns about `qcbus.level` outside of a checker, where it has no effect.
     fn misplaced_level(&mut self, params: &[ConfigParam], what: &str) {
         for param in params.iter().filter(|param| param.name == LEVEL_PARAM) {
             let text =
@@ -214,8 +214,8 @@ impl Parser<'_> {
         bundle.checkers.push(checker);
     }
 
-    /// A bundle that is configured a second time adds its checkers to the first: dropping them
-    /// would accept what somebody wanted to have checked.
+    /// Adds a bundle. A second entry of a bundle adds its checkers to the first entry. If they were
+    /// dropped, files could be accepted without the requested checks.
     fn add_bundle(&mut self, config: &mut Config, bundle: BundleConfig) {
         let names = |application: &str| canonical_bundle(application).map(|(name, _)| name);
         let meant = names(&bundle.application);
@@ -307,11 +307,11 @@ impl Parser<'_> {
     }
 }
 
-/// Adds a bundle's second entry to its first. An entry without checkers asks for all that run by
-/// default, so the whole asks for all.
+/// Adds a bundle's second entry to its first. An entry without checkers requests all default
+/// checkers, so the merged entry requests them all.
 fn merge(first: &mut BundleConfig, second: BundleConfig, parser: &mut Parser<'_>) {
     if first.checkers.is_empty() || second.checkers.is_empty() {
-        // One of the two leaves the choice to the bundle; a list would narrow it.
+        // One of the two entries leaves the choice to the bundle; a list would restrict it.
         first.checkers.clear();
     }
     let all = first.checkers.is_empty();
@@ -319,7 +319,7 @@ fn merge(first: &mut BundleConfig, second: BundleConfig, parser: &mut Parser<'_>
         if all {
             break;
         }
-        // The second entry's own parameters keep their reach: its checkers.
+        // The second entry's own parameters apply only to its own checkers.
         for param in &second.params {
             if !checker.params.iter().any(|own| own.name == param.name) {
                 checker.params.push(param.clone());

@@ -1,6 +1,6 @@
-//! Values of parameters: every type is written as text in a configuration.
+//! Values of parameters. A configuration contains all types as text.
 
-/// What the value of a parameter can be.
+/// Type of the value of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ParamType {
     /// A finite double.
@@ -16,15 +16,15 @@ pub enum ParamType {
 pub enum ParamValue {
     /// A finite double.
     Number(f64),
-    /// Yes or no.
+    /// A truth value.
     Flag(bool),
-    /// Any text, also an empty one.
+    /// Any text, possibly empty.
     Text(String),
 }
 
 impl ParamType {
-    /// The value that a configured text stands for; `None` when it is none of this type. Space
-    /// around numbers and flags counts for nothing.
+    /// Parses a configured text; returns `None` when it is not of this type. White space around
+    /// numbers and flags is ignored.
     pub fn read(self, text: &str) -> Option<ParamValue> {
         let trimmed = text.trim();
         match self {
@@ -41,7 +41,7 @@ impl ParamType {
         }
     }
 
-    /// What a value of this type must be, to stand behind "must be".
+    /// Returns the description of a valid value, to be appended to "must be".
     pub fn expected(self) -> &'static str {
         match self {
             ParamType::Number => "a finite number, written such as 0.05",

@@ -1,15 +1,15 @@
-//! What the configuration demands and nobody offers.
+//! Outcomes for configured bundles and checkers that are missing.
 
 use super::{BundleOutcome, CheckerOutcome, Ending};
 use crate::Text;
 use crate::config::{BundleConfig, published_name};
 use crate::distance::did_you_mean;
 
-/// The checker that stands for a whole bundle when the configuration names none of its checkers.
+/// Checker that represents a whole bundle when the configuration names none of its checkers.
 const WHOLE_BUNDLE: &str = "qcbus_bundle_is_there";
 
-/// The outcome of a bundle that is not there: each of its configured checkers is in error. `why` is
-/// known when somebody waited for it.
+/// Returns the outcome of a missing bundle: each of its configured checkers is in error. `why` is
+/// set when the broker waited for the bundle.
 pub(super) fn bundle(config: &BundleConfig, why: Option<String>) -> BundleOutcome {
     let application = &config.application;
     let reason =
@@ -31,7 +31,7 @@ pub(super) fn bundle(config: &BundleConfig, why: Option<String>) -> BundleOutcom
     }
 }
 
-/// The outcome of a bundle that must take part without being configured, and is not there.
+/// Returns the outcome of a missing bundle that is required but not configured.
 pub(super) fn demanded(why: String) -> BundleOutcome {
     BundleOutcome {
         description: String::from("Demanded, and not there."),
@@ -47,7 +47,7 @@ fn whole(reason: String) -> CheckerOutcome {
     }
 }
 
-/// The outcome of a configured checker that its bundle does not have.
+/// Returns the outcome of a configured checker that its bundle does not have.
 pub(super) fn checker(id: &str, bundle: &str, there: &[Text]) -> CheckerOutcome {
     let hint = did_you_mean(id, there.iter().map(|it| &**it));
     failed(

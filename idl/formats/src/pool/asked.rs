@@ -1,11 +1,11 @@
-//! How little was asked, as it stands in a result.
+//! The number of checkers left out, as written in a result.
 
 use std::fmt;
 
 use super::Asked;
 use crate::xqar::{CheckerBundle, Param, Results};
 
-/// Name of the bundle's parameter that says how many of its checkers were not asked.
+/// Name of the bundle's parameter with the number of checkers left out.
 const PARAM: &str = "qcbus.notAsked";
 
 /// The checkers of a bundle that a configuration left out.
@@ -13,14 +13,14 @@ const PARAM: &str = "qcbus.notAsked";
 pub struct NotAsked {
     /// Name of the bundle.
     pub bundle: String,
-    /// How many were left out.
+    /// Number of checkers left out.
     pub left_out: usize,
-    /// Of how many.
+    /// Total number of checkers.
     pub offered: usize,
 }
 
 impl NotAsked {
-    /// What the bundles of a result say, in its order; nothing of those that were asked everything.
+    /// Returns the entries of the bundles in a result, in order, if checkers were left out.
     pub fn of(results: &Results) -> Vec<NotAsked> {
         results.bundles.iter().filter_map(of_bundle).collect()
     }
@@ -37,7 +37,7 @@ fn of_bundle(bundle: &CheckerBundle) -> Option<NotAsked> {
 }
 
 impl Asked {
-    /// The bundle's parameter, when something was left out.
+    /// Returns the bundle's parameter, if any checkers were left out.
     pub(super) fn to_param(self) -> Option<Param> {
         let left_out = self.offered.checked_sub(self.asked)?;
         (left_out > 0).then(|| Param {
@@ -48,7 +48,7 @@ impl Asked {
 }
 
 impl fmt::Display for NotAsked {
-    /// `251 of the 252 checkers of xodrBundle`.
+    /// Writes text such as `251 of the 252 checkers of xodrBundle`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let NotAsked {
             bundle,

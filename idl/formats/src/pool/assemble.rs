@@ -54,7 +54,7 @@ pub(super) fn pool(input: PoolInput<'_>, resolver: &mut dyn Resolver) -> Pooled 
     pool.finish()
 }
 
-/// Bundles of one name are told apart by a number, as ASAM's pooling does.
+/// Numbers bundles of the same name to distinguish them, as ASAM's pooling does.
 fn with_own_names(mut bundles: Vec<BundleOutcome>) -> Vec<(BundleOutcome, String)> {
     let mut taken: Vec<String> = vec![OWN_BUNDLE.to_owned()];
     let mut named = Vec::with_capacity(bundles.len());
@@ -72,10 +72,10 @@ fn with_own_names(mut bundles: Vec<BundleOutcome>) -> Vec<(BundleOutcome, String
     named
 }
 
-/// What becomes of an outcome.
+/// How the configuration treats an outcome.
 #[derive(Clone, Copy)]
 enum Entry<'c> {
-    /// There is no configuration, or none that concerns a bundle by itself.
+    /// There is no configuration, or it does not apply because the bundle runs alone.
     Free,
     /// The configuration names the bundle.
     Configured(&'c BundleConfig),
@@ -83,7 +83,7 @@ enum Entry<'c> {
     Unwanted,
 }
 
-/// Outcomes in the order of the result, with the configuration's entry for each.
+/// Returns the outcomes in the order of the result, each with its entry in the configuration.
 fn in_order<'c>(
     config: Option<&'c Config>,
     outcomes: Vec<(BundleOutcome, String)>,
@@ -173,8 +173,8 @@ impl<'a> Pool<'a, '_> {
         });
     }
 
-    /// The checkers that the configuration names, in its order, and after them those that kept one
-    /// of them from looking; the others' issues are removed.
+    /// Returns the configured checkers in the order of the configuration. Checkers that blocked one
+    /// of them follow. The issues of all others are removed.
     fn configured(
         &mut self,
         config: &BundleConfig,
@@ -223,7 +223,7 @@ impl<'a> Pool<'a, '_> {
         }
     }
 
-    /// One checker: levels, rules, places, summary.
+    /// Completes one checker: levels, rules, places, summary.
     fn checker(
         &mut self,
         entry: Option<&BundleConfig>,
@@ -254,8 +254,8 @@ impl<'a> Pool<'a, '_> {
         checker::finish(outcome, configured, removed)
     }
 
-    /// `InputFile` first, then the configured parameters, then the bundle's own, then how little
-    /// was asked of it.
+    /// Returns `InputFile` first, then the configured parameters, then the bundle's own. The number
+    /// of checkers left out is last.
     fn params(
         &self,
         entry: Option<&BundleConfig>,
@@ -282,14 +282,14 @@ impl<'a> Pool<'a, '_> {
         params
     }
 
-    /// The remark that no checker looked at the file, where nothing else tells why.
+    /// Returns the remark that no checker examined the file, unless the result already explains it.
     fn nobody_looked(&self) -> Option<Remark> {
         let looked = self.pooled.results.bundles.iter().any(verdict::has_looked);
         let told = self.pooled.open().next().is_some();
         (!looked && !told).then(|| remarks::nobody_looked(&self.pooled))
     }
 
-    /// The bundle `qcbus`, when it has something to say.
+    /// Adds the bundle `qcbus`, if it has any remarks.
     fn add_own(&mut self, own: BundleOutcome, remarks: Vec<Remark>) {
         let mut all: Vec<Remark> = self
             .config
@@ -306,7 +306,7 @@ impl<'a> Pool<'a, '_> {
             ..own
         };
         let name = outcome.name.clone();
-        // Never filtered: as if there were no configuration.
+        // The bundle `qcbus` is never filtered, so the configuration is ignored here.
         let config = self.config.take();
         self.add(Entry::Free, (outcome, name));
         self.config = config;
@@ -330,7 +330,7 @@ impl<'a> Pool<'a, '_> {
     }
 }
 
-/// Checkers of one id become one: ids are unique in a result, and no issue is dropped for it.
+/// Merges checkers with the same id, because ids are unique in a result and no issue may be lost.
 fn merged(outcomes: Vec<CheckerOutcome>) -> Vec<CheckerOutcome> {
     let mut ids: Vec<&str> = outcomes.iter().map(|it| &*it.id).collect();
     ids.sort_unstable();
@@ -352,12 +352,12 @@ fn merged(outcomes: Vec<CheckerOutcome>) -> Vec<CheckerOutcome> {
 }
 
 impl Counts {
-    /// All levels together.
+    /// Returns the sum over all levels.
     pub fn total(self) -> u64 {
         self.errors + self.warnings + self.information
     }
 
-    /// Counts one issue more.
+    /// Counts one more issue.
     pub fn add(&mut self, level: Level) {
         match level {
             Level::Error => self.errors += 1,

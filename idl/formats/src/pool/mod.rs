@@ -1,8 +1,8 @@
-//! Pooling: what bundles found, under a configuration, becomes one result.
+//! Pooling: merges the findings of bundles into one result, according to a configuration.
 //!
-//! The broker pools the bundles of a job ([`Scope::Whole`]); a bundle that is run by itself as an
-//! ASAM module pools its own findings ([`Scope::Alone`]). What is removed is counted and told,
-//! what is missing is told, and the same input gives the same result, byte for byte.
+//! The broker pools the bundles of a job ([`Scope::Whole`]). A bundle that runs by itself as an
+//! ASAM module pools its own findings ([`Scope::Alone`]). Removed issues are counted and reported,
+//! and so are missing checkers. The same input gives the same result, byte for byte.
 
 mod absent;
 mod asked;
@@ -22,102 +22,102 @@ pub use places::{NoPlaces, Resolver, XPathPlace};
 pub use remarks::chosen;
 pub use uid::{RuleUids, is_rule_uid};
 
-/// The name of the bundle in which qcbus speaks for itself.
+/// Name of the bundle for qcbus's own remarks.
 pub const OWN_BUNDLE: &str = "qcbus";
 
-/// Key of a checker's metadata: how many findings it has besides those that it lists.
+/// Metadata key of a checker: the number of its findings that are not listed.
 pub const NOT_LISTED: &str = "qcbus.not_listed";
 
-/// The checker of [`OWN_BUNDLE`] that says what the command line left out.
+/// Checker of [`OWN_BUNDLE`] that reports which checkers the command line left out.
 pub const CHOICE_CHECKER: &str = "qcbus_choice";
 
-/// Name of the information on an issue that names a further rule which the same fact breaks: the format
-/// has room for one only.
+/// Name of the information about a further rule that the same fact violates. The format has room
+/// for only one rule per issue.
 pub const RULE_INFO: &str = "qcbus.rule";
 
-/// Key of the metadata of a checker that could not look, which ASAM's format calls `skipped` like
-/// one that does not apply.
+/// Metadata key of a blocked checker. ASAM's format calls it `skipped`, like a checker that does
+/// not apply.
 pub const BLOCKED: &str = "qcbus.blockedBy";
 
-/// What is to be pooled.
+/// Input of pooling.
 #[derive(Debug)]
 pub struct PoolInput<'a> {
-    /// Absolute path of the checked file; becomes the parameter `InputFile` of every bundle.
+    /// Absolute path of the checked file. It becomes the parameter `InputFile` of every bundle.
     pub input_file: &'a str,
     /// The configuration in force, if there is one.
     pub config: Option<&'a Config>,
-    /// What each bundle found, in the order of the result when no configuration says otherwise.
+    /// The findings of each bundle, in the order of the result without a configuration.
     pub bundles: Vec<BundleOutcome>,
-    /// What qcbus itself has to say about this check.
+    /// qcbus's own remarks about this check.
     pub remarks: Vec<Remark>,
     /// Whether configured bundles that are not among [`Self::bundles`] are missing.
     pub scope: Scope,
-    /// Version and build date written for the bundle `qcbus`: of the caller's own program.
+    /// Version of the caller's program, written for the bundle `qcbus`.
     pub version: &'a str,
     /// Date of the caller's build, `YYYY-MM-DD`.
     pub build_date: &'a str,
 }
 
-/// Whether the outcomes are all that there is.
+/// Whether the outcomes are complete.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
-    /// Everything that the configuration demands should be there; what is not becomes `error`.
+    /// All configured bundles must be present; a missing one becomes `error`.
     Whole,
-    /// One bundle by itself: the configuration's other bundles are nobody's business.
+    /// A single bundle: other bundles in the configuration are ignored.
     Alone,
 }
 
-/// Something that qcbus says itself, in the bundle `qcbus`, never filtered.
+/// A remark by qcbus itself, in the bundle `qcbus`. It is never filtered.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Remark {
-    /// The checker under which it is listed, such as `qcbus_limits`.
+    /// The checker that lists it, such as `qcbus_limits`.
     pub checker: String,
-    /// What that checker looks at, in a sentence.
+    /// Subject of that checker, in a sentence.
     pub description: String,
-    /// The issue: its `rule_uid` becomes an addressed rule of that checker.
+    /// The issue. Its `rule_uid` becomes an addressed rule of that checker.
     pub issue: Option<Issue>,
-    /// Why nothing may be accepted as long as this is so.
+    /// The reason why the file cannot be accepted, if there is one.
     pub open: Option<String>,
 }
 
-/// A pooled result and what a verdict needs to know about it.
+/// A pooled result and the data for its verdict.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Pooled {
     /// The result, ready to be written.
     pub results: Results,
     /// The issues kept, by level.
     pub counts: Counts,
-    /// The issues removed, by level as they would have been kept.
+    /// The issues removed, by their level after configuration.
     pub removed: Counts,
     /// The checkers that did not complete, in the order of the result.
     pub unfinished: Vec<Unfinished>,
 }
 
 impl Pooled {
-    /// The verdict.
+    /// Returns the verdict.
     pub fn verdict(&self) -> Verdict {
         Verdict::of(&self.results)
     }
 
-    /// The verdict without what one checker says.
+    /// Returns the verdict without the findings of one checker.
     pub fn verdict_without(&self, checker: &str) -> Verdict {
         Verdict::without(&self.results, checker)
     }
 
-    /// What keeps the file from being accepted though no error was found.
+    /// Returns the checkers that prevent acceptance although no error was found.
     pub fn open(&self) -> impl Iterator<Item = &Unfinished> {
         self.unfinished.iter().filter(|it| it.ending.is_open())
     }
 }
 
-/// Numbers of issues.
+/// Numbers of issues by level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
-    /// Of level error.
+    /// Number of errors.
     pub errors: u64,
-    /// Of level warning.
+    /// Number of warnings.
     pub warnings: u64,
-    /// Of level information.
+    /// Number of issues of level information.
     pub information: u64,
 }
 
@@ -144,10 +144,10 @@ impl std::fmt::Display for Unfinished {
     }
 }
 
-/// Pools what bundles found into one result. Places are completed with `resolver`.
+/// Pools the findings of bundles into one result. `resolver` completes the places.
 ///
-/// Order: bundles and checkers as configured, without a configuration as given; the bundle
-/// `qcbus` comes last and only when it has something to say.
+/// Bundles and checkers are in configured order, or in the given order without a configuration. The
+/// bundle `qcbus` comes last and only if it has remarks.
 pub fn pool(input: PoolInput<'_>, resolver: &mut dyn Resolver) -> Pooled {
     assemble::pool(input, resolver)
 }

@@ -1,4 +1,4 @@
-//! What bundles found: the one form of it, from the checker that says it to the result.
+//! Findings of bundles: the only data model for them, from the checker to the result.
 
 use std::collections::BTreeSet;
 
@@ -11,31 +11,31 @@ use crate::xqar::{Issue, Metadata, Param, Status};
 /// How a checker ended.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Ending {
-    /// It looked at all there is.
+    /// It checked everything.
     Completed,
-    /// It has nothing to say about such a file: version or kind. That is an answer.
+    /// It does not apply to this version or kind of file. This is a valid answer.
     NotApplicable {
-        /// Why, for a person.
+        /// The reason, for a person.
         reason: String,
     },
-    /// It could not look: something that it rests on found errors or failed, or the file could not
-    /// be read. That is no answer.
+    /// It could not run, because one of its dependencies found errors or failed, or the file cannot
+    /// be read. This is no answer.
     Blocked {
-        /// Identifiers of the checkers of its bundle that it rests on and that stopped it; none when
-        /// it was the file itself.
+        /// Identifiers of the checkers of its bundle that blocked it; empty when the file itself
+        /// was the cause.
         by: Vec<String>,
-        /// Why, for a person.
+        /// The reason, for a person.
         reason: String,
     },
-    /// It should have looked and did not: crash, deadline, absent, a parameter of no use.
+    /// It did not run as required: crash, deadline, missing checker, unusable parameter.
     Failed {
-        /// Why, for a person.
+        /// The reason, for a person.
         reason: String,
     },
 }
 
 impl Ending {
-    /// What a result calls it.
+    /// Returns the status for a result.
     pub fn status(&self) -> Status {
         match self {
             Ending::Completed => Status::Completed,
@@ -44,7 +44,7 @@ impl Ending {
         }
     }
 
-    /// Why it did not complete; empty when it did.
+    /// Returns the reason why it did not complete; empty when it did.
     pub fn reason(&self) -> &str {
         match self {
             Ending::Completed => "",
@@ -54,7 +54,7 @@ impl Ending {
         }
     }
 
-    /// The same, to be changed.
+    /// Returns the reason for changes.
     pub fn reason_mut(&mut self) -> Option<&mut String> {
         match self {
             Ending::Completed => None,
@@ -64,18 +64,18 @@ impl Ending {
         }
     }
 
-    /// Whether the checker owes an answer, so that nothing may be accepted.
+    /// Checks whether the checker's answer is missing, so that the file cannot be accepted.
     pub fn is_open(&self) -> bool {
         matches!(self, Ending::Blocked { .. } | Ending::Failed { .. })
     }
 }
 
-/// What one bundle found.
+/// Findings of one bundle.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BundleOutcome {
     /// Its name, such as `xodrBundle`.
     pub name: String,
-    /// Its short name, such as `xodr`; a configuration may use it for the name.
+    /// Its short name, such as `xodr`. A configuration may use it instead of the name.
     pub alias: String,
     /// Its version.
     pub version: String,
@@ -85,50 +85,51 @@ pub struct BundleOutcome {
     pub description: String,
     /// Parameters of the bundle beyond the configured ones.
     pub params: Vec<Param>,
-    /// Its checkers in the order of its catalogue: those that were demanded, and those besides that
-    /// kept one of them from looking.
+    /// Its checkers in the order of its catalogue: the requested checkers, and those that blocked
+    /// one of them.
     pub checkers: Vec<CheckerOutcome>,
-    /// Why it was not there: it was demanded and nobody has ever seen it, so nobody knows its checkers.
+    /// The reason why a required bundle is missing. It never joined, so its checkers are unknown.
     pub absent: Option<String>,
-    /// How many checkers were demanded of how many that it has; `None`: nobody counted.
+    /// Numbers of requested and available checkers; `None` when they were not counted.
     pub asked: Option<Asked>,
 }
 
-/// How many checkers of a bundle were asked.
+/// Numbers of requested and available checkers of a bundle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Asked {
-    /// Demanded.
+    /// Number of requested checkers.
     pub asked: usize,
-    /// In the bundle's catalogue, without those that are off by default and that nobody demands.
+    /// Number of checkers in the catalogue, except unrequested ones that are off by default.
     pub offered: usize,
 }
 
-/// What one checker found.
+/// Findings of one checker.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CheckerOutcome {
     /// Its identifier.
     pub id: Text,
     /// What it checks.
     pub description: Text,
-    /// The rules that it answers for.
+    /// The rules that it checks.
     pub rule_uids: RuleUids,
-    /// How it ended; `None`: it never said, which is a failure.
+    /// How it ended. `None` means that the bundle did not report it, which is a failure.
     pub ending: Option<Ending>,
     /// The parameters that it used.
     pub params: Vec<Param>,
-    /// Its findings, ids not yet given.
+    /// Its findings, without ids.
     pub issues: Vec<Issue>,
     /// Further facts.
     pub metadata: Vec<Metadata>,
 }
 
 impl CheckerOutcome {
-    /// What a result calls its ending.
+    /// Returns the status of its ending for a result.
     pub fn status(&self) -> Status {
         self.ending.as_ref().map_or(Status::Error, Ending::status)
     }
 
-    /// Why it did not complete; empty when it did or never said.
+    /// Returns the reason why it did not complete; empty when it did or when no ending was
+    /// reported.
     pub fn reason(&self) -> &str {
         self.ending.as_ref().map_or("", Ending::reason)
     }
@@ -141,8 +142,8 @@ impl CheckerOutcome {
     }
 }
 
-/// Whether each of these outcomes is part of the answer: demanded, or in the way of one that is,
-/// directly or through others.
+/// Checks for each outcome whether it is part of the answer. It is if it is requested, or if it
+/// blocks a requested checker directly or through others.
 pub fn in_the_answer(checkers: &[CheckerOutcome], demanded: impl Fn(&str) -> bool) -> Vec<bool> {
     let mut kept: Vec<bool> = checkers.iter().map(|it| demanded(&it.id)).collect();
     loop {

@@ -1,10 +1,10 @@
-//! Every XPath gets its row and column.
+//! Completion of issues: adds row and column to every XPath.
 
 use std::collections::HashMap;
 
 use crate::xqar::{Issue, Location, Locations};
 
-/// Where an XPath leads to in the checked file.
+/// Place of an XPath in the checked file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct XPathPlace {
     /// Line of the element's `<`, from 1.
@@ -15,10 +15,10 @@ pub struct XPathPlace {
     pub offset: Option<u64>,
 }
 
-/// Finds places in the checked file. Closures are resolvers.
+/// Finds places in the checked file. Closures implement this trait.
 pub trait Resolver {
-    /// The place of the first node that an XPath selects; `None` when it selects none. Asked
-    /// once for every XPath.
+    /// Returns the place of the first node that an XPath selects; `None` when it selects none. It
+    /// is called once for every XPath.
     fn resolve(&mut self, xpath: &str) -> Option<XPathPlace>;
 }
 
@@ -28,7 +28,7 @@ impl<F: FnMut(&str) -> Option<XPathPlace>> Resolver for F {
     }
 }
 
-/// A resolver that knows no place: for a file that could not be read.
+/// A resolver without any places, for a file that cannot be read.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NoPlaces;
 
@@ -41,7 +41,7 @@ impl Resolver for NoPlaces {
 /// Completes the places of issues.
 pub(super) struct Completer<'r> {
     resolver: &'r mut dyn Resolver,
-    /// Many issues point at the same elements.
+    /// Cache of places, because many issues point at the same elements.
     known: HashMap<String, Option<XPathPlace>>,
 }
 
@@ -64,7 +64,7 @@ impl<'r> Completer<'r> {
         }
     }
 
-    /// Puts a `FileLocation` before every `XMLLocation`.
+    /// Inserts a `FileLocation` before every `XMLLocation`.
     fn add_files(&mut self, place: &mut Locations) {
         let mut files: Vec<XPathPlace> = Vec::new();
         let before = std::mem::take(&mut place.places);
@@ -99,7 +99,7 @@ impl<'r> Completer<'r> {
     }
 }
 
-/// Removes file locations that say the same as an earlier one.
+/// Removes file locations that equal an earlier one.
 fn without_doubles(place: &mut Locations) {
     let mut seen: Vec<Location> = Vec::new();
     place.places.retain(|location| {

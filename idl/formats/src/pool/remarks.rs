@@ -1,17 +1,17 @@
-//! What qcbus itself has to say: the bundle `qcbus`.
+//! Remarks of qcbus itself: the bundle `qcbus`.
 
 use super::{CheckerOutcome, Counts, Ending, OWN_BUNDLE, Pooled, Remark};
 use crate::config::{Choice, Config, Levels};
 use crate::xqar::{Issue, Level};
 
-/// Rule: issues that the configuration does not want are removed, and that is said.
+/// Rule: issues that the configuration excludes are removed, and the removal is reported.
 pub(super) const FILTERED: &str = "qcbus.dev:qcbus:1.0.0:pooling.filtered";
-/// Rule: what was left out on the command line is said.
+/// Rule: checkers left out on the command line are reported.
 const CHOSEN: &str = "qcbus.dev:qcbus:1.0.0:pooling.chosen";
-/// Rule: `minLevel` and `maxLevel` are in today's order.
+/// Rule: `minLevel` and `maxLevel` are in the current order.
 pub(super) const LEVEL_ORDER: &str = "qcbus.dev:qcbus:1.0.0:config.level_order";
 
-/// Why issues were removed.
+/// Reason why issues were removed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Why {
     Bundle,
@@ -64,7 +64,7 @@ impl Removal {
     }
 }
 
-/// The remark that not everything was asked, for whoever reads the result later.
+/// Returns the remark that some checkers were left out, for later readers of the result.
 pub fn chosen(choice: &Choice) -> Option<Remark> {
     if choice.is_everything() {
         return None;
@@ -81,7 +81,7 @@ pub fn chosen(choice: &Choice) -> Option<Remark> {
     })
 }
 
-/// The remark that a configuration uses the order of levels of 2023.
+/// Returns the remark that a configuration uses the order of levels of 2023.
 pub(super) fn level_order(config: &Config) -> Option<Remark> {
     let oddities = config.old_order_oddities();
     let first = oddities.first()?;
@@ -99,7 +99,7 @@ pub(super) fn level_order(config: &Config) -> Option<Remark> {
     })
 }
 
-/// The remark that everything that was demanded was passed over.
+/// Returns the remark that none of the requested checkers examined the file.
 pub(super) fn nobody_looked(pooled: &Pooled) -> Remark {
     let open = match pooled.unfinished.as_slice() {
         [] => String::from("no checker is demanded of this file"),
@@ -131,7 +131,7 @@ fn information(rule: &str, description: String) -> Issue {
     }
 }
 
-/// Remarks as the checkers of the bundle `qcbus`, in the order in which they first speak.
+/// Converts remarks to the checkers of the bundle `qcbus`, in the order of their first remark.
 pub(super) fn to_checkers(remarks: Vec<Remark>) -> Vec<CheckerOutcome> {
     let mut checkers: Vec<(CheckerOutcome, Vec<String>)> = Vec::new();
     for remark in remarks {
@@ -157,7 +157,7 @@ pub(super) fn to_checkers(remarks: Vec<Remark>) -> Vec<CheckerOutcome> {
     checkers.into_iter().map(ended).collect()
 }
 
-/// How a checker of ours ended: what it leaves open is a failure, or nobody would see it in a result.
+/// Returns the ending of a qcbus checker. An open point is a failure, to be visible in a result.
 fn ending(open: Vec<String>) -> Ending {
     let more = open.len().saturating_sub(1);
     let Some(first) = open.into_iter().next() else {
@@ -170,7 +170,7 @@ fn ending(open: Vec<String>) -> Ending {
     Ending::Failed { reason }
 }
 
-/// The name that a guest gets who calls itself like qcbus.
+/// Returns the name for a bundle. A bundle with the reserved name of qcbus gets another one.
 pub(super) fn guest_name(name: &str) -> &str {
     if name == OWN_BUNDLE {
         "qcbus (guest)"

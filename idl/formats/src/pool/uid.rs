@@ -1,4 +1,4 @@
-//! The shape of a rule UID, and the rules that a checker answers for.
+//! The format of a rule UID, and the rules that a checker checks.
 
 use std::ops::Deref;
 use std::sync::Arc;
@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::Text;
 
-/// The rules that a checker answers for, as its catalogue has them. Every result names them all, so that
-/// they are shared, and looked at once.
+/// The rules that a checker checks, as listed in its catalogue. Every result contains all of them,
+/// so they are shared and validated only once.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(from = "Arc<[Text]>", into = "Arc<[Text]>")]
 pub struct RuleUids {
@@ -17,12 +17,12 @@ pub struct RuleUids {
 }
 
 impl RuleUids {
-    /// They can be written as they are: each is a rule UID, and none is there twice.
+    /// Checks whether they can be written unchanged: each is a rule UID, and none is duplicated.
     pub(super) fn can_be_written(&self) -> bool {
         self.sound
     }
 
-    /// They themselves, shared.
+    /// Returns the shared rules.
     pub(super) fn shared(&self) -> &Arc<[Text]> {
         &self.given
     }
@@ -67,7 +67,7 @@ impl Deref for RuleUids {
     }
 }
 
-/// Whether the text is a rule UID as ASAM's readers accept it:
+/// Checks whether the text is a rule UID that ASAM's readers accept:
 /// `entity.tld:standard:1.2.3:set.of.rules.name`.
 pub fn is_rule_uid(text: &str) -> bool {
     if text.is_ascii() {
@@ -77,9 +77,9 @@ pub fn is_rule_uid(text: &str) -> bool {
     }
 }
 
-/// The same for all that ASAM and most others name, byte by byte: it is asked hundreds of times for every file.
+/// Checks ASCII rule UIDs byte by byte, which is fast. It runs hundreds of times for every file.
 fn is_ascii_rule_uid(text: &[u8]) -> bool {
-    // In which of the four parts, how many words it has so far, how long the last of them is.
+    // The current part of four, its number of words so far, and the length of the current word.
     let (mut part, mut words, mut length) = (0, 0, 0);
     for &byte in text {
         match (byte, part) {
@@ -136,7 +136,7 @@ fn is_any_rule_uid(text: &str) -> bool {
         }) >= 1
 }
 
-/// The number of words between dots; 0 when one is empty or not as it should be.
+/// Counts the words between dots; returns 0 when one is empty or invalid.
 fn words(text: &str, good: impl Fn(&str) -> bool) -> usize {
     let mut count = 0;
     for word in text.split('.') {

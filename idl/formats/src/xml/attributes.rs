@@ -1,4 +1,4 @@
-//! The attributes of a tag, with places and with errors that point at the culprit.
+//! Parsing of the attributes of a tag, with positions and precise errors.
 
 use std::borrow::Cow;
 
@@ -7,7 +7,7 @@ use super::{Fault, is_name, is_xml_char};
 /// One attribute as written.
 pub(super) struct RawAttribute<'t> {
     pub name: &'t str,
-    /// Normalised and with its references resolved.
+    /// Normalised value with resolved references.
     pub value: Cow<'t, str>,
     /// Byte offset of the name in the text.
     pub offset: usize,
@@ -18,8 +18,8 @@ const QUOTE_HINT: &str = "a quotation mark inside a value ends it: remove the st
 const VALUE_HINT: &str = "write name=\"value\"";
 const OPEN_HINT: &str = "a quotation mark is missing, or there is one too many before this place";
 
-/// Takes the attributes of a tag apart. `text` is everything after the element's name up to `>`
-/// or `/>`, or up to the end of the file when the tag is not closed; it starts at byte `base`.
+/// Parses the attributes of a tag. `text` is everything after the element's name up to `>` or `/>`.
+/// If the tag is not closed, it ends with the file. It starts at byte `base`.
 pub(super) fn scan(text: &str, base: usize) -> Result<Vec<RawAttribute<'_>>, Fault> {
     let mut found: Vec<RawAttribute<'_>> = Vec::new();
     let mut at = 0;
@@ -46,7 +46,7 @@ fn leading_space(text: &str) -> usize {
     text.len() - text.trim_start_matches([' ', '\t', '\r', '\n']).len()
 }
 
-/// Something follows a value (or the element's name) without a space.
+/// Returns the error for text that follows a value (or the element's name) without a space.
 fn no_space(rest: &str, offset: usize, before: Option<&RawAttribute<'_>>) -> Fault {
     let stray = excerpt(rest);
     let what = match before {
@@ -61,7 +61,7 @@ fn no_space(rest: &str, offset: usize, before: Option<&RawAttribute<'_>>) -> Fau
     Fault::new(offset, what).with_hint(QUOTE_HINT)
 }
 
-/// The first word, short enough for a message.
+/// Returns the first word, short enough for a message.
 fn excerpt(text: &str) -> String {
     text.chars()
         .take_while(|c| !c.is_whitespace() && *c != '>' && *c != '<')
@@ -69,7 +69,7 @@ fn excerpt(text: &str) -> String {
         .collect()
 }
 
-/// The attribute that starts at `at`, and where it ends.
+/// Parses the attribute that starts at `at`, and returns its end too.
 fn one(text: &str, at: usize, base: usize) -> Result<(RawAttribute<'_>, usize), Fault> {
     let stops = [' ', '\t', '\r', '\n', '=', '"', '\'', '<', '>'];
     let length = text[at..].find(stops).unwrap_or(text.len() - at);
@@ -98,7 +98,7 @@ fn one(text: &str, at: usize, base: usize) -> Result<(RawAttribute<'_>, usize), 
     ))
 }
 
-/// What stands between the quotation marks at the start of `text`, which is at byte `offset`.
+/// Returns the text between quotation marks at the start of `text`, which is at byte `offset`.
 fn quoted<'t>(text: &'t str, name: &str, offset: usize) -> Result<&'t str, Fault> {
     let Some(quote @ ('"' | '\'')) = text.chars().next() else {
         let what = format!("the value of attribute `{name}` is not in quotation marks");
@@ -108,7 +108,7 @@ fn quoted<'t>(text: &'t str, name: &str, offset: usize) -> Result<&'t str, Fault
     let end = rest.find(quote);
     let raw = &rest[..end.unwrap_or(rest.len())];
     match raw.find('<') {
-        // Markup of a later line inside a value: the value was meant to end before it.
+        // The value contains markup of a later line, so its closing quotation mark is missing.
         Some(open) if raw[..open].contains('\n') => Err(unclosed(name, offset)),
         Some(open) => {
             let what = format!("`<` in the value of attribute `{name}`");
@@ -125,7 +125,7 @@ fn unclosed(name: &str, offset: usize) -> Fault {
     Fault::new(offset, what).with_hint(OPEN_HINT)
 }
 
-/// An attribute's value: white space becomes spaces, references are resolved.
+/// Returns an attribute's value: white space becomes spaces, references are resolved.
 fn resolve(raw: &str, base: usize) -> Result<Cow<'_, str>, Fault> {
     if !raw.contains(['&', '\t', '\n', '\r']) {
         return Ok(Cow::Borrowed(raw));
@@ -141,7 +141,7 @@ fn resolve(raw: &str, base: usize) -> Result<Cow<'_, str>, Fault> {
                 value.push(reference(name, offset)?);
                 rest = after;
             }
-            // A line end is one character, however it is written (XML 1.0, 2.11).
+            // A line end counts as one character in each of its spellings (XML 1.0, 2.11).
             '\r' if rest.starts_with('\n') => {}
             '\t' | '\n' | '\r' => value.push(' '),
             other => value.push(other),
@@ -150,7 +150,7 @@ fn resolve(raw: &str, base: usize) -> Result<Cow<'_, str>, Fault> {
     Ok(Cow::Owned(value))
 }
 
-/// The character that `&name;` stands for.
+/// Returns the character that `&name;` represents.
 pub(super) fn reference(name: &str, offset: usize) -> Result<char, Fault> {
     let number = match name.strip_prefix('#') {
         None => None,

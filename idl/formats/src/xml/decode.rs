@@ -1,8 +1,8 @@
-//! Bytes to text: byte order marks and encoding declarations.
+//! Decoding of bytes to text: byte order marks and encoding declarations.
 
 use super::XmlError;
 
-/// The text of a file: by its byte order mark, else by its declaration, else UTF-8.
+/// Decodes a file's text by its byte order mark, else by its declaration, else as UTF-8.
 pub(super) fn decode(bytes: &[u8]) -> Result<String, XmlError> {
     let encoding = match encoding_rs::Encoding::for_bom(bytes) {
         Some((encoding, _)) => encoding,
@@ -15,7 +15,7 @@ pub(super) fn decode(bytes: &[u8]) -> Result<String, XmlError> {
     Ok(text.into_owned())
 }
 
-/// The encoding that `<?xml … encoding="…"?>` names. The declaration itself is plain ASCII.
+/// Returns the encoding in `<?xml … encoding="…"?>`. The declaration itself is plain ASCII.
 fn declared(bytes: &[u8]) -> Result<&'static encoding_rs::Encoding, XmlError> {
     let head = &bytes[..bytes.len().min(200)];
     let Some(end) = head.windows(2).position(|pair| pair == b"?>") else {
@@ -32,7 +32,7 @@ fn declared(bytes: &[u8]) -> Result<&'static encoding_rs::Encoding, XmlError> {
         .and_then(|rest| rest.split(['"', '\'']).nth(1));
     match label {
         None => Ok(encoding_rs::UTF_8),
-        // Read as ASCII so far, so it cannot be UTF-16, whatever it says.
+        // The declaration was read as ASCII, so the file cannot be UTF-16, even if it declares it.
         Some(label) if label.to_ascii_lowercase().starts_with("utf-16") => Ok(encoding_rs::UTF_8),
         Some(label) => encoding_rs::Encoding::for_label(label.as_bytes()).ok_or_else(|| XmlError {
             row: 1,
@@ -43,7 +43,7 @@ fn declared(bytes: &[u8]) -> Result<&'static encoding_rs::Encoding, XmlError> {
     }
 }
 
-/// Where the first invalid byte of a UTF-8 file is; for other encodings only that there is one.
+/// Returns the error for invalid bytes, with the position of the first one if the file is UTF-8.
 fn invalid(bytes: &[u8], encoding: &str) -> XmlError {
     let (row, column, what) = match std::str::from_utf8(bytes) {
         Err(error) if encoding == "UTF-8" => {

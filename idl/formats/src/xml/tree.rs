@@ -1,4 +1,4 @@
-//! The tree and how it is read.
+//! The element tree and its parser.
 
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
@@ -7,11 +7,11 @@ use super::attributes::{reference, scan};
 use super::decode::decode;
 use super::{Fault, MAX_DEPTH, XmlError, is_name, is_xml_char};
 
-/// A file that is well-formed.
+/// A well-formed file.
 #[derive(Debug)]
 pub(crate) struct Document {
     text: String,
-    /// Byte offsets at which lines start.
+    /// Byte offsets of the line starts.
     lines: Vec<usize>,
     /// The root element.
     pub root: Element,
@@ -24,16 +24,16 @@ pub(crate) struct Element {
     pub name: String,
     /// Attributes in order.
     pub attributes: Vec<Attribute>,
-    /// What is inside, in order.
+    /// Content, in order.
     pub content: Vec<Node>,
     /// Byte offset of `<` in the text.
     pub offset: usize,
 }
 
-/// What can be inside an element.
+/// Content of an element.
 #[derive(Debug)]
 pub(crate) enum Node {
-    /// Another element.
+    /// A child element.
     Element(Element),
     /// Character data, never empty.
     Text(String),
@@ -51,7 +51,7 @@ pub(crate) struct Attribute {
 }
 
 impl Document {
-    /// Row and column, both from 1, of a byte offset of the text.
+    /// Returns row and column, both from 1, of a byte offset of the text.
     pub fn place(&self, offset: usize) -> (u64, u64) {
         let row = self.lines.partition_point(|start| *start <= offset);
         let start = row
@@ -68,14 +68,14 @@ impl Document {
 }
 
 impl Element {
-    /// The name without its prefix.
+    /// Returns the name without its prefix.
     pub fn local_name(&self) -> &str {
         self.name
             .rsplit_once(':')
             .map_or(self.name.as_str(), |(_, local)| local)
     }
 
-    /// The elements inside.
+    /// Returns the child elements.
     pub fn children(&self) -> impl Iterator<Item = &Element> {
         self.content.iter().filter_map(|node| match node {
             Node::Element(element) => Some(element),
@@ -83,21 +83,21 @@ impl Element {
         })
     }
 
-    /// The attribute of this name.
+    /// Returns the attribute of this name.
     pub fn attribute(&self, name: &str) -> Option<&Attribute> {
         self.attributes
             .iter()
             .find(|attribute| attribute.name == name)
     }
 
-    /// The value of the attribute of this name.
+    /// Returns the value of the attribute of this name.
     pub fn value(&self, name: &str) -> Option<&str> {
         self.attribute(name)
             .map(|attribute| attribute.value.as_str())
     }
 }
 
-/// Row and column, both from 1, of a byte offset.
+/// Returns row and column, both from 1, of a byte offset.
 pub(super) fn row_column(text: &str, offset: usize) -> (u64, u64) {
     let before = text.get(..offset).unwrap_or(text);
     let row = before.bytes().filter(|byte| *byte == b'\n').count() + 1;
@@ -105,7 +105,7 @@ pub(super) fn row_column(text: &str, offset: usize) -> (u64, u64) {
     (row as u64, line.chars().count() as u64 + 1)
 }
 
-/// Reads a file.
+/// Parses a file.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Document, XmlError> {
     let text = decode(bytes)?;
     let read = Builder::new(&text).read();
@@ -154,7 +154,7 @@ impl<'t> Builder<'t> {
             return Err(Fault::new(offset, what));
         }
         let mut reader = Reader::from_str(self.text);
-        // End tags are compared here, because this error knows where the element was opened.
+        // End tags are compared here, because this error can show where the element was opened.
         reader.config_mut().check_end_names = false;
         reader.config_mut().allow_unmatched_ends = true;
         loop {
@@ -295,8 +295,8 @@ impl<'t> Builder<'t> {
         }
     }
 
-    /// The tokenizer gave up at the markup that starts at `at`. Where that is a tag, its
-    /// attributes know better what is wrong.
+    /// Returns the error for markup at `at` that the tokenizer could not parse. If it is a tag, its
+    /// attributes are parsed again for a more precise error.
     fn syntax(&self, at: usize, error: &quick_xml::Error) -> Fault {
         let rest = self.text.get(at..).unwrap_or("");
         if let Some(tag) = rest.strip_prefix('<') {
@@ -314,7 +314,7 @@ impl<'t> Builder<'t> {
     }
 }
 
-/// Text where there may be none.
+/// Returns the error for text outside of the root element.
 fn outside(text: &str, at: usize) -> Fault {
     let shown: String = text.trim_start().chars().take(20).collect();
     let offset = at + (text.len() - text.trim_start().len());

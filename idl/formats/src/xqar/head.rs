@@ -1,12 +1,12 @@
-//! What a result is about, without reading all of it.
+//! Reading of a result's input file without parsing the whole result.
 
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
 
 use crate::config::INPUT_PARAMS;
 
-/// The checked file that a result names first: the parameter `InputFile` of a bundle. `head` is the
-/// beginning of a result; `None` when it is none, or the parameter does not come in it.
+/// Returns the first checked file in a result: the parameter `InputFile` of a bundle. `head` is the
+/// beginning of a result. Returns `None` if it is no result or lacks the parameter.
 pub fn input_file(head: &[u8]) -> Option<String> {
     let mut reader = Reader::from_reader(head);
     let mut in_results = false;

@@ -7,20 +7,20 @@ use serde::{Deserialize, Serialize};
 use crate::Text;
 use crate::location::OtherPlace;
 
-/// How severe an issue is. The number is the one written to files; a smaller number is worse.
+/// Severity of an issue. The number is the one written to files; a smaller number is worse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
-    /// Level 1: the file breaks a rule that it must keep.
+    /// Level 1: the file violates a mandatory rule.
     Error = 1,
-    /// Level 2: the file breaks a recommendation, or something looks wrong.
+    /// Level 2: the file violates a recommendation, or something looks wrong.
     Warning = 2,
-    /// Level 3: something worth knowing.
+    /// Level 3: useful information.
     Information = 3,
 }
 
 impl Level {
-    /// The level of a number as written to files.
+    /// Returns the level of a number as written to files.
     pub fn from_number(number: u8) -> Option<Level> {
         match number {
             1 => Some(Level::Error),
@@ -30,7 +30,7 @@ impl Level {
         }
     }
 
-    /// The level of a word, in any letter case, or of a number.
+    /// Returns the level of a word, in any letter case, or of a number.
     pub fn from_word(text: &str) -> Option<Level> {
         match text.trim().to_ascii_lowercase().as_str() {
             "error" | "1" => Some(Level::Error),
@@ -40,7 +40,7 @@ impl Level {
         }
     }
 
-    /// The word for it.
+    /// Returns the word for it.
     pub fn as_str(self) -> &'static str {
         match self {
             Level::Error => "error",
@@ -51,7 +51,7 @@ impl Level {
 }
 
 impl Status {
-    /// The word for it, as written to files.
+    /// Returns the word for it, as written to files.
     pub fn as_str(self) -> &'static str {
         match self {
             Status::Completed => "completed",
@@ -69,7 +69,7 @@ pub enum Status {
     Completed,
     /// It did not apply: version, kind of file or a precondition.
     Skipped,
-    /// It should have run and did not: crash, deadline, panic, absent.
+    /// It did not run as required: crash, deadline, panic, missing.
     Error,
 }
 
@@ -82,7 +82,7 @@ pub struct Results {
     pub bundles: Vec<CheckerBundle>,
 }
 
-/// What one bundle found.
+/// Findings of one bundle.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct CheckerBundle {
     /// Name, such as `xodrBundle`.
@@ -93,9 +93,9 @@ pub struct CheckerBundle {
     pub build_date: String,
     /// What the bundle checks.
     pub description: String,
-    /// Counts of its checkers by status.
+    /// Numbers of its checkers by status.
     pub summary: String,
-    /// Effective parameters, `InputFile` among them.
+    /// Effective parameters, including `InputFile`.
     pub params: Vec<Param>,
     /// Its checkers, in order.
     pub checkers: Vec<Checker>,
@@ -110,24 +110,24 @@ pub struct Param {
     pub value: String,
 }
 
-/// What one checker found.
+/// Findings of one checker.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Checker {
     /// Identifier, such as `check_asam_xodr_xml_root_tag_is_opendrive`.
     pub id: Text,
     /// What it checks.
     pub description: Text,
-    /// Why it was skipped or failed, and how many issues it found.
+    /// The reason why it was skipped or failed, and its number of issues.
     pub summary: Text,
-    /// How it ended; files written by others may leave it out.
+    /// How it ended; files written by other tools may omit it.
     pub status: Option<Status>,
     /// Effective parameters.
     pub params: Vec<Param>,
     /// Its findings.
     pub issues: Vec<Issue>,
-    /// The rule UIDs that it answers for.
+    /// The rule UIDs that it checks.
     pub addressed_rules: Arc<[Text]>,
-    /// Further facts, such as the time it took.
+    /// Further facts, such as the run time.
     pub metadata: Vec<Metadata>,
 }
 
@@ -138,40 +138,40 @@ pub struct Metadata {
     pub key: String,
     /// Its value.
     pub value: String,
-    /// What it means.
+    /// Meaning of the fact.
     pub description: String,
 }
 
 /// One finding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Issue {
-    /// Running number over a whole result; given by pooling, 0 before.
+    /// Running number over a whole result. Pooling assigns it; it is 0 before.
     pub id: u64,
-    /// What was found and what is allowed.
+    /// The finding and the allowed state.
     pub description: String,
     /// Severity.
     pub level: Level,
     /// The violated rule.
     pub rule_uid: String,
-    /// Where; every place with its own description.
+    /// The places of the issue, each with its own description.
     pub locations: Vec<Locations>,
-    /// Facts that the format has no element for, such as road positions.
+    /// Facts without an element in the format, such as road positions.
     pub domain_info: Vec<DomainInfo>,
 }
 
-/// One place, described in one or several ways. When it lies in another file, the ways lead to the
+/// One place, described in one or several ways. For a place in another file, they lead to the
 /// reference in the checked file.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Locations {
-    /// What is to be seen here.
+    /// Explanation of this place.
     pub description: String,
-    /// Where it is, when it is in another file than the checked one.
+    /// The actual place, when it is in another file than the checked one.
     pub elsewhere: Option<OtherPlace>,
-    /// The ways to find it, in the order in which they are written.
+    /// The descriptions of the place, in the order of the file.
     pub places: Vec<Location>,
 }
 
-/// One way to say where.
+/// One way to describe a place.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Location {
     /// A place in the text of the checked file.
@@ -201,9 +201,9 @@ pub enum Location {
     Road {
         /// `@id` of the road.
         road_id: String,
-        /// Along the reference line.
+        /// Coordinate along the reference line.
         s: f64,
-        /// Across it, left positive.
+        /// Coordinate across the reference line; left is positive.
         t: f64,
     },
     /// A point in time, in seconds.
@@ -247,12 +247,12 @@ pub struct InfoElement {
     pub children: Vec<InfoElement>,
 }
 
-/// Trees deeper than this are refused when they are read or decoded: every later step recurses.
-/// As JSON a whole result then stays within the 128 levels that serde_json allows.
+/// Maximum depth of a tree that is read or decoded; every later step recurses. A whole result as
+/// JSON then stays within the 128 levels that serde_json allows.
 pub(crate) const MAX_INFO_DEPTH: usize = 48;
 
-/// Decodes the children of an [`InfoElement`]. Messages come from processes that nobody trusts,
-/// and a tree of a hundred thousand levels would overflow the stack of the one who decodes it.
+/// Decodes the children of an [`InfoElement`]. Messages come from untrusted processes. A tree of a
+/// hundred thousand levels would overflow the decoder's stack.
 fn bounded_children<'de, D>(deserializer: D) -> Result<Vec<InfoElement>, D::Error>
 where
     D: serde::Deserializer<'de>,

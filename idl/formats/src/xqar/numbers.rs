@@ -1,7 +1,7 @@
-//! Doubles as text.
+//! Conversion between doubles and text.
 
-/// The shortest text that reads back as the same double; `NaN`, `INF`, `-INF` as XML Schema
-/// writes them. Very large and very small numbers with an exponent.
+/// Returns the shortest text that reads back as the same double. `NaN`, `INF`, `-INF` are written
+/// as in XML Schema. Very large and very small numbers have an exponent.
 pub(super) fn write(value: f64) -> String {
     if value.is_nan() {
         return String::from("NaN");
@@ -17,7 +17,7 @@ pub(super) fn write(value: f64) -> String {
     }
 }
 
-/// Reads what [`write()`] writes, and what C++ and Python write.
+/// Reads the output of [`write()`], of C++ and of Python.
 pub(super) fn read(text: &str) -> Option<f64> {
     match text.trim() {
         "INF" | "+INF" => Some(f64::INFINITY),

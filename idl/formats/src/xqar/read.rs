@@ -1,4 +1,4 @@
-//! Reading result files: the current form, the form of 2023, and Python's order of elements.
+//! Reading of result files: the current form, the form of 2023, and Python's order of elements.
 
 use super::{
     Checker, CheckerBundle, DomainInfo, InfoElement, Issue, Level, Location, Locations,
@@ -16,18 +16,18 @@ pub struct ReadError {
     pub row: u64,
     /// Column in characters, from 1.
     pub column: u64,
-    /// What is wrong.
+    /// Description of the error.
     pub text: String,
 }
 
-/// Reads a result file. Unknown elements and attributes are left out, missing texts are empty, a
-/// missing level is an error, and an issue without a number gets its rank among all issues.
+/// Reads a result file. Unknown elements and attributes are left out, missing texts are empty, and
+/// a missing level is an error. An issue without a number gets its rank among all issues.
 ///
-/// In the form of 2023 a rule UID in brackets at the end of an issue's description is taken for
-/// its rule, because [`super::write`] puts it there.
+/// In the form of 2023, a rule UID in brackets at the end of an issue's description becomes its
+/// rule. [`super::write`] writes it there.
 ///
 /// # Errors
-/// The file is not well-formed XML or no result file, or a number, level or status is none.
+/// The file is not well-formed XML or not a result file, or a number, level or status is invalid.
 pub fn read(bytes: &[u8]) -> Result<Results, ReadError> {
     let document = xml::parse(bytes).map_err(|error| ReadError {
         row: error.row,
@@ -43,7 +43,7 @@ pub fn read(bytes: &[u8]) -> Result<Results, ReadError> {
 
 struct Reader<'d> {
     document: &'d Document,
-    /// Issues read so far.
+    /// Number of issues read so far.
     issues: u64,
 }
 
@@ -170,7 +170,8 @@ impl Reader<'_> {
             "XMLLocation" => Location::Xml {
                 xpath: self.required(element, "xpath")?.to_owned(),
             },
-            // Angles h, p, r of the form of 2023 are left out: nothing here has a direction.
+            // The angles h, p, r of the form of 2023 are left out, because locations have no
+            // direction.
             "InertialLocation" => Location::Inertial {
                 x: self.number(element, "x")?,
                 y: self.number(element, "y")?,
@@ -246,7 +247,7 @@ impl Reader<'_> {
             return Ok(None);
         };
         match attribute.value.trim() {
-            // The tools of 2023 left attributes empty where they knew nothing.
+            // The tools of 2023 leave attributes empty when the value is unknown.
             "" => Ok(None),
             value => value.parse().map(Some).map_err(|_| {
                 let text = format!("`{value}` is no whole number from 0 on");
@@ -288,7 +289,7 @@ fn metadata(element: &Element) -> Metadata {
     }
 }
 
-/// The text of an element in one piece. White space between child elements is layout.
+/// Returns an element's text in one piece. White space between child elements is ignored.
 fn direct_text(element: &Element) -> String {
     let texts = element.content.iter().filter_map(|node| match node {
         Node::Text(text) => Some(text.as_str()),
@@ -300,7 +301,7 @@ fn direct_text(element: &Element) -> String {
     texts.filter(|text| !text.trim().is_empty()).collect()
 }
 
-/// Takes ` [rule UID]` off the end of a description.
+/// Splits ` [rule UID]` off the end of a description.
 fn split_rule(description: String) -> (String, String) {
     let found = description
         .strip_suffix(']')

@@ -1,9 +1,9 @@
-//! Road positions in the current form, which has no element for them: a `DomainSpecificInfo`
-//! named `qcbus.road` with one `Road` for each.
+//! Road positions in the current form, which has no element for them. They are stored in a
+//! `DomainSpecificInfo` named `qcbus.road` with one `Road` for each.
 //!
-//! `locations` says to which `Locations` of the issue the position belongs, from 1. A place that
-//! is described by nothing but road positions has no `Locations` element, because readers refuse
-//! one without a place that they know; its description then stands here.
+//! `locations` is the number of the issue's `Locations` that the position belongs to, from 1. A
+//! place with only road positions has no `Locations` element, because readers refuse one without a
+//! place they know. Its description is stored in the `Road` instead.
 
 use super::numbers;
 use super::{DomainInfo, InfoElement, Issue, Location, Locations};
@@ -11,7 +11,7 @@ use super::{DomainInfo, InfoElement, Issue, Location, Locations};
 /// Name of the `DomainSpecificInfo`.
 pub(super) const NAME: &str = "qcbus.road";
 
-/// Whether a place has nothing but road positions (and at least one).
+/// Checks whether a place has at least one road position and nothing else.
 pub(super) fn only_roads(place: &Locations) -> bool {
     !place.places.is_empty()
         && place
@@ -20,7 +20,7 @@ pub(super) fn only_roads(place: &Locations) -> bool {
             .all(|p| matches!(p, Location::Road { .. }))
 }
 
-/// The road positions of an issue, if it has any.
+/// Returns the road positions of an issue, if it has any.
 pub(super) fn to_info(issue: &Issue) -> Option<DomainInfo> {
     let mut content = Vec::new();
     let mut written = 0;
@@ -56,8 +56,8 @@ pub(super) fn to_info(issue: &Issue) -> Option<DomainInfo> {
     })
 }
 
-/// Puts the positions back to the places that they belong to; the first `listed` ones can be
-/// named. `false`: this is not what [`to_info`] writes, and nothing has been changed.
+/// Adds the positions to their places; only the first `listed` places can be referenced. Returns
+/// `false` and changes nothing if this is not the output of [`to_info`].
 pub(super) fn from_info(info: &DomainInfo, listed: usize, places: &mut Vec<Locations>) -> bool {
     let Some(roads) = info
         .content
@@ -91,13 +91,13 @@ pub(super) fn from_info(info: &DomainInfo, listed: usize, places: &mut Vec<Locat
     true
 }
 
-/// Where a position belongs.
+/// Target place of a position.
 enum Target {
-    /// To the `Locations` of this index.
+    /// The `Locations` of this index.
     Listed(usize),
-    /// To a place of its own with this description.
+    /// A new place with this description.
     NewPlace(String),
-    /// To the place that the position before it opened.
+    /// The new place of the previous position.
     SamePlace,
 }
 

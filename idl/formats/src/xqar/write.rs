@@ -1,4 +1,4 @@
-//! Writing result files: ASAM's current form, and the form of 2023.
+//! Writing of result files: ASAM's current form, and the form of 2023.
 
 mod info;
 mod markup;
@@ -9,33 +9,33 @@ use super::{
 };
 use markup::Markup;
 
-/// The version of the result format that is written when a result names none.
+/// Version of the result format that is written when a result has none.
 pub const FORMAT_VERSION: &str = "1.0.0";
 
-/// Which form of the file is written.
+/// Form of the result file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Dialect {
-    /// What ASAM's framework reads today.
+    /// The form that ASAM's framework reads today.
     #[default]
     Current,
-    /// The form of 2023 (QC4OpenX 1.0.0): `fileType`, `RoadLocation`, angles at
-    /// `InertialLocation`; without status, rules, metadata and domain specific facts. An issue's
-    /// rule is written in brackets behind its description.
+    /// The form of 2023 (QC4OpenX 1.0.0): `fileType`, `RoadLocation`, angles at `InertialLocation`.
+    /// It has no status, rules, metadata and domain specific facts. An issue's rule is written in
+    /// brackets after its description.
     Qc4Openx,
 }
 
-/// A result as text: elements in the order of ASAM's schema (Param, Issue, AddressedRule,
-/// Metadata), the same bytes for the same result. Characters that XML does not allow become
-/// U+FFFD, and names that are no names are mended, so that every result can be read again.
+/// Writes a result as text. Elements are in the order of ASAM's schema (Param, Issue,
+/// AddressedRule, Metadata). The same result gives the same bytes. Characters that XML does not
+/// allow become U+FFFD. Invalid names are repaired, so every result can be read again.
 ///
-/// In the current form an issue's rule that its checker does not list is added to the list,
-/// because ASAM's readers refuse the whole file otherwise, and an issue's place without any
-/// location that the form knows is written as row 1, column 1.
+/// In the current form, an issue's rule is added to its checker's list if it is missing there.
+/// ASAM's readers refuse the whole file otherwise. A place without any location that the form
+/// supports is written as row 1, column 1.
 pub fn write(results: &Results, dialect: Dialect) -> String {
     write_into(String::new(), results, dialect)
 }
 
-/// As [`write`], in the memory of a text that nobody needs any more.
+/// Writes like [`write`], and reuses the memory of a text that is no longer needed.
 pub fn write_into(mut memory: String, results: &Results, dialect: Dialect) -> String {
     memory.clear();
     memory.reserve(room(results));
@@ -48,7 +48,7 @@ pub fn write_into(mut memory: String, results: &Results, dialect: Dialect) -> St
     writer.out.finish()
 }
 
-/// About how many bytes a result has as text, on the safe side for most.
+/// Estimates the size of a result as text in bytes, enough for most results.
 fn room(results: &Results) -> usize {
     let checkers = results.bundles.iter().flat_map(|it| &it.checkers);
     let rows = |it: &Checker| {
@@ -63,7 +63,7 @@ fn room(results: &Results) -> usize {
 struct Writer {
     out: Markup,
     dialect: Dialect,
-    /// In the form of 2023: 1 for OpenDRIVE, 2 for OpenSCENARIO.
+    /// Value in the form of 2023: 1 for OpenDRIVE, 2 for OpenSCENARIO.
     file_type: &'static str,
 }
 
@@ -155,13 +155,13 @@ impl Writer {
     }
 
     fn params(&mut self, params: &[Param]) {
-        // A reader refuses a parameter without a name.
+        // Readers refuse a parameter without a name.
         for Param { name, value } in params.iter().filter(|param| !param.name.is_empty()) {
             self.out.empty("Param", &[("name", name), ("value", value)]);
         }
     }
 
-    /// In 2023 the checked file was the parameter `XodrFile` or `XoscFile`.
+    /// Writes the parameter of the checked file in the form of 2023: `XodrFile` or `XoscFile`.
     fn input_file_of_2023(&mut self, params: &[Param]) {
         let value = |name: &str| params.iter().find(|param| param.name == name);
         let name = if self.file_type == "2" {
@@ -227,7 +227,7 @@ impl Writer {
         self.out.close("Locations");
     }
 
-    /// Writes one location; `false` when the form has no element for it.
+    /// Writes one location. Returns `false` when the form has no element for it.
     fn location(&mut self, location: &Location) -> bool {
         let current = self.dialect == Dialect::Current;
         match location {
@@ -287,7 +287,7 @@ impl Writer {
         }
         let offset_text = offset.map(|offset| offset.to_string());
         let offset = offset_text.as_ref().map(|text| ("offset", text.as_str()));
-        // Row 0 says that only the offset is known.
+        // Row 0 means that only the offset is known.
         let place = if (row, column) == (0, 0) && offset.is_some() {
             &[][..]
         } else {
@@ -298,7 +298,7 @@ impl Writer {
     }
 }
 
-/// 2 when the bundle's input file is a scenario, else 1.
+/// Returns 2 when the bundle's input file is a scenario, else 1.
 fn file_type(bundle: &CheckerBundle) -> &'static str {
     let value = |name: &str| bundle.params.iter().find(|param| param.name == name);
     let scenario = match value("InputFile") {

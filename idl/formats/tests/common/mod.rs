@@ -1,4 +1,4 @@
-//! What the tests share.
+//! Common helpers of the tests.
 
 #![allow(dead_code, reason = "every test file uses a part of it")]
 
@@ -75,7 +75,7 @@ pub fn input(bundles: Vec<BundleOutcome>) -> PoolInput<'static> {
     }
 }
 
-/// A result with one of everything.
+/// Returns a result with one of each element.
 pub fn full() -> Results {
     let road = Location::Road {
         road_id: "5".into(),

@@ -1,4 +1,4 @@
-//! Results to report on, and a runner that reads what is printed.
+//! Results for test reports, and a runner that reads the printed output.
 
 pub mod runner;
 
@@ -32,8 +32,8 @@ pub fn sections(results: &[ResultMessage]) -> BTreeMap<String, Section> {
     results.iter().map(section).collect()
 }
 
-/// The report of these results. Whatever they are, a runner is asked for no more than it takes, and
-/// the report reads back as what it was made of.
+/// Returns the report of these results. The report never exceeds the limits of a runner, and it
+/// reads back as the same sections.
 pub fn report(results: &[ResultMessage]) -> String {
     let sections = sections(results);
     let text = Annotations.whole(&sections).unwrap();

@@ -1,10 +1,10 @@
-//! A runner of workflow commands: both forms, as a runner reads them from the lines of a log.
+//! A test runner of workflow commands. It reads both forms from the lines of a log.
 
 use std::collections::BTreeMap;
 
 use qcbus_report_github::MOST_ANNOTATIONS;
 
-/// What a runner of today obeys.
+/// Commands that a current runner executes.
 const KNOWN: &[&str] = &[
     "add-mask",
     "add-matcher",
@@ -30,7 +30,8 @@ pub struct Command {
     pub data: String,
 }
 
-/// What a runner obeys in a report: groups that end, and as many annotations as it takes.
+/// Returns the commands that a runner executes in a report. Asserts that groups end, and that the
+/// number of annotations is allowed.
 pub fn run(report: &str) -> Vec<Command> {
     assert!(!report.contains('\r'), "a runner ends lines there as well");
     let commands: Vec<Command> = report.lines().filter_map(command).collect();
@@ -53,8 +54,8 @@ pub fn run(report: &str) -> Vec<Command> {
     commands
 }
 
-/// The command of a line. Strings are compared by the rules of a language, where characters that
-/// nobody sees do not count.
+/// Returns the command of a line. Runners compare strings by the rules of a language, in which
+/// invisible characters do not count.
 fn command(line: &str) -> Option<Command> {
     let unseen = |c| {
         matches!(c, '\u{ad}' | '\u{34f}' | '\u{180e}' | '\u{200b}'..='\u{200f}'
@@ -64,7 +65,7 @@ fn command(line: &str) -> Option<Command> {
     newer(&seen).or_else(|| older(&seen))
 }
 
-/// `::name key=value,key=value::data`, after blanks.
+/// Parses `::name key=value,key=value::data`, after blanks.
 fn newer(line: &str) -> Option<Command> {
     let inside = line.trim_start().strip_prefix("::")?;
     let (head, data) = inside.split_once("::")?;
@@ -81,7 +82,7 @@ fn newer(line: &str) -> Option<Command> {
     })
 }
 
-/// `##[name key=value;key=value]data`, anywhere.
+/// Parses `##[name key=value;key=value]data`, anywhere in the line.
 fn older(line: &str) -> Option<Command> {
     let (_, inside) = line.split_once("##[")?;
     let (head, data) = inside.split_once(']')?;

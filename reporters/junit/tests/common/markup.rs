@@ -1,4 +1,4 @@
-//! XML read strictly, and by other code than that which wrote it.
+//! A strict XML reader, independent of the code that writes the reports.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ impl Element {
         self.children.iter().filter(move |child| child.name == name)
     }
 
-    /// All these attributes, and no other.
+    /// Asserts that the element has exactly these attributes.
     pub fn has_only(&self, names: &[&str]) {
         let mut wanted = names.to_vec();
         wanted.sort_unstable();
@@ -27,7 +27,7 @@ impl Element {
     }
 }
 
-/// The root element of a well-formed document of elements, attributes and text.
+/// Returns the root element of a well-formed document of elements, attributes and text.
 pub fn read(document: &str) -> Element {
     assert!(
         document.chars().all(is_legal),
@@ -44,7 +44,8 @@ fn is_legal(c: char) -> bool {
     matches!(c, '\t' | '\n' | '\r' | ' '..='\u{FFFD}' | '\u{10000}'..)
 }
 
-/// The element at whose `<` the rest begins; the rest is what follows it.
+/// Reads the element whose `<` is at the start of `rest`. Afterwards `rest` contains the text after
+/// it.
 fn element(rest: &mut &str) -> Element {
     let inside = rest.strip_prefix('<').unwrap();
     let (tag, behind) = inside.split_once('>').unwrap();
@@ -89,7 +90,7 @@ fn attributes(mut text: &str) -> BTreeMap<String, String> {
     attributes
 }
 
-/// Text without its references; an `&` that is none is a fault.
+/// Resolves the references in a text. An `&` without a valid reference is a fault.
 fn plain(text: &str) -> String {
     let mut parts = text.split('&');
     let mut plain = parts.next().unwrap_or_default().to_owned();

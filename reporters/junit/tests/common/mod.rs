@@ -1,4 +1,4 @@
-//! Results to report on, and what must hold of every report.
+//! Results for test reports, and checks that every report must pass.
 
 pub mod markup;
 
@@ -22,7 +22,7 @@ pub fn issue(level: Level, text: &str, row: u64) -> Issue {
     )
 }
 
-/// A checker of every ending.
+/// Returns one checker for every kind of ending.
 pub fn endings() -> Vec<Checker> {
     let completed = Some(Status::Completed);
     let remarks = vec![
@@ -46,7 +46,7 @@ pub fn endings() -> Vec<Checker> {
     ]
 }
 
-/// Sections by their keys.
+/// Returns sections by their keys.
 pub fn sections(
     results: &[ResultMessage],
 ) -> Result<BTreeMap<String, quick_junit::TestSuite>, ReportError> {
@@ -57,8 +57,8 @@ pub fn sections(
     results.iter().map(section).collect()
 }
 
-/// The report of these results. Whatever they are, it keeps to the rules of JUnit and reads back as
-/// what it was made of.
+/// Returns the report of these results. It always follows the rules of JUnit and reads back as the
+/// same sections.
 pub fn report(results: &[ResultMessage]) -> String {
     let sections = sections(results).unwrap();
     let text = Suites.whole(&sections).unwrap();
@@ -67,7 +67,7 @@ pub fn report(results: &[ResultMessage]) -> String {
     text
 }
 
-/// Names, places and numbers of elements as JUnit has them.
+/// Asserts that names, places and numbers of elements follow JUnit.
 pub fn assert_keeps_the_rules(text: &str) {
     let root = markup::read(text);
     assert_eq!(root.name, "testsuites");

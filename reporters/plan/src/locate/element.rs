@@ -1,4 +1,4 @@
-//! The place of an element: that of the nearest thing around it that has one.
+//! Place of an element: the place of the nearest enclosing element that has one.
 
 use qcbus_document::Node;
 use qcbus_opendrive::geometry::Point;
@@ -10,7 +10,7 @@ use super::find::{lane_at, section_at};
 use super::{Locator, Target};
 use crate::furniture::{object_pose, on_the_road, signal_pose};
 
-/// Where an element lies and what it is about.
+/// The place of an element and its targets.
 #[derive(Debug, Default)]
 pub(super) struct Found {
     pub(super) at: Option<Point>,
@@ -18,10 +18,10 @@ pub(super) struct Found {
 }
 
 impl<'m, 'a> Locator<'m, 'a> {
-    /// The place of an element; nothing for one that is part of no road and no junction.
+    /// Returns the place of an element; empty for an element outside of roads and junctions.
     pub(super) fn element(&self, node: Node<'a>) -> Found {
         let mut way: Vec<Node<'a>> = std::iter::once(node).chain(node.ancestors()).collect();
-        // From the child of the root downwards.
+        // The order is now from the child of the root downwards.
         way.pop();
         way.reverse();
         let Some((&top, within)) = way.split_first() else {
@@ -36,7 +36,8 @@ impl<'m, 'a> Locator<'m, 'a> {
         }
     }
 
-    /// The place of something within a road, given the elements from the road's child down to it.
+    /// Returns the place of an element in a road, given the elements from the road's child down to
+    /// it.
     fn in_road(&self, road: &'m Road<'a>, within: &[Node<'a>]) -> Found {
         let section = within
             .iter()
@@ -56,7 +57,7 @@ impl<'m, 'a> Locator<'m, 'a> {
         }
     }
 
-    /// As [`Locator::in_road`], outside of lane sections.
+    /// Does the same as [`Locator::in_road`], outside of lane sections.
     fn beside_lanes(&self, road: &'m Road<'a>, within: &[Node<'a>]) -> (Option<Point>, Target) {
         let on_road = Target::Road { road: road.index() };
         for node in within {
@@ -84,7 +85,8 @@ impl<'m, 'a> Locator<'m, 'a> {
         (at, on_road)
     }
 
-    /// The place of something within a junction, given the elements from the junction's child down to it.
+    /// Returns the place of an element in a junction, given the elements from the junction's child
+    /// down to it.
     fn in_junction(&self, junction: &'m Junction<'a>, within: &[Node<'a>]) -> Found {
         let target = Target::Junction {
             junction: junction.index(),
@@ -117,12 +119,12 @@ impl<'m, 'a> Locator<'m, 'a> {
         found
     }
 
-    /// The place that an element gives by the id of a road and s there.
+    /// Returns the place that an element gives by the id of a road and its s.
     fn on_other_road(&self, node: Node<'a>, road: &str, s: &str) -> Option<Point> {
         on_line(self.map.road(node.attr(road)?)?, number(node, s)?, 0.0)
     }
 
-    /// Where the first road starts that a junction leads to: for junctions without an outline.
+    /// Returns the start of the first road of a junction, for junctions without an outline.
     fn first_road(&self, junction: &Junction<'a>) -> Option<Point> {
         junction.connections().find_map(|connection| {
             let road = self.map.road(connection.target_road()?)?;
@@ -132,7 +134,7 @@ impl<'m, 'a> Locator<'m, 'a> {
     }
 }
 
-/// The place of something within a lane section, given the elements below the section.
+/// Returns the place of an element in a lane section, given the elements below the section.
 fn in_section<'a>(
     road: usize,
     index: usize,
@@ -178,14 +180,14 @@ fn in_section<'a>(
     (at, target)
 }
 
-/// The length of a section for a lane, or over both sides.
+/// Returns the length of a section for a lane, or the shortest length of both sides.
 fn length(section: SectionRef<'_, '_>, lane: Option<LaneRef<'_, '_>>) -> Option<f64> {
     let of_lane = lane.and_then(|lane| lane.length());
     let length = of_lane.or_else(|| section.shortest_length())?;
     (length > 0.0).then_some(length)
 }
 
-/// A point of the road; at its nearer end for what lies before or beyond it.
+/// Returns a point of the road. For a place before or beyond the road it uses the nearer end.
 fn on_line(road: &Road<'_>, s: f64, t: f64) -> Option<Point> {
     let point = road.point(on_the_road(road, s)?, t, 0.0)?;
     Some(point.plan())
@@ -195,7 +197,7 @@ fn end_of(road: &Road<'_>, end: ContactPoint) -> Option<Point> {
     road.end_pose(end).map(|pose| pose.point())
 }
 
-/// The middle of a road's reference line; its start where that has no middle.
+/// Returns the middle of a road's reference line, or its start if the middle is undefined.
 fn middle_of(road: &Road<'_>) -> Option<Point> {
     let length = road.plan_view().end().or(road.length());
     let middle = length.and_then(|length| road.pose(length / 2.0));
@@ -203,7 +205,7 @@ fn middle_of(road: &Road<'_>) -> Option<Point> {
     middle.or_else(|| end_of(road, ContactPoint::Start))
 }
 
-/// Where a geometry starts.
+/// Returns the start of a geometry.
 fn start_of(line: &PlanView<'_>, node: Node<'_>) -> Option<Point> {
     let geometries = line.geometries();
     let found = geometries.binary_search_by(|geometry| geometry.node().cmp(&node));
@@ -211,7 +213,7 @@ fn start_of(line: &PlanView<'_>, node: Node<'_>) -> Option<Point> {
     geometry.start_point().or_else(|| geometry.origin())
 }
 
-/// A finite number among the attributes of an element.
+/// Returns an attribute of an element as a finite number.
 fn number(node: Node<'_>, name: &str) -> Option<f64> {
     let value: f64 = node.attr(name)?.trim().parse().ok()?;
     value.is_finite().then_some(value)

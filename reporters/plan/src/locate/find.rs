@@ -1,4 +1,4 @@
-//! From an element to the part of the model that reads it.
+//! Search for the part of the model that reads an element.
 
 use qcbus_document::Node;
 use qcbus_opendrive::{Junction, LaneRef, Object, Road, SectionRef, Signal};
@@ -6,14 +6,14 @@ use qcbus_opendrive::{Junction, LaneRef, Object, Road, SectionRef, Signal};
 use super::Locator;
 
 impl<'m, 'a> Locator<'m, 'a> {
-    /// The junction of this element.
+    /// Returns the junction of this element.
     pub(super) fn junction_at(&self, node: Node<'a>) -> Option<&'m Junction<'a>> {
         let junctions = self.map.junctions();
         let found = junctions.binary_search_by(|junction| junction.node().cmp(&node));
         junctions.get(found.ok()?)
     }
 
-    /// The signal of this element and its place among the signals.
+    /// Returns the signal of this element and its index in the list of signals.
     pub(super) fn signal_at(&self, node: Node<'a>) -> Option<(usize, Signal<'a>)> {
         let all = self.signals.get_or_init(|| {
             let signals = self.map.signals();
@@ -23,7 +23,7 @@ impl<'m, 'a> Locator<'m, 'a> {
         Some((place, Signal::of(node)))
     }
 
-    /// The object of this element and its place among the objects.
+    /// Returns the object of this element and its index in the list of objects.
     pub(super) fn object_at(&self, node: Node<'a>) -> Option<(usize, Object<'a>)> {
         let all = self.objects.get_or_init(|| {
             let objects = self.map.objects();
@@ -34,7 +34,7 @@ impl<'m, 'a> Locator<'m, 'a> {
     }
 }
 
-/// The lane section of this element, and its place among the sections of the road.
+/// Returns the lane section of this element and its index among the sections of the road.
 pub(super) fn section_at<'m, 'a>(
     road: &'m Road<'a>,
     node: Node<'a>,
@@ -51,7 +51,7 @@ pub(super) fn section_at<'m, 'a>(
     None
 }
 
-/// The lane of this element.
+/// Returns the lane of this element.
 pub(super) fn lane_at<'m, 'a>(
     section: SectionRef<'m, 'a>,
     node: Node<'a>,
@@ -61,7 +61,7 @@ pub(super) fn lane_at<'m, 'a>(
     found.map(|(_, lane)| lane)
 }
 
-/// The item of an element among items in document order.
+/// Finds the item of an element among items in document order.
 fn search<'a, T: Copy>(
     count: usize,
     get: impl Fn(usize) -> Option<T>,

@@ -1,4 +1,4 @@
-//! Where findings lie on the plan.
+//! Places of findings on the plan.
 
 mod element;
 mod find;
@@ -18,81 +18,81 @@ use crate::plan::allowance;
 use crate::road::{RoadPlan, road};
 use paths::Paths;
 
-/// What a finding says about its place.
+/// Place data of a finding.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Said<'a> {
-    /// The XPath of an element of the map.
+    /// XPath of an element of the map.
     pub xpath: Option<&'a str>,
-    /// The id of a road, s and t in metres.
+    /// Id of a road, with s and t in metres.
     pub road: Option<(&'a str, f64, f64)>,
     /// x and y in metres, in the coordinates of the map.
     pub position: Option<(f64, f64)>,
 }
 
-/// Where a finding lies.
+/// Place of a finding on the plan.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Spot {
-    /// x and y in metres, in the coordinates of the map as it is written.
+    /// x and y in metres, in the original coordinates of the map.
     pub at: Option<[f64; 2]>,
-    /// Where `at` comes from; `None` when there is none.
+    /// Source of `at`; `None` if `at` is `None`.
     pub how: Option<How>,
-    /// What it is about, the most telling first.
+    /// Targets of the finding, the most specific first.
     pub on: Vec<Target>,
 }
 
-/// Where a place comes from.
+/// Source of a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum How {
-    /// The finding says x and y.
+    /// The finding gives x and y.
     Position,
-    /// It says road, s and t.
+    /// The finding gives road, s and t.
     Road,
-    /// It names an element that has a place.
+    /// The finding names an element that has a place.
     Element,
 }
 
-/// Something on the plan, by its place in the plan's lists.
+/// An element of the plan, by its index in the plan's lists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Target {
     /// A road.
     Road {
-        /// Its place among the roads.
+        /// Index in the list of roads.
         road: usize,
     },
     /// A lane section.
     Section {
-        /// Its road's place among the roads.
+        /// Index of its road in the list of roads.
         road: usize,
-        /// Its place among the sections of the road, over all layers.
+        /// Index among the sections of the road, over all layers.
         section: usize,
     },
     /// A lane.
     Lane {
-        /// Its road's place among the roads.
+        /// Index of its road in the list of roads.
         road: usize,
-        /// Its section's place among the sections of the road, over all layers.
+        /// Index of its section among the sections of the road, over all layers.
         section: usize,
-        /// Its id.
+        /// Id of the lane.
         lane: i64,
     },
     /// A junction.
     Junction {
-        /// Its place among the junctions.
+        /// Index in the list of junctions.
         junction: usize,
     },
     /// A signal.
     Signal {
-        /// Its place among the signals.
+        /// Index in the list of signals.
         signal: usize,
     },
     /// An object.
     Object {
-        /// Its place among the objects.
+        /// Index in the list of objects.
         object: usize,
     },
 }
 
-/// Leads findings to their places. What it has to look up it looks up once for all of them.
+/// Locator of findings on the plan. Its lookups are cached and shared by all findings.
 pub struct Locator<'m, 'a> {
     map: &'m RoadMap<'a>,
     origin: Shift,
@@ -102,15 +102,15 @@ pub struct Locator<'m, 'a> {
     junctions: RefCell<Junctions>,
 }
 
-/// The middles of the junctions that were asked for.
+/// Cached middles of junctions.
 struct Junctions {
     outlines: OnceCell<Outlines>,
     middles: HashMap<usize, Option<[f64; 2]>>,
-    /// How many more points of roads may be looked at.
+    /// Remaining number of road points that may be computed.
     left: usize,
 }
 
-/// How many points of roads are looked at for the middles of junctions.
+/// Maximum number of road points that are computed for the middles of junctions.
 const WORK: usize = 8_000_000;
 
 impl std::fmt::Debug for Locator<'_, '_> {
@@ -122,7 +122,7 @@ impl std::fmt::Debug for Locator<'_, '_> {
 }
 
 impl<'m, 'a> Locator<'m, 'a> {
-    /// Leads findings to places on the plan of this map.
+    /// Creates a locator for the plan of this map.
     pub fn new(map: &'m RoadMap<'a>) -> Locator<'m, 'a> {
         let root = map.root();
         Locator {
@@ -139,8 +139,8 @@ impl<'m, 'a> Locator<'m, 'a> {
         }
     }
 
-    /// Leads to the place that a finding tells: its position, else road, s and t, else the element of its XPath. A
-    /// place that is not on the plan (NaN, more than 1,000 km from the middle) counts as not told.
+    /// Returns the place of a finding: its position, else road, s and t, else the element of its
+    /// XPath. A place outside the plan (NaN, or more than 1,000 km from the middle) is ignored.
     pub fn locate(&self, said: &Said<'_>) -> Spot {
         let node = said.xpath.zip(self.paths.as_ref());
         let node = node.and_then(|(xpath, paths)| paths.find(xpath));
@@ -168,7 +168,7 @@ impl<'m, 'a> Locator<'m, 'a> {
         }
     }
 
-    /// The road that a finding means: of several with this id the one in which its element lies.
+    /// Returns the road of a finding. Of several with this id, it is the one around the element.
     fn road(&self, id: &str, node: Option<Node<'a>>) -> Option<&'m Road<'a>> {
         let around = node.and_then(|node| self.map.road_of(node));
         around
@@ -182,7 +182,7 @@ impl<'m, 'a> Locator<'m, 'a> {
         Some([point.x, point.y])
     }
 
-    /// The middle of a junction's outline.
+    /// Returns the middle of a junction's outline.
     fn middle(&self, junction: &Junction<'a>) -> Option<Point> {
         let mut junctions = self.junctions.borrow_mut();
         let junctions = &mut *junctions;
@@ -206,7 +206,7 @@ impl<'m, 'a> Locator<'m, 'a> {
     }
 }
 
-/// Roads that are drawn for the outline of a junction.
+/// Roads that are drawn on demand for the outline of a junction.
 struct RoadsWhenAsked<'m, 'a, 'w> {
     map: &'m RoadMap<'a>,
     origin: Shift,

@@ -1,36 +1,36 @@
-//! From the XPath of a finding to its element, for very many findings.
+//! Search for the element of a finding by its XPath; suitable for very many findings.
 
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 
 use qcbus_document::{Document, Node};
 
-/// Elements with more children than this remember them by number and id.
+/// Elements with more children than this cache them by number and id.
 const MANY: usize = 24;
 
-/// How many nodes may be looked at for XPaths that are not of the plain form.
+/// Maximum number of nodes that are visited for XPaths without the plain form.
 const WORK: u64 = 50_000_000;
 
-/// What a plain step of an unusual XPath costs at least.
+/// Minimum cost of an XPath without the plain form.
 const STEP: u64 = 10_000;
 
-/// Finds elements of one document.
+/// Finder of elements in one document.
 pub(super) struct Paths<'a> {
     document: Document<'a>,
-    /// The children of elements that have many.
+    /// Cached children of elements with many children.
     children: RefCell<HashMap<u32, Children<'a>>>,
-    /// How much work may still be done for unusual XPaths.
+    /// Remaining work for XPaths without the plain form.
     left: Cell<u64>,
 }
 
 /// The many children of an element.
 struct Children<'a> {
     named: HashMap<&'a str, Vec<Node<'a>>>,
-    /// By name of the element, name of the attribute and its value: the first one.
+    /// First child for each element name, attribute name and attribute value.
     with: HashMap<(&'a str, String), HashMap<&'a str, Node<'a>>>,
 }
 
-/// A step as `Node::xpath` prints it.
+/// A step in the form that `Node::xpath` prints.
 struct Step<'x> {
     name: &'x str,
     which: Which<'x>,
@@ -38,7 +38,7 @@ struct Step<'x> {
 
 enum Which<'x> {
     First,
-    /// Counted from one.
+    /// Position, counted from one.
     Number(usize),
     With(&'x str, &'x str),
 }
@@ -52,13 +52,14 @@ impl<'a> Paths<'a> {
         }
     }
 
-    /// The first element that an XPath means; a last step to an attribute or text leads to the element that bears it.
+    /// Returns the first element that an XPath matches. If the last step is an attribute or text,
+    /// it returns the element that contains it.
     pub(super) fn find(&self, xpath: &str) -> Option<Node<'a>> {
         self.follow(xpath).or_else(|| self.evaluate(xpath))
     }
 
-    /// Goes along an XPath of plain steps; `None` when it has others, or when the first element of a step that means
-    /// several does not lead on.
+    /// Follows an XPath of plain steps. Returns `None` if it has other steps. If a step matches
+    /// several elements, only the first is followed; `None` if that one does not lead on.
     fn follow(&self, xpath: &str) -> Option<Node<'a>> {
         let mut rest = xpath.trim();
         let mut at: Option<Node<'a>> = None;
@@ -114,7 +115,7 @@ impl<'a> Paths<'a> {
         }
     }
 
-    /// What `follow` does not understand, as long as such XPaths have not cost too much.
+    /// Evaluates an XPath that `follow` does not support, up to the work limit for such XPaths.
     fn evaluate(&self, xpath: &str) -> Option<Node<'a>> {
         let anywhere = xpath.contains("//");
         let price = if anywhere {
@@ -158,7 +159,7 @@ impl<'a> Children<'a> {
     }
 }
 
-/// The first step of `text` and what follows it.
+/// Returns the first step of `text` and the rest after it.
 fn step(text: &str) -> Option<(Step<'_>, &str)> {
     let end = text.find(['/', '[']).unwrap_or(text.len());
     let (name, rest) = text.split_at(end);
@@ -191,7 +192,7 @@ fn step(text: &str) -> Option<(Step<'_>, &str)> {
     ends.then_some((Step { name, which }, rest))
 }
 
-/// Whether this is a plain name, without prefix.
+/// Checks whether this is a plain name without a prefix.
 fn is_name(text: &str) -> bool {
     let plain = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-' | '.');
     !text.is_empty() && text.chars().all(plain) && !text.starts_with(['-', '.'])

@@ -1,4 +1,4 @@
-//! Maps made of text, and what their plans say: a reader of the bytes by `docs/html-report.md` alone.
+//! Maps made from text, and a decoder of their plans that is based only on `docs/html-report.md`.
 
 #![allow(dead_code, reason = "each test takes what it needs")]
 #![expect(
@@ -14,7 +14,7 @@ use qcbus_ingest::{Limits, prepare_bytes};
 use qcbus_opendrive::RoadMap;
 use qcbus_plan::Plan;
 
-/// Runs `test` on the map that these elements make within a complete file.
+/// Runs `test` on the map that these elements form within a complete file.
 pub fn with_map<T>(elements: &str, test: impl FnOnce(&RoadMap<'_>) -> T) -> T {
     let xml = format!("<OpenDRIVE><header revMajor=\"1\" revMinor=\"8\"/>{elements}</OpenDRIVE>");
     with_bytes(xml.into_bytes(), test)
@@ -28,7 +28,7 @@ pub fn with_bytes<T>(bytes: Vec<u8>, test: impl FnOnce(&RoadMap<'_>) -> T) -> T 
     test(&RoadMap::new(document))
 }
 
-/// The plan of the map that these elements make, read back.
+/// Returns the decoded plan of the map that these elements form.
 pub fn plan(elements: &str) -> Decoded {
     with_map(elements, |map| {
         let plan = Plan::of(map);
@@ -38,7 +38,7 @@ pub fn plan(elements: &str) -> Decoded {
     })
 }
 
-/// A road of these geometries and sections.
+/// Returns a road with these geometries and sections.
 pub fn road(id: &str, more: &str, length: f64, geometries: &str, lanes: &str) -> String {
     format!(
         "<road id='{id}' length='{length}' {more}><planView>{geometries}</planView>\
@@ -46,12 +46,12 @@ pub fn road(id: &str, more: &str, length: f64, geometries: &str, lanes: &str) ->
     )
 }
 
-/// A straight geometry.
+/// Returns a straight geometry.
 pub fn line(s: f64, x: f64, y: f64, hdg: f64, length: f64) -> String {
     format!("<geometry s='{s}' x='{x}' y='{y}' hdg='{hdg}' length='{length}'><line/></geometry>")
 }
 
-/// A section with one lane on either side, 3.5 and 3 m wide.
+/// A section with one lane on each side, 3.5 and 3 m wide.
 pub const TWO_LANES: &str = "<laneSection s='0'>\
     <left><lane id='1' type='driving'><width sOffset='0' a='3.5' b='0' c='0' d='0'/></lane></left>\
     <center><lane id='0' type='none'/></center>\
@@ -81,7 +81,7 @@ pub struct Border {
 }
 
 impl Border {
-    /// The points without their levels.
+    /// Returns the points without their levels.
     pub fn places(&self) -> Vec<[i64; 2]> {
         self.points.iter().map(|point| [point.x, point.y]).collect()
     }
@@ -287,7 +287,7 @@ impl Reader<'_> {
     }
 }
 
-/// Reads a plan to its last byte.
+/// Decodes a plan to its last byte.
 pub fn decode(bytes: &[u8]) -> Decoded {
     let mut reader = Reader {
         rest: bytes,

@@ -1,4 +1,4 @@
-//! The side of whoever asks.
+//! Client side of the control socket.
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
@@ -10,52 +10,52 @@ use qcbus_messages::control::{Request, Response};
 
 use super::{SOCKET, file_view, others, place};
 
-/// Why a broker could not be asked.
+/// Reason why a broker could not be asked.
 #[derive(Debug, thiserror::Error)]
 pub enum AskError {
-    /// Nobody listens.
+    /// No broker listens.
     #[error("no broker {}", nobody(path, others))]
     NoBroker {
-        /// The socket looked for.
+        /// Expected path of the socket.
         path: PathBuf,
-        /// Brokers of other users that serve an instance of this name, each in words.
+        /// Brokers of other users that serve an instance of this name, each as a text.
         others: Vec<String>,
     },
-    /// The instance is another user's.
+    /// The instance belongs to another user.
     #[error(
         "this user may not ask the broker of this instance ({path}): it belongs to {owner}; ask as that user"
     )]
     Forbidden {
-        /// The socket.
+        /// Path of the socket.
         path: PathBuf,
-        /// Whose it is, for a person.
+        /// Owner of the instance, as a text.
         owner: String,
     },
-    /// The socket cannot be reached, whoever listens.
+    /// The socket cannot be reached, whether or not a broker listens.
     #[error("cannot ask the broker of this instance ({path}): {why}")]
     Unreachable {
-        /// The socket.
+        /// Path of the socket.
         path: PathBuf,
-        /// What the system says.
+        /// Error message of the system.
         why: String,
     },
-    /// The broker went away before it answered.
+    /// The broker closed the connection before it answered.
     #[error("the broker left before it answered ({0}); see its log, and ask again when it runs")]
     Left(String),
-    /// The broker said something else than an answer.
+    /// The reply of the broker is no valid answer.
     #[error("the broker did not answer: {0}")]
     NoAnswer(String),
 }
 
-/// A broker that listens.
+/// Connection to a broker that listens.
 #[derive(Debug)]
 pub struct Line {
     stream: BufReader<UnixStream>,
-    /// Who listens; `None` where it cannot be seen, in another container for instance.
+    /// Process that listens. `None` if it cannot be seen, for example in another container.
     process: Option<Process>,
 }
 
-/// Asks a broker one thing. Blocks until it answers.
+/// Sends one request to a broker. Blocks until it answers.
 ///
 /// # Errors
 /// See [`AskError`].
@@ -64,7 +64,7 @@ pub fn ask_broker(directory: &Path, request: &Request) -> Result<Response, AskEr
     Line::on(stream).ask(request)
 }
 
-/// Why there is no connection.
+/// Returns the reason why the connection failed.
 fn refused(directory: &Path, error: &io::Error) -> AskError {
     use io::ErrorKind::{ConnectionRefused, NotADirectory, NotFound, PermissionDenied};
     let path = directory.join(SOCKET);
@@ -100,32 +100,33 @@ fn nobody(path: &Path, others: &[String]) -> String {
 }
 
 impl Line {
-    /// Connects to the broker of an instance; `None` if there is none that listens at this moment.
+    /// Connects to the broker of an instance. Returns `None` if no broker listens at this moment.
     pub fn to(directory: &Path) -> Option<Line> {
         place::connect_at_once(directory).ok().map(Line::on)
     }
 
     fn on(stream: UnixStream) -> Line {
-        // Nobody waits for his own end.
+        // A process must not wait for its own end.
         let process = Process::behind(&stream).filter(|it| it.id() != std::process::id());
         let stream = BufReader::new(stream);
         Line { stream, process }
     }
 
-    /// Who listens there; `None` where it cannot be seen.
+    /// Returns the id of the process that listens, or `None` if it cannot be seen.
     pub fn process(&self) -> Option<u32> {
         self.process.as_ref().map(Process::id)
     }
 
-    /// Whether the broker is this very program, with the rights of this process, and sees the files that it sees.
+    /// Checks whether the broker is the same program, has the rights of this process and sees the
+    /// same files.
     pub fn is_like_us(&self) -> bool {
         self.process.as_ref().is_some_and(file_view::is_like_us)
     }
 
-    /// Asks one thing after the other. Blocks until it is answered.
+    /// Sends one request on this connection. Blocks until it is answered.
     ///
     /// # Errors
-    /// See [`AskError`]; nothing more can be asked then.
+    /// See [`AskError`]. After an error the connection cannot be used any more.
     pub fn ask(&mut self, request: &Request) -> Result<Response, AskError> {
         let mut text =
             serde_json::to_vec(request).map_err(|error| AskError::NoAnswer(error.to_string()))?;
@@ -159,14 +160,14 @@ fn answer(
     let timeout = reader.get_ref().set_read_timeout(Some(SLICE));
     timeout.map_err(lost)?;
     let mut line = Vec::new();
-    // What has been read of the line is kept when the time is over.
+    // The part of the line that was read before a timeout stays in the buffer.
     while let Err(error) = reader.read_until(b'\n', &mut line) {
         if !is_timeout(&error) {
             return Err(lost(error));
         }
         let is_over = limit.is_some_and(|limit| begin.elapsed() >= limit);
         if is_over && has_own_limit(request) {
-            // The broker stands still: whoever asked for a limit gets it all the same.
+            // The broker does not respond, but the limit of the client holds all the same.
             return Ok(Response::TimedOut);
         }
         stopped += u32::from(process.is_some_and(Process::is_stopped));
@@ -188,20 +189,20 @@ fn answer(
     serde_json::from_slice(&line).map_err(|error| AskError::NoAnswer(error.to_string()))
 }
 
-/// How often it is looked at whether the broker can answer at all.
+/// Interval of the checks whether the broker can answer at all.
 const SLICE: Duration = Duration::from_millis(500);
-/// In so many looks it is stopped before nobody waits any more.
+/// Number of checks that find the broker stopped before the request is given up.
 const STOPPED_FOR: u32 = 6;
-/// How long a broker that has stopped may take to let go of what it holds.
+/// Maximum time that a stopped broker may take to release its resources.
 const END_WITHIN: Duration = Duration::from_secs(30);
-/// Beyond its own limit, how long a request waits for a broker that stands still.
+/// Time beyond its own limit that a request waits for a broker that does not respond.
 const GRACE: Duration = Duration::from_secs(2);
-/// How long a broker may take to check a file for somebody who can do it himself.
+/// Maximum time that a broker may take to check a file if the client can check it itself.
 const CHECKED_WITHIN: Duration = Duration::from_secs(60);
-/// How long a broker may take for what needs no waiting.
+/// Maximum time that a broker may take for a request that needs no waiting.
 const AT_ONCE: Duration = Duration::from_secs(30);
 
-/// Whether whoever asks has said how long to wait.
+/// Checks whether the request contains its own timeout.
 fn has_own_limit(request: &Request) -> bool {
     matches!(
         request,
@@ -215,7 +216,7 @@ fn has_own_limit(request: &Request) -> bool {
     )
 }
 
-/// How long to wait for an answer; `None`: as long as it takes.
+/// Returns how long to wait for an answer, or `None` if there is no limit.
 fn limit_of(request: &Request) -> Option<Duration> {
     match request {
         Request::Wait { timeout_ms, .. } | Request::WaitReported { timeout_ms, .. } => {

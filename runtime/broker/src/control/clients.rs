@@ -1,7 +1,8 @@
-//! Clients of the control socket: bounded in number, in what they may say and in the time that they take.
+//! Clients of the control socket: limits their number, their requests and their time.
 //!
-//! Whoever waits for a verdict stays as long as it lives. Everybody else has a few seconds, and where there
-//! is no room for one more, whoever has been silent longest makes it.
+//! A client that waits for a verdict stays as long as it lives. Every other client has a few
+//! seconds. If there is no room for a new client, the client that has been silent longest is
+//! removed.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -16,32 +17,33 @@ use tokio::time::{Instant, timeout};
 
 use super::Asked;
 
-/// Longest request, in bytes.
+/// Maximum length of a request in bytes.
 const MAX_REQUEST: usize = 64 << 10;
-/// Clients that are let in before everybody else has a turn.
+/// Number of clients that are accepted before other tasks run.
 const LET_IN: usize = 16;
-/// How often it is looked whether a client that waits is still there.
+/// Interval of the checks whether a waiting client is still connected.
 const LOOK: Duration = Duration::from_secs(1);
-/// How long somebody may be silent whom nobody needs to make room for another.
+/// Time that a client may be silent before it can be removed to make room for another.
 const GRACE: Duration = Duration::from_millis(250);
-/// How long a newcomer waits for room.
+/// Maximum time that a new client waits for room.
 const ROOM_WITHIN: Duration = Duration::from_secs(2);
 
-/// What clients may take.
+/// Limits of the clients.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bounds {
-    /// Clients at once.
+    /// Maximum number of clients at once.
     pub clients: usize,
-    /// Of those, the ones whose answer may take any time.
+    /// Maximum number of clients among them with an answer that may take any time.
     pub waiting: usize,
-    /// How long a request may take to come, from the connection or the answer before.
+    /// Maximum time for a request to arrive after the connection or the previous answer.
     pub request_within: Duration,
-    /// How long an answer may take to be read.
+    /// Maximum time for a client to read an answer.
     pub answer_within: Duration,
 }
 
 impl Bounds {
-    /// Half of the descriptors that this process may have are the broker's own.
+    /// Returns the limits of this process. The broker keeps half of its file descriptors for
+    /// itself.
     pub(super) fn of_this_process() -> Bounds {
         let limit = rustix::process::getrlimit(rustix::process::Resource::Nofile).current;
         let limit = limit.map_or(usize::MAX, |it| usize::try_from(it).unwrap_or(usize::MAX));
@@ -55,16 +57,16 @@ impl Bounds {
     }
 }
 
-/// What is done for a client at the moment.
+/// Current state of a client.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stage {
-    /// It is to say something.
+    /// The broker waits for a request.
     Silent,
-    /// It has asked and is answered at once.
+    /// The client has sent a request that is answered at once.
     Asking,
-    /// It has asked for something that takes as long as it takes.
+    /// The client has sent a request that may take any time.
     Waiting,
-    /// It is to read its answer.
+    /// The broker waits until the client reads its answer.
     Reading,
 }
 
@@ -72,7 +74,7 @@ enum Stage {
 struct Client {
     stage: Stage,
     since: Instant,
-    /// It is to make room.
+    /// Signal that the client must make room.
     go: Arc<Notify>,
 }
 
@@ -81,7 +83,7 @@ struct Client {
 pub(super) struct Clients {
     bounds: Bounds,
     there: Mutex<BTreeMap<u64, Client>>,
-    /// One has gone.
+    /// Signal that a client has disconnected.
     gone: Notify,
     inbox: mpsc::UnboundedSender<Asked>,
 }
@@ -96,17 +98,17 @@ impl Clients {
         })
     }
 
-    /// Whether an answer is being found or read.
+    /// Checks whether an answer is being computed or sent.
     pub(super) fn is_busy(&self) -> bool {
         self.there().values().any(|it| it.stage != Stage::Silent)
     }
 
     fn there(&self) -> std::sync::MutexGuard<'_, BTreeMap<u64, Client>> {
-        // Nothing is half done in there when somebody panics.
+        // A panic cannot leave the map in an inconsistent state.
         self.there.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Serves whoever connects, for ever.
+    /// Serves all clients that connect. Never returns.
     pub(super) async fn accept(self: Arc<Clients>, listener: UnixListener) {
         let mut number = 0_u64;
         loop {
@@ -134,7 +136,8 @@ impl Clients {
         }
     }
 
-    /// Whether one more can be served; if need be whoever has been silent longest has to go.
+    /// Checks whether one more client can be served. If necessary, the client that has been silent
+    /// longest is removed.
     async fn has_room(&self) -> bool {
         let until = Instant::now() + ROOM_WITHIN;
         loop {
@@ -145,7 +148,7 @@ impl Clients {
             if Instant::now() >= until {
                 return false;
             }
-            // Somebody may have been silent for long enough meanwhile.
+            // Another client may have been silent for long enough meanwhile.
             let _ = timeout(GRACE / 8, gone).await;
         }
     }
@@ -181,7 +184,7 @@ impl Clients {
     }
 }
 
-/// One client among all; it is counted until this is dropped, in whatever way.
+/// One connected client. It is counted until this value is dropped.
 struct Connection {
     clients: Arc<Clients>,
     number: u64,
@@ -194,7 +197,7 @@ impl Connection {
         }
     }
 
-    /// Whether there is room for one more whose answer may take any time.
+    /// Checks whether one more client may wait for an answer of any duration.
     fn may_wait(&self) -> bool {
         let there = self.clients.there();
         let waiting = there.values().filter(|it| it.stage == Stage::Waiting);
@@ -221,7 +224,7 @@ async fn serve(connection: Connection, stream: UnixStream, go: Arc<Notify>) {
         let line = match read {
             Ok(Ok(Some(line))) => line,
             Ok(Ok(None)) => return,
-            // Whoever says nothing, or what is no request, gets no other chance.
+            // A client that is silent or sends too long a request is disconnected.
             Ok(Err(reason)) => return refuse(stream.get_ref(), reason),
             Err(_) => {
                 let seconds = bounds.request_within.as_secs();
@@ -255,7 +258,7 @@ fn made_room(bounds: &Bounds) -> String {
     )
 }
 
-/// The next request; `None` when the client has said everything.
+/// Returns the next request, or `None` when the client has closed its send side.
 async fn read_line(stream: &mut BufReader<UnixStream>) -> Result<Option<Vec<u8>>, String> {
     let mut line = Vec::new();
     let limit = MAX_REQUEST as u64 + 1;
@@ -269,7 +272,7 @@ async fn read_line(stream: &mut BufReader<UnixStream>) -> Result<Option<Vec<u8>>
     }
 }
 
-/// The answer to a request; `None` when the client has left before there was one.
+/// Returns the answer to a request, or `None` if the client disconnects before it exists.
 async fn answer(connection: &Connection, line: &[u8], stream: &UnixStream) -> Option<Response> {
     let request = match serde_json::from_slice(line) {
         Ok(request) => request,
@@ -319,7 +322,8 @@ async fn answer(connection: &Connection, line: &[u8], stream: &UnixStream) -> Op
     }
 }
 
-/// Whether nobody is at the other end any more. One that only has nothing more to say still listens.
+/// Checks whether the client has disconnected. A client that has only closed its send side still
+/// listens.
 fn has_left(stream: &UnixStream) -> bool {
     let mut ends = [PollFd::new(stream, PollFlags::empty())];
     let at_once = Timespec::default();
@@ -330,11 +334,11 @@ fn has_left(stream: &UnixStream) -> bool {
             .intersects(PollFlags::HUP | PollFlags::ERR)
 }
 
-/// Says why, if the client is there to read it, and does not wait for that.
+/// Sends the reason to the client if it can be written at once.
 fn refuse(stream: &UnixStream, reason: String) {
     if let Ok(mut text) = serde_json::to_vec(&Response::Failed { reason }) {
         text.push(b'\n');
-        // Whoever does not read has itself to blame.
+        // The error is ignored: a client that does not read misses the reason.
         let _ = stream.try_write(&text);
     }
 }

@@ -1,12 +1,12 @@
-//! Whether a broker would see what its client sees.
+//! Check whether a broker sees the same files as its client.
 
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
 
 use qcbus_bus::Process;
 
-/// Whether another process is this very program, with our rights and with the same files in the same places.
-/// What cannot be seen is not the same.
+/// Checks whether another process is the same program, has the same rights and sees the same files
+/// at its paths. If a property cannot be read, the processes count as different.
 pub(super) fn is_like_us(process: &Process) -> bool {
     let of = |id: &str, what: &str| std::fs::metadata(format!("/proc/{id}/{what}")).ok();
     let file_view = |what: &str, is: fn(&Metadata, &Metadata) -> bool| {
@@ -19,18 +19,19 @@ pub(super) fn is_like_us(process: &Process) -> bool {
         && file_view("exe", same_file)
         && file_view("ns/mnt", same_file)
         && file_view("root", same_file)
-        // Its id was not given to somebody else meanwhile.
+        // The process id must not have been reused meanwhile.
         && process.is_alive()
 }
 
-/// Whether another process has the rights that this one has: with others it reads what we cannot, or cannot what we can.
+/// Checks whether another process has the same rights as this one. With other rights it can read
+/// other files than this process.
 fn may_what_we_may(process: &Process) -> bool {
     let of = |id: &str| std::fs::read_to_string(format!("/proc/{id}/status")).ok();
     let both = of(&process.id().to_string()).zip(of("self"));
     both.is_some_and(|(theirs, ours)| rights(&theirs).eq(rights(&ours)))
 }
 
-/// Of what `/proc` says of a process, what it may.
+/// Returns the lines about rights from the `/proc` status of a process.
 fn rights(status: &str) -> impl Iterator<Item = &str> {
     let counts = ["Uid:", "Gid:", "Groups:", "CapEff:"];
     let lines = status.lines();
@@ -50,7 +51,7 @@ mod tests {
             .spawn()
             .unwrap();
         let process = Process::open(other.id(), None).unwrap();
-        // Until it is another program it is a copy of this one.
+        // Until it executes the other program, the child is still a copy of this program.
         let exe = || std::fs::read_link(format!("/proc/{}/exe", other.id())).unwrap();
         while exe() == std::env::current_exe().unwrap() {
             std::thread::yield_now();

@@ -1,10 +1,10 @@
-//! Brokers of other users: whoever asks as the wrong user is told as which to ask.
+//! Brokers of other users: a command of the wrong user reports the right user.
 
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
-/// A user as people know him.
+/// Returns a readable name of a user.
 pub(super) fn user(uid: u32) -> String {
     let users = std::fs::read_to_string("/etc/passwd").unwrap_or_default();
     match name_of(uid, &users) {
@@ -21,13 +21,13 @@ fn name_of(uid: u32, users: &str) -> Option<&str> {
     })
 }
 
-/// Who owns the directory of an instance, or what of the way to it can be seen.
+/// Returns the owner of an instance's directory, or of its nearest visible parent directory.
 pub(super) fn owner_of(directory: &Path) -> Option<u32> {
     let visible = directory.ancestors().find_map(|it| it.metadata().ok());
     visible.as_ref().map(Metadata::uid)
 }
 
-/// The brokers of other users that serve an instance of this name, each in words.
+/// Returns the brokers of other users that serve an instance of this name, each as a text.
 pub(super) fn brokers(instance: &str) -> Vec<String> {
     let own = rustix::process::geteuid().as_raw();
     let processes = std::fs::read_dir("/proc").into_iter().flatten().flatten();
@@ -47,7 +47,8 @@ pub(super) fn brokers(instance: &str) -> Vec<String> {
     found.collect()
 }
 
-/// The instance that a command line serves; nothing if it is no broker's.
+/// Returns the instance that a command line serves, or `None` if it is not the command line of a
+/// broker.
 fn served<'w>(words: &[&'w str]) -> Option<&'w str> {
     let (program, rest) = words.split_first()?;
     let (command, rest) = rest.split_first()?;

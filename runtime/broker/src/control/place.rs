@@ -1,4 +1,5 @@
-//! Where the control socket is: however long the path to it is, and again when a cleaner has taken it.
+//! Location of the control socket: its path may have any length, and a removed socket is created
+//! again.
 
 use std::fs::Permissions;
 use std::io;
@@ -15,16 +16,17 @@ use tokio::task::AbortHandle;
 
 use super::SOCKET;
 
-/// How often somebody looks whether the socket is still there.
+/// Interval of the checks whether the socket still exists.
 const EVERY: Duration = Duration::from_millis(500);
 
-/// The socket by way of a descriptor of its directory: the kernel takes 107 bytes of a path to a
-/// socket, and the way there may be longer. Good as long as the descriptor is open.
+/// Returns the path of the socket through a descriptor of its directory. The kernel accepts at most
+/// 107 bytes for a socket path, and the real path may be longer. The returned path is valid as long
+/// as the descriptor is open.
 fn short(directory: &Path) -> io::Result<(OwnedFd, PathBuf)> {
     let flags = OFlags::PATH | OFlags::DIRECTORY | OFlags::CLOEXEC;
     let descriptor = open(directory, flags, Mode::empty())?;
     let through = PathBuf::from(format!("/proc/self/fd/{}", descriptor.as_raw_fd()));
-    // Without /proc only a short way is left; an error tells when it is too long.
+    // Without /proc only the direct path remains. If it is too long, an error is returned.
     let way = if through.exists() {
         &through
     } else {
@@ -34,7 +36,7 @@ fn short(directory: &Path) -> io::Result<(OwnedFd, PathBuf)> {
     Ok((descriptor, path))
 }
 
-/// Listens, readable and writable by the owner only.
+/// Listens on the socket. Only the owner can read and write it.
 pub(super) fn listen(directory: &Path) -> io::Result<UnixListener> {
     let (_directory, path) = short(directory)?;
     let listener = UnixListener::bind(&path)?;
@@ -42,13 +44,14 @@ pub(super) fn listen(directory: &Path) -> io::Result<UnixListener> {
     Ok(listener)
 }
 
-/// Connects to whoever listens.
+/// Connects to the broker that listens.
 pub(super) fn connect(directory: &Path) -> io::Result<UnixStream> {
     let (_directory, path) = short(directory)?;
     UnixStream::connect(path)
 }
 
-/// Connects to whoever listens, if he takes a client at this moment: one that is stopped lets clients wait.
+/// Connects to the broker if it accepts a client at this moment. A stopped broker would let the
+/// client wait.
 pub(super) fn connect_at_once(directory: &Path) -> io::Result<UnixStream> {
     let (_directory, path) = short(directory)?;
     let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
@@ -59,8 +62,8 @@ pub(super) fn connect_at_once(directory: &Path) -> io::Result<UnixStream> {
     Ok(stream)
 }
 
-/// Listens again whenever the socket has gone. `serve` starts to take clients from a listener, and
-/// gives back how to stop it.
+/// Listens again whenever the socket was removed. `serve` starts to accept clients of a listener
+/// and returns a handle that stops it.
 pub(super) async fn keep(
     directory: PathBuf,
     first: UnixListener,
@@ -69,14 +72,14 @@ pub(super) async fn keep(
     let mut serving = serve(first);
     loop {
         tokio::time::sleep(EVERY).await;
-        // The directory itself comes back with the rest of the bus' files.
+        // The directory itself is created again with the other files of the bus.
         if directory.join(SOCKET).exists() || !directory.is_dir() {
             continue;
         }
         match listen(&directory) {
             Ok(listener) => {
                 tracing::warn!("the control socket was removed; it was made again");
-                // Nobody finds the one before any more.
+                // No client can find the old socket any more.
                 serving.abort();
                 serving = serve(listener);
             }
@@ -92,10 +95,10 @@ mod tests {
 
     use crate::control::{Asked, ControlSocket, SOCKET, ask_broker};
 
-    /// Longer than anything takes; only a hang gets here.
+    /// Longer than any step takes. Only a hang reaches this limit.
     const WATCHDOG: std::time::Duration = std::time::Duration::from_secs(60);
 
-    /// Asks over the socket, and answers.
+    /// Sends a request over the socket and answers it.
     async fn ask(directory: &std::path::Path, asked: &mut mpsc::UnboundedReceiver<Asked>) {
         let directory = directory.to_owned();
         let client = tokio::task::spawn_blocking(move || ask_broker(&directory, &Request::Reload));

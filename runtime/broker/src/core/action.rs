@@ -1,4 +1,4 @@
-//! Everything that the state machine wants done.
+//! Actions that the state machine requests.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -12,40 +12,40 @@ use super::notice::Notice;
 use super::required_set::Member;
 use super::types::{ChildSpec, Delivery, FinishedJob, Judged, Launch, RequestId, SessionId, Stamp};
 
-/// Everything that the state machine wants done.
+/// An action that the state machine requests.
 #[derive(Debug)]
 pub enum Action {
-    /// Read the file and its dependencies, publish the images.
+    /// Read the file and its dependencies, and publish the images.
     Prepare {
         /// The job.
         job: JobId,
         /// The file.
         path: Arc<Path>,
-        /// How long ago it came or was last asked for: nothing that is read may be older.
+        /// Time since the file arrived or was last requested. No data that is read may be older.
         waited: Duration,
     },
-    /// Let go of a job's documents apart from the root: nobody reads them any more.
+    /// Release the documents of a job except the root, because no bundle reads them any more.
     ReleaseParts {
         /// The job.
         job: JobId,
     },
-    /// Let go of a job's documents.
+    /// Release the documents of a job.
     Release {
         /// The job.
         job: JobId,
     },
-    /// Publish a document once more.
+    /// Publish a document again.
     PublishAgain {
         /// The job that needs it.
         job: JobId,
         /// The document.
         doc: qcbus_messages::DocId,
     },
-    /// Say something to a peer.
+    /// Send a message to a peer.
     Send {
-        /// Its session.
+        /// The session of the peer.
         session: SessionId,
-        /// The words.
+        /// The message.
         message: ToPeer,
     },
     /// Open a session.
@@ -53,11 +53,11 @@ pub enum Action {
         /// The session.
         session: SessionId,
     },
-    /// Turn a peer away.
+    /// Reject a peer.
     Refuse {
         /// The session.
         session: SessionId,
-        /// For a person.
+        /// The reason as a text for the user.
         reason: String,
     },
     /// Close a session.
@@ -67,33 +67,34 @@ pub enum Action {
     },
     /// Start a child.
     Spawn {
-        /// Which start.
+        /// Identifier of this start.
         launch: Launch,
-        /// What to start.
+        /// Specification of the child.
         spec: ChildSpec,
     },
-    /// Kill a child that does not answer.
+    /// Kill a child that does not respond.
     Kill {
-        /// Which start.
+        /// Start of the child.
         launch: Launch,
     },
-    /// Kill what former brokers of this instance started and what has not come to this one.
+    /// Kill stale children: former brokers of this instance started them, and they have not joined
+    /// this one.
     KillStaleChildren {
-        /// The starts of those that have joined.
+        /// Starts of the children that have joined.
         joined: BTreeSet<Launch>,
     },
-    /// Pool, write, record.
+    /// Pool the findings, write the result and record it.
     Store(Box<FinishedJob>),
-    /// Pool what was found for an errand.
+    /// Pool the findings of an on-demand check.
     Pool(Box<FinishedJob>),
-    /// Remove the result of a file that has gone.
+    /// Remove the result of a file that was removed.
     Withdraw {
         /// The file.
         path: Arc<Path>,
-        /// Who has reported about it and is to take that back.
+        /// Reporters that have reported the file and must withdraw their report.
         reporters: Vec<String>,
     },
-    /// Tell a reporter that a file has gone.
+    /// Tell a reporter that a file was removed.
     Void {
         /// The reporter's session.
         session: SessionId,
@@ -102,32 +103,32 @@ pub enum Action {
         /// The file.
         path: Arc<Path>,
     },
-    /// Remember that a reporter has taken back what it said of a file that has gone.
+    /// Record that a reporter has withdrawn its report of a file that was removed.
     Voided {
         /// The reporter.
         reporter: String,
         /// The file.
         path: Arc<Path>,
     },
-    /// Remember that a file was looked at and found unchanged.
+    /// Record that a file was checked and found unchanged.
     Restamp {
         /// The file.
         path: Arc<Path>,
-        /// Its verdict with fresh stamps.
+        /// Its verdict with new stamps.
         judged: Arc<Judged>,
     },
     /// Send a result to a reporter.
     Deliver {
-        /// Its session.
+        /// The session of the reporter.
         session: SessionId,
-        /// Its name.
+        /// The name of the reporter.
         reporter: String,
         /// The result.
         delivery: Delivery,
     },
-    /// Remember that a reporter has a result.
+    /// Record that a reporter has received a result.
     Delivered {
-        /// Its name.
+        /// The name of the reporter.
         reporter: String,
         /// The file.
         path: Arc<Path>,
@@ -136,65 +137,66 @@ pub enum Action {
     },
     /// Answer a client.
     Answer {
-        /// The client.
+        /// Request id of the client.
         request_id: RequestId,
         /// The answer.
         response: Response,
     },
-    /// Remember that a bundle must judge, before any verdict that it takes part in.
+    /// Record that a bundle is required. This happens before any verdict of this bundle.
     Enrol(Member),
-    /// Remember that a bundle need not judge any more.
+    /// Record that a bundle is no longer required.
     Strike {
-        /// Its name.
+        /// The name of the bundle.
         name: String,
     },
-    /// Watch these paths for changes though nobody asked for a check of them.
+    /// Watch these paths for changes even if no check of them was requested.
     Depend {
         /// The paths, each with the stamp under which it was read.
         files: Vec<(Arc<Path>, Option<Stamp>)>,
     },
-    /// No verdict depends on these any more.
+    /// Stop watching these paths, because no verdict depends on them any more.
     Undepend {
         /// The paths.
         paths: Vec<Arc<Path>>,
     },
-    /// Something that an acceptance rests on is not what it was: the file goes from behind the
-    /// gate, at once, with everything that rests on it.
+    /// Withdraw the file from the gate at once, with every file that rests on it. A file that its
+    /// acceptance rests on has changed.
     CloseGate {
         /// The file.
         path: Arc<Path>,
     },
-    /// The acceptance stands after all.
+    /// Publish the file again, because its acceptance is still valid.
     OpenGate {
         /// The file.
         path: Arc<Path>,
         /// Its verdict.
         judged: Arc<Judged>,
     },
-    /// A verdict stands: tell whoever listens.
+    /// Tell all listeners that a verdict is valid.
     Judged {
         /// The file.
         path: Arc<Path>,
         /// Its verdict.
         judged: Arc<Judged>,
-        /// `false` when the verdict stood already.
+        /// `false` if the verdict was already valid before.
         fresh: bool,
     },
-    /// What a shadow has found, in one file or in all, is to be forgotten.
+    /// Delete the findings of a shadow, in one file or in all files.
     ForgetTrials {
         /// The shadow.
         shadow: String,
         /// The file; `None` for all.
         file: Option<Arc<Path>>,
     },
-    /// Something that a person should read.
+    /// Show a message to the user.
     Notice(Notice),
-    /// Everything is drained: leave the loop.
+    /// Leave the loop, because everything is drained.
     Stop,
 }
 
 impl Action {
-    /// Kill a process that has not joined: there is nothing that it could finish.
+    /// Returns the action that kills a process that has not joined. Such a process has no work to
+    /// finish.
     pub(super) fn kill_unjoined(launch: Launch) -> Action {
         Action::Kill { launch }
     }

@@ -1,4 +1,4 @@
-//! Bundles: who is there, what they say, and what happens when one dies.
+//! Bundles: their sessions, their messages and the handling of a dead bundle.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use super::required_set::{Member, Origin, VersionDigest};
 use super::types::{Launch, SessionId};
 use super::{Actions, State};
 
-/// A bundle by name: it outlives its processes.
+/// A bundle, identified by its name. It outlives its processes.
 #[derive(Debug, Default)]
 pub(super) struct Bundle {
     pub version: String,
@@ -25,75 +25,76 @@ pub(super) struct Bundle {
     pub pid: u32,
     pub launch: Option<Launch>,
     pub catalogue: Option<Arc<Catalogue>>,
-    /// What it says that it is, while it is not believed.
+    /// Its registration while that is distrusted.
     pub registered: Option<Registration>,
-    /// What was started when it was believed last.
+    /// Digest of the started program at the last accepted registration.
     pub accepted_spec: Option<u64>,
-    /// Documents that it lacked, and when it said so last.
+    /// Documents that it was missing, each with the time of its last report.
     pub lacks: BTreeMap<DocId, Duration>,
-    /// What brought it onto the roster; `None`: it is not on it, and nobody misses it.
+    /// Reason why it is in the registry. `None`: it is not in the registry and is not required.
     pub origin: Option<Origin>,
-    /// Of the version and the catalogue that it is on the roster with.
+    /// Version digest of the version and catalogue in the registry.
     pub version_digest: Option<VersionDigest>,
     pub ready: bool,
     pub capacity: usize,
-    /// As it says; only told.
+    /// Number of threads as reported by the bundle. Shown in the status only.
     pub threads: u16,
-    /// The process has not been given any job yet.
+    /// The process has not received any job yet.
     pub fresh_process: bool,
     /// The process has finished a job, so it is not broken from the start.
     pub proved: bool,
     pub active: BTreeMap<JobId, Given>,
     pub queue: Queue,
     pub quarantine: VecDeque<JobId>,
-    /// The highest job that this session was given.
+    /// The highest job that this session has received.
     pub highest: Option<JobId>,
-    /// Jobs given in this session.
+    /// Number of jobs sent in this session.
     pub given: u64,
-    /// Last word of any kind.
+    /// Time of the last message of any kind.
     pub heard: Duration,
-    /// Last time that it was given or ended a job.
+    /// Time when it last received or finished a job.
     pub moved: Duration,
     pub joined: Duration,
-    /// Since when nobody of this name is there.
+    /// Time since which no process with this name has been connected.
     pub away_since: Option<Duration>,
-    /// It leaves by drain and takes no part in new jobs.
+    /// It is draining and takes no part in new jobs.
     pub draining: bool,
     pub done: u64,
     pub offences: u32,
     pub note: String,
 }
 
-/// A job in the hands of a bundle.
+/// A job that was sent to a bundle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Given {
-    /// The how manieth of its session.
+    /// Sequence number of the job in its session.
     pub number: u64,
-    /// Since when a job that was given later has ended.
+    /// Time when a job that was sent later finished first.
     pub overtaken: Option<Duration>,
 }
 
-/// What words on a job are worth.
+/// Validity of a message about a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Word {
     /// The bundle has the job.
     Due,
-    /// It had it, or may have: the words were under way when it was taken away.
+    /// The bundle had the job or may have had it. The message was already sent when the job was
+    /// cancelled.
     Late,
-    /// It was never given such a job.
+    /// The bundle never received such a job.
     Lie,
 }
 
-/// Bytes of a peer's version.
+/// Maximum length of a peer's version in bytes.
 const MOST_OF_A_VERSION: usize = 128;
-/// Bundles on the roster, and reporters that results were given to.
+/// Maximum number of bundles in the registry, and of reporters that have received results.
 const MOST_NAMES: usize = 256;
 
-/// Lies about jobs and checkers beyond which a bundle is not believed any more.
+/// Number of false messages about jobs and checkers beyond which a bundle is stopped.
 const LIES_FORGIVEN: u32 = 64;
 
 impl Bundle {
-    /// As the journal remembers it, once it is known what it checks.
+    /// Returns the registry entry for the journal, or `None` as long as the catalogue is unknown.
     pub fn as_member(&self, name: &str) -> Option<Member> {
         Some(Member {
             name: name.to_owned(),
@@ -103,12 +104,12 @@ impl Bundle {
         })
     }
 
-    /// A job waits for this bundle.
+    /// Queues a job for this bundle.
     pub fn expect(&mut self, id: JobId, is_on_demand: bool) {
         self.queue.push(id, is_on_demand);
     }
 
-    /// Notes that the bundle has got a job.
+    /// Notes that the bundle has received a job.
     pub fn give(&mut self, id: JobId, now: Duration) {
         self.given += 1;
         let (number, overtaken) = (self.given, None);
@@ -118,7 +119,7 @@ impl Bundle {
         self.moved = now;
     }
 
-    /// Notes that it has ended one: those that it was given before are overtaken.
+    /// Notes that the bundle has finished a job. Jobs that it received earlier are overtaken.
     pub fn take(&mut self, id: JobId, now: Duration) {
         let Some(ended) = self.active.remove(&id) else {
             return;
@@ -147,7 +148,7 @@ impl Bundle {
 }
 
 impl State {
-    /// A process says hello.
+    /// Handles the hello of a process.
     pub(super) fn hello(&mut self, session: SessionId, hello: &Hello, actions: &mut Actions) {
         if self.draining() {
             let reason = IS_STOPPING.to_owned();
@@ -202,8 +203,9 @@ impl State {
         }
     }
 
-    /// A name is taken while another live process bears it, unless the newcomer replaces it. Children
-    /// have theirs whether they run or not: nobody else may judge in their place.
+    /// Returns the reason why a name is taken, or `None`. A name is taken while another live
+    /// process uses it, unless the new process replaces that one. The names of children are always
+    /// reserved, so no other process may judge in their place.
     fn taken(&self, hello: &Hello) -> Option<String> {
         if hello.launch.is_none() && self.children.contains_key(&hello.name) {
             return Some(format!(
@@ -228,7 +230,7 @@ impl State {
         let replaces = hello
             .launch
             .is_some_and(|launch| self.is_successor(&hello.name, Launch(launch)));
-        // A process that cannot be seen from here has no number.
+        // The process id is 0 if the process cannot be seen from here.
         let same = incarnation == hello.incarnation || (pid == hello.pid && pid != 0);
         (!same && !replaces)
             .then(|| format!("`{}` has already joined, as process {pid}", hello.name))
@@ -271,7 +273,7 @@ impl State {
         self.drain_unwanted(&hello.name, launch, actions);
     }
 
-    /// A newer process of the same name takes over: what the old one had goes to the new one.
+    /// Lets a newer process of the same name take over. It gets the tasks of the old process.
     fn replace_session(&mut self, name: &str, same_process: bool, actions: &mut Actions) {
         let Some(bundle) = self.bundles.get_mut(name) else {
             return;
@@ -293,7 +295,8 @@ impl State {
         }
     }
 
-    /// Something from a bundle. `false`: it was only put aside.
+    /// Handles a message of a bundle. Returns `false` if the message was only added to the pending
+    /// findings.
     pub(super) fn bundle_says(
         &mut self,
         name: &str,
@@ -332,7 +335,7 @@ impl State {
                 issues,
             } => self.issues(name, job, checker, issues),
             FromPeer::CheckersDone { job, ended } => {
-                // All are heard, whatever one of them is worth.
+                // All entries are processed, even if one of them is false.
                 let ended = ended.into_iter();
                 let lies = ended.filter_map(|end| {
                     let is_true = self.checker_done(name, job, end);
@@ -365,7 +368,7 @@ impl State {
         }
     }
 
-    /// A bundle says that it goes.
+    /// Handles the message of a bundle that it leaves.
     fn bundle_left(&mut self, name: &str, actions: &mut Actions) {
         let Some(bundle) = self.bundles.get_mut(name) else {
             return;
@@ -379,26 +382,27 @@ impl State {
         let stays = bundle.origin == Some(Origin::Supervised) && !bundle.draining;
         self.take_back(name, false);
         self.child_left(name);
-        // At the broker's own end nobody leaves the roster, nor does a child whose manifest is there.
+        // During the shutdown of the broker no bundle leaves the registry. The same holds for a
+        // child as long as its manifest exists.
         if !stays && !self.draining() {
             self.drop_bundle(name, actions);
         }
     }
 
-    /// Forgets a bundle; jobs that still wait for it go on without it.
+    /// Removes a bundle from the registry. Jobs that still wait for it continue without it.
     pub(super) fn drop_bundle(&mut self, name: &str, actions: &mut Actions) {
         self.strike(name, actions);
         self.reseat = true;
     }
 
-    /// The process of a session is dead.
+    /// Handles the death of the process of a session.
     pub(super) fn bundle_died(&mut self, name: &str, why: &str, actions: &mut Actions) {
         let notice = Notice::ended(name, why);
         self.bundle_is_down(name, notice, actions);
     }
 
-    /// A bundle misbehaves: its session ends, its process is killed when it is one of ours, and
-    /// the rest is as if it had died.
+    /// Handles a misbehaving bundle. Its session ends, and its process is killed if the broker
+    /// started it. All other steps are the same as after its death.
     pub(super) fn bundle_fails(&mut self, name: &str, why: &str, actions: &mut Actions) {
         let Some(bundle) = self.bundles.get(name) else {
             return;
@@ -432,7 +436,7 @@ impl State {
         }
     }
 
-    /// Looks for bundles that hang, are silent, forget a job, or never get ready.
+    /// Looks for bundles that hang, are silent, forget a job or never get ready.
     pub(super) fn watch_bundles(&mut self, actions: &mut Actions) {
         let there = self.bundles.iter().filter(|(_, it)| it.session.is_some());
         let failing = there.filter_map(|(name, it)| Some((name.clone(), self.is_failing(it)?)));
@@ -441,7 +445,7 @@ impl State {
         }
     }
 
-    /// What is wrong with a bundle that is there, if anything is.
+    /// Returns the fault of a joined bundle, or `None`.
     fn is_failing(&self, bundle: &Bundle) -> Option<String> {
         let since = |then: Duration| self.now.saturating_sub(then);
         let (deadline, silence) = (self.settings.job_deadline, self.settings.silence_limit);
@@ -475,7 +479,7 @@ impl State {
     }
 }
 
-/// The job that words are about, of those that a bundle says.
+/// Returns the job that a message of a bundle refers to.
 fn about(message: &FromPeer) -> Option<JobId> {
     match message {
         FromPeer::Issues { job, .. }

@@ -1,4 +1,5 @@
-//! What happens to files: they come, change and go, and so does what verdicts depend on.
+//! File events: handles new, changed and removed files, and changes of the files that verdicts
+//! depend on.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -16,13 +17,13 @@ use super::notice::Notice;
 use super::types::{Judged, LostOutput, Stamp};
 use super::{Actions, State};
 
-/// How a verdict depends on a file.
+/// Kind of a verdict's dependence on a file.
 enum Dependence {
-    /// The file was read, or looked for.
+    /// The file was read or looked up.
     Read {
-        /// What it was then; `None` if it was not there.
+        /// Stamp at that time. `None` if the file did not exist.
         stamp: Option<Stamp>,
-        /// The stamp proves nothing.
+        /// The stamp is too young to prove that the file is unchanged.
         racy: bool,
     },
     /// The file has the verdict, and a link to it was read.
@@ -30,15 +31,15 @@ enum Dependence {
 }
 
 impl State {
-    /// A file is there and may still be written to.
+    /// Handles a file that exists and may still be written to.
     pub(super) fn present(&mut self, path: &Arc<Path>) {
         if let Some(id) = self.files.id(path) {
             self.is_there(id);
         }
     }
 
-    /// A file is there. When it has a verdict from before a restart, a shadow that was ready sooner than the watcher
-    /// does not know of it yet.
+    /// Marks a file as present. It may have a verdict from before a restart. Then a shadow that was
+    /// ready before the watcher does not know the file yet.
     fn is_there(&mut self, id: FileId) {
         let Some(entry) = self.files.get_mut(id) else {
             return;
@@ -49,8 +50,8 @@ impl State {
         }
     }
 
-    /// A file is being written to. It is judged when it has settled, and what was accepted of it, or rests on it, goes
-    /// from behind the gate until then.
+    /// Handles a file that is being written to. It is judged when it has settled. Until then its
+    /// acceptance, and every acceptance that rests on it, is withdrawn from the gate.
     pub(super) fn unfinished(
         &mut self,
         path: &Arc<Path>,
@@ -77,8 +78,9 @@ impl State {
         }
     }
 
-    /// Something that a verdict depends on is being written to: nobody is told the verdict before that has settled.
-    /// A job that is under way finds out by itself, when it is stored.
+    /// Marks a verdict as stale while a file that it depends on is being written to. The verdict is
+    /// not reported before that file has settled. An active job notices the change by itself when
+    /// it is stored.
     fn stale_until_settled(&mut self, id: FileId) {
         if let Some(entry) = self.files.get_mut(id)
             && !matches!(entry.stage(), Stage::Active(_))
@@ -87,17 +89,17 @@ impl State {
         }
     }
 
-    /// Whether it was told of a file that it is there, quiet, and what it is now.
+    /// Checks whether an event has reported the file as present and settled with this stamp.
     pub fn is_settled(&self, path: &Path, stamp: Stamp) -> bool {
         let entry = self.files.id(path).and_then(|id| self.files.get(id));
         entry.is_some_and(|it| it.present && it.stamp == stamp)
     }
 
-    /// A file is there and quiet: whose verdict depends on it?
+    /// Handles a settled file: rechecks the verdicts that depend on it.
     pub(super) fn touched(&mut self, path: &Arc<Path>, stamp: Stamp, actions: &mut Actions) {
         for dependent in self.files.dependents(path) {
             match self.reading_of(dependent, path) {
-                // It rests on the file and has read it by a link, which is watched, too.
+                // The dependent file read this file by a link. The link itself is watched too.
                 Some(Dependence::ByLink) => {}
                 Some(Dependence::Read { stamp: read, racy }) if read == Some(stamp) => {
                     let entry = self.files.get(dependent);
@@ -110,7 +112,8 @@ impl State {
         }
     }
 
-    /// How a file was read for the verdict on another one: for the one that is on its way, else for the last.
+    /// Returns how a file was read for the verdict on another file. An active job takes precedence
+    /// over the last verdict.
     fn reading_of(&self, dependent: FileId, path: &Path) -> Option<Dependence> {
         let entry = self.files.get(dependent)?;
         let job = match entry.stage() {
@@ -137,7 +140,7 @@ impl State {
         by_link.then_some(Dependence::ByLink)
     }
 
-    /// An event tells that a file is there and quiet.
+    /// Handles an event that a file exists and has settled.
     pub(super) fn written(&mut self, path: &Arc<Path>, stamp: Stamp, actions: &mut Actions) {
         let id = self.files.id(path);
         let entry = id.and_then(|id| self.files.get_mut(id));
@@ -151,7 +154,7 @@ impl State {
         self.settled(path, stamp, actions);
     }
 
-    /// A file is there and quiet.
+    /// Handles a file that exists and has settled.
     pub(super) fn settled(&mut self, path: &Arc<Path>, stamp: Stamp, actions: &mut Actions) {
         self.touched(path, stamp, actions);
         let Some(kind) = FileKind::of_path(path) else {
@@ -184,15 +187,15 @@ impl State {
         self.seen(id, actions);
     }
 
-    /// Something that the verdict on a file depends on is not what it was. The file's own stamp
-    /// does not tell, so the verdict is doubted: it stands only after everything was read again.
+    /// Marks a verdict as stale because a file that it depends on has changed. The file's own stamp
+    /// does not show this. The verdict is valid again only after everything was read again.
     fn make_stale(&mut self, id: FileId, actions: &mut Actions) {
         self.unpublish(id, actions);
         self.look_again(id);
         self.wait_no_longer(id, actions);
     }
 
-    /// Everything that a verdict depends on is to be read again, whatever the file's stamp says.
+    /// Requests that everything a verdict depends on is read again, regardless of the file's stamp.
     fn look_again(&mut self, id: FileId) {
         if let Some(entry) = self.files.get_mut(id) {
             entry.stale = true;
@@ -200,7 +203,7 @@ impl State {
         self.changed(id);
     }
 
-    /// A job that waits for other verdicts begins anew when something that it has read is another by now.
+    /// Restarts a job that waits for other verdicts, because a file that it has read has changed.
     fn wait_no_longer(&mut self, id: FileId, actions: &mut Actions) {
         if let Some(Stage::Active(job)) = self.files.get(id).map(FileEntry::stage) {
             let job = *job;
@@ -210,7 +213,7 @@ impl State {
         }
     }
 
-    /// What was accepted goes from behind the gate at once, before there is a new verdict.
+    /// Withdraws an accepted file from the gate at once, before a new verdict exists.
     fn unpublish(&mut self, id: FileId, actions: &mut Actions) {
         let accepted = |judged: &Judged| judged.verdict == Verdict::Accepted;
         if let Some(entry) = self.files.get_mut(id)
@@ -222,7 +225,7 @@ impl State {
         }
     }
 
-    /// The file, or something it depends on, is not what it was.
+    /// Notes that the file, or a file that it depends on, has changed.
     fn changed(&mut self, id: FileId) {
         let Some(entry) = self.files.get_mut(id) else {
             return;
@@ -243,21 +246,22 @@ impl State {
         }
         match self.files.id(path) {
             Some(id) => self.vanished_file(id, actions),
-            // It has gone before it was finished.
+            // The file was removed before it had settled.
             None => self.answer_gone(path, actions),
         }
     }
 
-    /// A file has gone: its result is withdrawn once no job of it is left.
+    /// Handles a removed file. Its result is withdrawn once it has no job left.
     pub(super) fn vanished_file(&mut self, id: FileId, actions: &mut Actions) {
         let Some(entry) = self.files.get_mut(id) else {
             return;
         };
         entry.present = false;
         if let Stage::Active(job) = *entry.stage() {
-            // The result stays until the job is over, what lies behind the gate does not.
+            // The result stays until the job is over, but the gate is cleared at once.
             self.unpublish(id, actions);
-            // Nothing is stored for a file that is not there; a job at the writers' will notice.
+            // No result is stored for a removed file. A job that is already with the writers
+            // notices the removal itself.
             if self
                 .jobs
                 .get(&job)
@@ -280,14 +284,14 @@ impl State {
         self.answer_gone(&path, actions);
     }
 
-    /// Somebody has removed or changed results, or copies behind the gate: the files that they are about are judged
-    /// again, which writes them again.
+    /// Handles results or copies behind the gate that another process has removed or changed. The
+    /// files that they belong to are judged again, which writes them again.
     pub(super) fn outputs_lost(&mut self, lost: &[LostOutput], actions: &mut Actions) {
         let mut files = BTreeSet::new();
         for it in lost {
             match self.files.id(&it.file) {
                 Some(id) => drop(files.insert(id)),
-                // A part of other files, which lies behind the gate for them.
+                // The file is a part of other files and lies behind the gate for them.
                 None => files.extend(self.files.dependents(&it.file)),
             }
         }
@@ -310,7 +314,7 @@ impl State {
         match *entry.stage() {
             Stage::Active(job) => {
                 let job = self.jobs.get(&job);
-                // Before that its result is still to be written.
+                // In an earlier stage the job has yet to write its result.
                 let is_late = job.is_some_and(|job| job.stage == JobStage::Storing);
                 (entry.anew, entry.stale) = (true, entry.stale || is_late);
             }
@@ -318,7 +322,7 @@ impl State {
         }
     }
 
-    /// It is in the journal that a file has gone.
+    /// Notes that the journal has recorded the removal of a file.
     pub(super) fn withdrawn(&mut self, path: &Path, actions: &mut Actions) {
         if let Some(times) = self.withdrawing.get_mut(path) {
             *times -= 1;
@@ -329,7 +333,8 @@ impl State {
         }
     }
 
-    /// The first scan is complete: what the journal knew and the scan did not see has gone.
+    /// Handles the end of the first scan. Files that the journal knows and the scan did not find
+    /// were removed.
     pub(super) fn scanned(&mut self, actions: &mut Actions) {
         self.scanned = true;
         let gone: Vec<FileId> = self
@@ -346,7 +351,7 @@ impl State {
     }
 }
 
-/// What a person is told of outputs that are lost.
+/// Returns the message for the user about lost outputs.
 fn told_of(lost: &[LostOutput]) -> Option<String> {
     let (first, others) = lost.split_first()?;
     let (output, others) = (to_text(&first.output), others.len());

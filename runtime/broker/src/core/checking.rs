@@ -1,4 +1,4 @@
-//! Checking: shares of jobs are given out to bundles, and come to their end.
+//! Checking: sends the tasks of jobs to bundles and handles their end.
 
 use std::time::Duration;
 
@@ -8,11 +8,11 @@ use super::action::Action;
 use super::jobs::{ActiveJob, JobStage, TaskState};
 use super::{Actions, State};
 
-/// How soon a bundle may lack the same document again: each time, it is published.
+/// Minimum time between two publications of the same document for a bundle that is missing it.
 const LACK_PAUSE: Duration = Duration::from_millis(250);
 
 impl State {
-    /// Calls the jury of a job that is read and gives it out.
+    /// Fixes the required bundles of a job that has been read, and sends it to them.
     pub(super) fn give_out(&mut self, id: JobId, actions: &mut Actions) {
         if let Some(job) = self.jobs.get_mut(&id) {
             job.stage = JobStage::Checking;
@@ -22,7 +22,8 @@ impl State {
         self.fail_missing();
     }
 
-    /// Gives a bundle its next jobs: suspects one at a time and alone, others up to its capacity.
+    /// Sends a bundle its next jobs: quarantined jobs one at a time and alone, other jobs up to its
+    /// capacity.
     pub(super) fn dispatch(&mut self, name: &str, actions: &mut Actions) {
         loop {
             let findings = self.room_for_findings();
@@ -68,7 +69,7 @@ impl State {
         }
     }
 
-    /// Gives every bundle that has room its next jobs: room also comes from jobs that are cancelled.
+    /// Sends the next jobs to every bundle that has room. Cancelled jobs also make room.
     pub(super) fn dispatch_all(&mut self, actions: &mut Actions) {
         let waiting = self
             .bundles
@@ -80,7 +81,7 @@ impl State {
         }
     }
 
-    /// A bundle lacks a document of a job that it has.
+    /// Handles the report of a bundle that it is missing a document of one of its jobs.
     pub(super) fn need_document(&mut self, name: &str, doc: DocId, actions: &mut Actions) {
         let now = self.now;
         let Some(bundle) = self.bundles.get_mut(name) else {
@@ -100,7 +101,7 @@ impl State {
         }
     }
 
-    /// A bundle is through with a job.
+    /// Handles the end of a bundle's task.
     pub(super) fn job_done(
         &mut self,
         name: &str,
@@ -128,7 +129,7 @@ impl State {
         true
     }
 
-    /// Takes one bundle's share of a job away.
+    /// Cancels the task of one bundle in a job.
     pub(super) fn cancel_task(&mut self, id: JobId, name: &str, actions: &mut Actions) {
         let job = self.jobs.get_mut(&id);
         let Some(task) = job.and_then(|job| job.tasks.remove(name)) else {

@@ -1,4 +1,4 @@
-//! Children: the bundles and reporters that the broker itself keeps running.
+//! Children: the bundles and reporters that the broker itself starts and keeps running.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -12,45 +12,47 @@ use super::types::{ChildEnd, ChildSpec, Launch, Restart, SessionId};
 use super::upgrades::Upgrade;
 use super::{Actions, State};
 
-/// A child by name.
+/// A child, identified by its name.
 #[derive(Debug)]
 pub(super) struct Child {
     pub spec: ChildSpec,
     pub state: ChildState,
     /// Starts within the restart window.
     starts: VecDeque<Duration>,
-    /// Failures in a row.
+    /// Number of consecutive failures.
     pub failures: u32,
-    /// Why it does not get as far as to join; nobody waits for it meanwhile.
+    /// Reason why it does not get as far as joining. The broker does not wait for it meanwhile.
     stuck: Option<String>,
-    /// Why the process that is wanted was last not ready, since it was last ready or became wanted.
+    /// Last reason why the wanted process was not ready. It is cleared when the process is ready or
+    /// when another process becomes the wanted one.
     pub failure: Option<String>,
     pub restarts: u32,
     /// A newer process that will take over once it has joined.
     pub upgrade: Option<Upgrade>,
 }
 
-/// Where a child stands.
+/// State of a child.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ChildState {
-    /// To be started then.
+    /// It is started at this time.
     Due(Duration),
-    /// Started, has not said hello.
+    /// It was started at this time and has not sent hello yet.
     Starting(Launch, Duration),
-    /// It has joined. One that a former broker started has a launch that this one does not know.
+    /// It has joined. If a former broker started it, this broker does not know its launch.
     Joined,
-    /// It failed too often; to be started once more then.
+    /// It failed too often and is started once more at this time.
     GaveUp(Duration),
-    /// It ended and is not to be started again.
+    /// It ended and is not started again.
     Ended,
 }
 
-/// How long a child may take until it says hello.
+/// Maximum time from the start of a child until its hello.
 const START_LIMIT: Duration = Duration::from_secs(15);
-/// The same of one that runs programs first, which may have to come from a slow disk.
+/// The same limit for a child that first runs other programs, which may come from a slow disk.
 const SLOW_START_LIMIT: Duration = Duration::from_secs(120);
 
-/// Failures in a row, without ever having joined, after which nobody waits for a child.
+/// Number of consecutive failures without joining after which the broker no longer waits for a
+/// child.
 const STUCK_AFTER: u32 = 3;
 
 impl Child {
@@ -67,9 +69,10 @@ impl Child {
         }
     }
 
-    /// Takes a new manifest. A process that runs goes on until a newer one has joined, and for good when it is what
-    /// the manifest wants (somebody has taken back what he had changed); one that was started and has not
-    /// joined is of the manifest before, and is returned: nobody wants it.
+    /// Takes a new manifest. A running process continues until a newer one has joined. It stays for
+    /// good if it matches the manifest, because the user has reverted a change. A process that was
+    /// started and has not joined belongs to the previous manifest. Its launch is returned, because
+    /// it is not wanted any more.
     fn respecify(
         &mut self,
         spec: ChildSpec,
@@ -90,7 +93,7 @@ impl Child {
         unwanted
     }
 
-    /// How long it may take until it says hello.
+    /// Returns the maximum time until its hello.
     pub fn start_limit(&self) -> Duration {
         match self.spec.slow_start {
             true => SLOW_START_LIMIT,
@@ -98,7 +101,7 @@ impl Child {
         }
     }
 
-    /// The process that was started and has not joined, and since when.
+    /// Returns the process that was started and has not joined, with its start time.
     fn starting(&self) -> Option<(Launch, Duration)> {
         match (self.state, self.upgrade) {
             (ChildState::Starting(launch, since), _)
@@ -107,7 +110,7 @@ impl Child {
         }
     }
 
-    /// The process that is to take over from one that has joined and is not the one wanted.
+    /// Returns the process that must take over from a joined process that is not the wanted one.
     fn successor(&self, now: Duration) -> Upgrade {
         match (self.starting(), self.state) {
             (Some((launch, since)), _) => Upgrade::Starting(launch, since),
@@ -116,7 +119,8 @@ impl Child {
         }
     }
 
-    /// The pause before the next start; children that fell together should not get up together.
+    /// Returns the pause before the next start. It varies so that children that failed together do
+    /// not restart together.
     pub fn pause(&self, backoff: Duration, most: Duration) -> Duration {
         let doubled = backoff * 2_u32.saturating_pow(self.failures.saturating_sub(1).min(16));
         let pause = doubled.min(most);
@@ -125,8 +129,8 @@ impl Child {
 }
 
 impl State {
-    /// The children that should run: starts what is new, replaces what has changed, drains what
-    /// is no longer wanted.
+    /// Sets the children that must run. Starts new ones, replaces changed ones and drains the
+    /// others.
     pub(super) fn set_children(&mut self, specs: Vec<ChildSpec>, actions: &mut Actions) {
         let unwanted = |name: &&String| specs.iter().all(|it| it.name != **name);
         let gone: Vec<String> = self.children.keys().filter(unwanted).cloned().collect();
@@ -134,7 +138,8 @@ impl State {
             self.dismiss(&name, actions);
         }
         for spec in specs.iter().filter(|it| it.role == Role::Reporter) {
-            // Known from now on, so that it hears of files that go before it has joined.
+            // The reporter is registered now, so that it also learns of files that are removed
+            // before it joins.
             self.reporter_index(&spec.name);
         }
         let due = self.now.max(self.settings.collect);
@@ -156,7 +161,7 @@ impl State {
         self.watch_children(actions);
     }
 
-    /// What the process of this name that has joined was started as.
+    /// Returns the launch of the joined process with this name.
     fn runs_as(&self, name: &str) -> Option<Launch> {
         let bundle = self.bundles.get(name).filter(|it| it.session.is_some());
         let reporter = self.reporter_named(name).filter(|it| it.session.is_some());
@@ -165,7 +170,7 @@ impl State {
             .or_else(|| reporter.and_then(|it| it.launch))
     }
 
-    /// A child is no longer wanted: what runs of it is told to go.
+    /// Removes a child that is not wanted any more and drains its process.
     fn dismiss(&mut self, name: &str, actions: &mut Actions) {
         let Some(child) = self.children.remove(name) else {
             return;
@@ -175,9 +180,9 @@ impl State {
         self.drain_peer(name, actions);
     }
 
-    /// A process of a child has said hello. It need not be the one that is wanted: a former broker
-    /// may have started it by an older manifest, and of one that was killed the last words may come
-    /// now. Then it goes on until the one that is wanted has joined.
+    /// Handles the hello of a child's process. It may be another process than the wanted one. A
+    /// former broker may have started it from an older manifest. The hello of a killed process may
+    /// also arrive late. Such a process continues until the wanted one has joined.
     pub(super) fn child_joined(
         &mut self,
         name: &str,
@@ -205,7 +210,7 @@ impl State {
         child.stuck = None;
     }
 
-    /// A child has left as it was told, or of its own will.
+    /// Handles a child that has left, either on request or by itself.
     pub(super) fn child_left(&mut self, name: &str) {
         let draining = self.draining();
         let Some(child) = self.children.get_mut(name) else {
@@ -221,7 +226,7 @@ impl State {
         };
     }
 
-    /// A child is down: when is it started again?
+    /// Handles a child that is down, and decides when it is started again.
     pub(super) fn child_down(
         &mut self,
         name: &str,
@@ -234,11 +239,11 @@ impl State {
         let Some(child) = self.children.get_mut(name) else {
             return;
         };
-        // The next start is of the newest manifest anyway.
+        // The next start uses the newest manifest anyway.
         match child.upgrade.take() {
             Some(Upgrade::Starting(launch, _)) => actions.push(Action::kill_unjoined(launch)),
             Some(Upgrade::Due(_)) => {}
-            // It was the one that is wanted.
+            // The process was the wanted one.
             None => child.failure = Some(why.to_owned()),
         }
         if child.spec.restart == Restart::Never || draining {
@@ -266,7 +271,7 @@ impl State {
         self.fail_missing();
     }
 
-    /// A child process has ended or could not be started.
+    /// Handles a child process that has ended or could not be started.
     pub(super) fn exited(&mut self, launch: Launch, end: &ChildEnd, actions: &mut Actions) {
         let gone = |it: &(&SessionId, &Retired)| it.1.launch == Some(launch);
         let gone: Vec<SessionId> = self
@@ -307,8 +312,8 @@ impl State {
         }
     }
 
-    /// A child did not get as far as to join. Nobody waits for one that cannot be started, has
-    /// nothing to do here, or has failed again and again.
+    /// Handles a child that ended before it joined. The broker does not wait for a child that
+    /// cannot be started, has no work here, or has failed repeatedly.
     fn ended_before_joining(&mut self, name: &str, end: &ChildEnd, actions: &mut Actions) {
         let there = self
             .bundles
@@ -320,7 +325,7 @@ impl State {
         };
         let gives_up = match end {
             ChildEnd::NotStarted(_) => true,
-            // It was turned away because another process bears its name, or had nothing to do.
+            // It was rejected because another process uses its name, or it had no work.
             ChildEnd::Done(_) => !there,
             ChildEnd::Failed(_) => child.failures + 1 >= STUCK_AFTER,
         };
@@ -339,7 +344,7 @@ impl State {
         self.fail_missing();
     }
 
-    /// Starts what is due, and kills what does not get going or does not go.
+    /// Starts due children, and kills children that do not join or do not leave in time.
     pub(super) fn watch_children(&mut self, actions: &mut Actions) {
         if self.draining() {
             return self.kill_overdue(actions);
@@ -387,27 +392,28 @@ impl State {
         self.fail_missing();
     }
 
-    /// Whether a child of this name is being started, or will be soon.
+    /// Checks whether a child of this name is starting or will start soon.
     pub(super) fn child_is_coming(&self, name: &str) -> bool {
         self.children.get(name).is_some_and(|child| {
             matches!(child.state, ChildState::Due(_) | ChildState::Starting(..))
         })
     }
 
-    /// Whether a child has failed so often that nobody should wait for it.
+    /// Checks whether a child has failed so often that waiting for it is useless.
     pub(super) fn child_gave_up(&self, name: &str) -> bool {
         self.children
             .get(name)
             .is_some_and(|child| matches!(child.state, ChildState::GaveUp(_) | ChildState::Ended))
     }
 
-    /// Why nobody should wait for a child that has not joined, if nobody should.
+    /// Returns the reason why waiting for a child that has not joined is useless, or `None`.
     pub(super) fn child_cannot_start(&self, name: &str) -> Option<&str> {
         let child = self.children.get(name)?;
         child.stuck.as_deref()
     }
 
-    /// Whether every bundle that was to be started has joined, or has had its chance.
+    /// Checks whether every bundle that should be started has joined or cannot be waited for any
+    /// more.
     pub(super) fn children_settled(&self) -> bool {
         let children = self.children.iter();
         let mut bundles = children.filter(|(_, child)| child.spec.judges());
@@ -418,8 +424,8 @@ impl State {
     }
 }
 
-/// A number below 256 that differs from child to child and from start to start, yet is the same
-/// in every run: the state machine has no dice.
+/// Returns a number below 256 that differs between children and between starts. It is the same in
+/// every run, because the state machine has no random numbers.
 fn jitter_of(name: &str, restarts: u32) -> u8 {
     name.bytes().fold(restarts.to_le_bytes()[0], |sum, byte| {
         sum.wrapping_mul(31).wrapping_add(byte)

@@ -1,4 +1,5 @@
-//! Delivering: every result reaches every reporter at least once, and none can hold up a verdict.
+//! Delivery: every result reaches every reporter at least once, and no reporter can delay a
+//! verdict.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,16 +14,16 @@ use super::reporters::Reporter;
 use super::types::{Delivery, Reported, SessionId};
 use super::{Actions, State};
 
-/// Findings under way to one reporter. A result with more of them travels alone: otherwise a bundle
-/// that reports far too much would fill the broker with results that are waiting to be read.
+/// Maximum number of unacknowledged findings per reporter. A result with more findings is sent
+/// alone. Otherwise a bundle that reports far too much would fill the broker with unread results.
 const FINDINGS_UNDER_WAY: u64 = 2_000;
 
-/// Reporters that may have a larger result at once: each of them is read back and kept until it is
-/// acknowledged, and there are as many reporters as somebody likes. More than one, so that one that is
-/// stopped does not hold up the others.
+/// Maximum number of reporters that have a larger result at once. Each such result is read back and
+/// kept until it is acknowledged, and the number of reporters is unlimited. The limit is above 1 so
+/// that a stopped reporter does not block the others.
 const LARGE_AT_ONCE: usize = 2;
 
-/// A result that was sent and is not acknowledged.
+/// A result that was sent and is not acknowledged yet.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sent {
     pub file: FileId,
@@ -36,13 +37,13 @@ impl Sent {
 }
 
 impl State {
-    /// Whether one more large result may be given to a reporter.
+    /// Checks whether one more large result may be sent to a reporter.
     fn has_room_for_large(&self) -> bool {
         let sent = self.reporters.iter().flat_map(|it| it.active.values());
         sent.filter(|sent| sent.is_large()).count() < LARGE_AT_ONCE
     }
 
-    /// Gives out what had to wait for other reporters.
+    /// Sends the results that had to wait for other reporters.
     pub(super) fn deliver_what_waited(&mut self, actions: &mut Actions) {
         for index in 0..self.reporters.len() {
             let waits = |it: &Reporter| it.active.is_empty() && !it.queue.is_empty();
@@ -52,8 +53,8 @@ impl State {
         }
     }
 
-    /// Whether a result that was read back for a reporter is still to be sent: its file may have
-    /// gone meanwhile.
+    /// Checks whether a result that was read back for a reporter must still be sent. Its file may
+    /// have been removed meanwhile.
     pub fn awaits_result(&self, session: SessionId, job: JobId) -> bool {
         let mut reporters = self.reporters.iter();
         reporters.any(|it| it.session == Some(session) && it.active.contains_key(&job))
@@ -65,13 +66,13 @@ impl State {
         }
     }
 
-    /// A new result: every reporter that is there gets it.
+    /// Sends a new result to every connected reporter.
     pub(super) fn deliver_to_all(&mut self, file: FileId, actions: &mut Actions) {
         for index in 0..self.reporters.len() {
             let Some(reporter) = self.reporters.get_mut(index) else {
                 continue;
             };
-            // One that is away gets everything that it lacks when it joins.
+            // A disconnected reporter gets all missing results when it joins.
             if reporter.session.is_some() {
                 reporter.retries.forget(file);
                 reporter.queue.push_back(file);
@@ -89,7 +90,8 @@ impl State {
             if reporter.active.len() + reporter.voiding.len() >= reporter.capacity {
                 return;
             }
-            // Before any result: a file that is there again has its new report written after this.
+            // Withdrawals precede results, because the new report of a file that exists again must
+            // be written later.
             let recorded = |path: &&Arc<Path>| !self.withdrawing.contains_key(*path);
             let gone = reporter.void.iter().find(recorded).cloned();
             if let Some(path) = gone {
@@ -140,7 +142,7 @@ impl State {
         }
     }
 
-    /// A reporter has a result, or could not use it.
+    /// Handles the answer of a reporter that it has a result or could not use it.
     pub(super) fn result_done(
         &mut self,
         index: u32,
@@ -190,7 +192,8 @@ impl State {
         self.settle_waits(file, actions);
     }
 
-    /// It is tried again after a pause, and the journal does not have it: the next broker tries it, too.
+    /// Schedules a failed report for another try after a pause. The journal does not record it, so
+    /// the next broker tries it as well.
     fn is_not_reported(&mut self, index: u32, file: FileId, why: String, actions: &mut Actions) {
         let (now, pause) = (self.now, self.settings.retry_after);
         let mut why = why;
@@ -207,7 +210,7 @@ impl State {
         }
     }
 
-    /// Tries reports again that failed, when their pause is over.
+    /// Retries failed reports after the end of their pause.
     pub(super) fn report_again(&mut self, actions: &mut Actions) {
         for index in 0..self.reporters.len() {
             let Some(reporter) = self.reporters.get_mut(index) else {
@@ -221,7 +224,8 @@ impl State {
         }
     }
 
-    /// A reporter has taken back what it said of a file that has gone, or could not.
+    /// Handles the answer of a reporter that it has withdrawn its report of a removed file, or
+    /// could not.
     pub(super) fn withdrawal_done(
         &mut self,
         index: u32,
@@ -253,7 +257,8 @@ impl State {
         self.deliver(index, actions);
     }
 
-    /// A result could not be read back: it was withdrawn or replaced, or the disk is in trouble.
+    /// Handles a result that could not be read back: it was withdrawn or replaced, or the disk has
+    /// failed.
     pub(super) fn undeliverable(
         &mut self,
         session: SessionId,
@@ -279,7 +284,7 @@ impl State {
         self.deliver(index, actions);
     }
 
-    /// Whether every reporter that is there has everything.
+    /// Checks whether every connected reporter has received everything.
     pub(super) fn all_delivered(&self) -> bool {
         self.reporters.iter().all(|it| {
             it.session.is_none() || (!it.owes() && it.queue.is_empty() && it.void.is_empty())

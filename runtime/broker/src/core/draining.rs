@@ -1,4 +1,4 @@
-//! Leaving: what nobody wants any more is told to finish and go, and killed when it does not.
+//! Draining: asks unwanted processes to finish and leave, and kills them if they do not.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -9,28 +9,29 @@ use super::action::Action;
 use super::types::{Launch, SessionId};
 use super::{Actions, State};
 
-/// A process that has been told to go.
+/// A process that was told to leave.
 #[derive(Debug)]
 pub(super) struct Retired {
     pub launch: Option<Launch>,
     pub since: Duration,
 }
 
-/// How long a process may take to leave after it was told to drain.
+/// Maximum time that a process may take to leave after it was told to drain.
 pub(super) const LEAVE_LIMIT: Duration = Duration::from_secs(10);
 
-/// How long what a former broker started may take to join this one. A process that is well notices
-/// at once that its broker has gone, and ends when it finds no other within ten seconds.
+/// Maximum time that a process of a former broker may take to join this one. A healthy process
+/// notices the end of its broker at once. It ends if it finds no other broker within ten seconds.
 const RETURN_LIMIT: Duration = Duration::from_secs(15);
 
 impl State {
-    /// Tells a peer to finish and go, and forgets that it was wanted.
+    /// Tells a peer to finish and leave. It is not required any more.
     pub(super) fn drain_peer(&mut self, name: &str, actions: &mut Actions) {
         let now = self.now;
         if let Some(bundle) = self.bundles.get_mut(name) {
             bundle.draining = true;
             bundle.moved = now;
-            // From now on nobody misses it, also when the broker ends before it has left.
+            // From now on the bundle is not required, even if the broker ends before the bundle has
+            // left.
             if bundle.origin.take().is_some() {
                 let name = name.to_owned();
                 actions.push(Action::Strike { name });
@@ -56,7 +57,7 @@ impl State {
         }
     }
 
-    /// A process that a former broker started and that nobody wants any more is told to go.
+    /// Drains a process that a former broker started and that is not wanted any more.
     pub(super) fn drain_unwanted(
         &mut self,
         name: &str,
@@ -68,7 +69,7 @@ impl State {
         }
     }
 
-    /// A process that should go: it is killed when it does not.
+    /// Registers a process that must leave. It is killed if it does not.
     pub(super) fn retire(&mut self, session: SessionId, launch: Option<Launch>) {
         self.retired.insert(
             session,
@@ -79,8 +80,8 @@ impl State {
         );
     }
 
-    /// A process that hung when its broker was killed has no session with this one, so
-    /// nobody would ever miss it: what has not come back in time is killed, once.
+    /// Kills, once, the processes that have not joined in time. A process that hung when its broker
+    /// was killed has no session here, so it would remain unnoticed.
     pub(super) fn kill_what_did_not_return(&mut self, actions: &mut Actions) {
         if self.stale_children_are_gone || self.now < RETURN_LIMIT {
             return;
@@ -93,7 +94,7 @@ impl State {
         actions.push(Action::KillStaleChildren { joined });
     }
 
-    /// Kills what was told to go long ago.
+    /// Kills processes that have not left within the limit.
     pub(super) fn kill_overdue(&mut self, actions: &mut Actions) {
         let now = self.now;
         let overdue = |it: &Retired| now.saturating_sub(it.since) > LEAVE_LIMIT;

@@ -1,15 +1,15 @@
-//! Reading before anybody is there who judges: a run of `check` reads its files while its bundles start.
+//! Early reading: a `check` run reads its files while its bundles are still starting.
 
 use qcbus_messages::JobId;
 
 use super::types::{PrepareFailure, PreparedJob};
 use super::{Actions, Phase, State};
 
-/// What came of reading a file.
+/// Result of reading a file.
 pub(super) type ReadingEnd = Result<Box<PreparedJob>, PrepareFailure>;
 
 impl State {
-    /// A file was read.
+    /// Handles the end of reading a file.
     pub(super) fn was_read(&mut self, job: JobId, result: ReadingEnd, actions: &mut Actions) {
         if self.settings.once && !self.has_judges() {
             self.read_early.push((job, result));
@@ -18,13 +18,14 @@ impl State {
         }
     }
 
-    /// Whether all are there, or were, who judge.
+    /// Checks whether all required bundles have joined, now or earlier.
     fn has_judges(&mut self) -> bool {
         self.may_judge() || self.judged_once
     }
 
-    /// Whether files are read already although nobody can judge them yet: a run has nothing else to do while its
-    /// bundles start. What is read is not looked at before they are there, for who they are decides what becomes of it.
+    /// Checks whether files are read before any bundle can judge them. A run has no other work
+    /// while its bundles start. The read data is not evaluated before the bundles have joined,
+    /// because the result depends on them.
     pub(super) fn reads_early(&mut self) -> bool {
         self.settings.once && self.phase == Phase::Running && !self.has_judges()
     }
@@ -37,7 +38,7 @@ impl State {
             if self.judged_once {
                 self.prepared(job, result, actions);
             } else {
-                // The run is to end: nobody will come any more.
+                // The run must end, because no bundle will join any more.
                 self.preparing -= 1;
                 self.end_job(job, actions);
             }

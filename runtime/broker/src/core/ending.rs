@@ -1,4 +1,4 @@
-//! How it ends: jobs first, then reporters, then goodbye.
+//! Shutdown: ends the jobs first, then the reporters, then all peers.
 
 use std::time::Duration;
 
@@ -7,11 +7,11 @@ use qcbus_messages::{Role, ToPeer};
 use super::action::Action;
 use super::{Actions, Phase, State};
 
-/// How long peers may take to leave at the end.
+/// Maximum time that peers may take to leave at the end.
 const GOODBYE_LIMIT: Duration = Duration::from_secs(3);
 
 impl State {
-    /// Whether somebody has told the broker to stop.
+    /// Checks whether the broker was told to stop.
     pub fn draining(&self) -> bool {
         self.phase != Phase::Running
     }
@@ -22,7 +22,7 @@ impl State {
         }
     }
 
-    /// Moves the end on: jobs first, then reporters, then goodbye.
+    /// Advances the shutdown: jobs first, then reporters, then all peers.
     pub(super) fn wind_down(&mut self, actions: &mut Actions) {
         let quiet = self.jobs.is_empty() && self.all_delivered();
         if self.settings.once
@@ -59,7 +59,7 @@ impl State {
         }
     }
 
-    /// Whether a reporter that was to be started may still join.
+    /// Checks whether a reporter that should be started may still join.
     fn reporters_coming(&self) -> bool {
         self.children.iter().any(|(name, child)| {
             child.spec.role == Role::Reporter
@@ -80,7 +80,7 @@ impl State {
         }
     }
 
-    /// Kills what a broker started and what does not leave.
+    /// Kills the processes that a broker started and that do not leave.
     fn kill_ours(&self, actions: &mut Actions) {
         for (role, name) in self.sessions.values() {
             let launch = match role {
@@ -91,7 +91,7 @@ impl State {
         }
     }
 
-    /// Whether a broker started this peer, this one or a former one.
+    /// Checks whether this broker or a former one started the peer.
     fn is_ours(&self, name: &str) -> bool {
         self.bundles.get(name).is_some_and(|it| it.launch.is_some())
             || self

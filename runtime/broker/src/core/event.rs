@@ -1,4 +1,4 @@
-//! Everything that can happen to the broker.
+//! Events that the broker handles.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -12,84 +12,84 @@ use super::types::{
 };
 use super::waits::Until;
 
-/// Everything that can happen to the broker.
+/// An event that the broker handles.
 #[derive(Debug)]
 pub enum Event {
-    /// A file is there and quiet: new, changed, or seen in a scan.
+    /// A file exists and has settled: it is new, changed or was seen in a scan.
     Settled {
         /// Absolute path.
         path: Arc<Path>,
-        /// What `stat` says.
+        /// Its stamp from `stat`.
         stamp: Stamp,
     },
-    /// A file was seen in the first look at everything, and may still be written to: it is there,
-    /// and [`Event::Settled`] follows.
+    /// The first scan has found a file, which may still be written to. [`Event::Settled`] follows.
     Present {
         /// Absolute path.
         path: Arc<Path>,
     },
-    /// A file that has no verdict of its own is there and quiet: verdicts may depend on it.
+    /// A file without a verdict of its own exists and has settled. Verdicts may depend on it.
     Touched {
         /// Absolute path.
         path: Arc<Path>,
-        /// What `stat` says.
+        /// Its stamp from `stat`.
         stamp: Stamp,
     },
-    /// A file has gone.
+    /// A file was removed.
     Vanished {
         /// Absolute path.
         path: Arc<Path>,
     },
-    /// Somebody has removed or changed results, or copies behind the gate.
+    /// Another process has removed or changed results, or copies behind the gate.
     OutputsLost {
-        /// Which.
+        /// The lost outputs.
         lost: Vec<LostOutput>,
     },
     /// The first scan is complete.
     Scanned,
-    /// Reading a file is over.
+    /// A file was read.
     Prepared {
         /// The job.
         job: JobId,
-        /// What it gave.
+        /// Result of reading.
         result: Result<Box<PreparedJob>, PrepareFailure>,
     },
-    /// Storing a result is over.
+    /// The storing of a result has ended.
     Stored {
         /// The job.
         job: JobId,
-        /// What it gave.
+        /// Outcome of storing.
         outcome: StoreOutcome,
     },
-    /// A file whose acceptance stands after all is behind the gate again, or held back there.
+    /// A file with a confirmed acceptance is behind the gate again, or was held back there.
     Opened {
         /// Its path.
         path: Arc<Path>,
     },
-    /// That a file has gone is in the journal, with who is to take back a report about it.
+    /// The journal has recorded that a file was removed, and the reporters that must withdraw their
+    /// report.
     Withdrawn {
         /// Its path.
         path: Arc<Path>,
     },
-    /// A peer says hello.
+    /// A peer sends its hello.
     Hello {
         /// Its session.
         session: SessionId,
-        /// Its words.
+        /// Content of the hello.
         hello: Hello,
     },
-    /// A peer says something.
+    /// A peer sends a message.
     Message {
         /// Its session.
         session: SessionId,
-        /// Its words.
+        /// The message.
         message: FromPeer,
     },
-    /// A peer sends what is no message.
+    /// A peer sends an invalid message.
     Garbage {
         /// Its session.
         session: SessionId,
-        /// What is wrong.
+        /// Description of the fault.
         what: String,
     },
     /// A peer's process is dead.
@@ -101,77 +101,77 @@ pub enum Event {
     Undeliverable {
         /// The reporter's session.
         session: SessionId,
-        /// The job.
+        /// The job of the result.
         job: JobId,
-        /// Why.
+        /// The reason.
         why: String,
     },
     /// A child could not be started or has ended.
     Exited {
-        /// Which start.
+        /// Identifier of the start.
         launch: Launch,
-        /// How.
+        /// How it ended.
         end: ChildEnd,
     },
-    /// A configuration is in force from now on.
+    /// A new configuration is in force.
     Configured {
         /// Its digest.
         digest: Digest,
-        /// What it demands.
+        /// Demand of the configuration.
         demand: Arc<dyn Demand>,
     },
-    /// The children that should run from now on.
+    /// The list of children that must run has changed.
     Children {
-        /// All of them.
+        /// All children.
         specs: Vec<ChildSpec>,
     },
     /// A file is being written to.
     Unfinished {
         /// The file.
         path: Arc<Path>,
-        /// What it is at this moment.
+        /// Its stamp at this moment.
         stamp: Option<Stamp>,
     },
     /// A client waits for a verdict.
     Wait {
-        /// The client.
+        /// Request id of the client.
         request_id: RequestId,
         /// The file.
         path: Arc<Path>,
-        /// What `stat` says of it now, if it is there and at rest. Otherwise an event will tell.
+        /// Its stamp from `stat` if it exists and has settled. Otherwise an event follows.
         stamp: Option<Stamp>,
-        /// Why nobody will ever check it, if so.
+        /// Reason why the file will never be checked, or `None`.
         unwatched: Option<String>,
-        /// What for, and when to give up.
+        /// Goal and timeout of the wait.
         until: Until,
     },
-    /// A client wants a file checked for itself alone.
+    /// A client requests an on-demand check of a file.
     Check {
         /// The file.
         path: Arc<Path>,
-        /// Who wants it, and by whom.
+        /// The client, and the bundles that must check the file.
         on_demand: OnDemand,
     },
-    /// What was found for an errand is pooled.
+    /// The findings of an on-demand check are pooled.
     Pooled {
         /// The job.
         job: JobId,
-        /// What it gave.
+        /// The outcome.
         outcome: OnDemandOutcome,
     },
-    /// A client that waited has left without its answer.
+    /// A waiting client has disconnected before its answer.
     ClientLeft {
-        /// The client.
+        /// Request id of the client.
         request_id: RequestId,
     },
-    /// Somebody wants a bundle off the roster that is there by joining.
+    /// A client wants to remove a joined bundle from the registry.
     RemoveBundle {
-        /// The client.
+        /// Request id of the client.
         request_id: RequestId,
         /// The bundle.
         name: String,
     },
-    /// Stop taking files, finish what is there, stop.
+    /// The broker must accept no new files, finish its jobs and stop.
     Drain,
     /// Time has passed.
     Tick,

@@ -1,6 +1,6 @@
-//! The files table: every file that is present, what is known of it, and the queue of those that
-//! wait. A path is in the queue at most once, so a file that changes a hundred times while it
-//! waits is checked once, with its newest bytes.
+//! Files table: every known file with its state, and the queues of waiting files. A path is in the
+//! queue at most once. A file that changes a hundred times while it waits is checked once, with its
+//! newest bytes.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::path::Path;
@@ -13,112 +13,114 @@ use qcbus_messages::JobId;
 use super::on_demand::OnDemand;
 use super::types::{Judged, Reported, Stamp};
 
-/// Index of a file in the table; never reused within a generation.
+/// Index of a file in the table. It is never reused within a generation.
 pub type FileId = u32;
 
-/// Which queue a file waits in.
+/// Queue that a file waits in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Priority {
-    /// Asked for by somebody who waits for it and for nothing else.
+    /// On-demand check: a client waits for exactly this file.
     OnDemand,
-    /// New or changed: somebody waits for the verdict.
+    /// New or changed file: a client waits for the verdict.
     Fresh,
-    /// Judged already, to be judged again because bundles or configuration changed.
+    /// File with a verdict that is judged again because bundles or the configuration changed.
     Background,
 }
 
-/// Where a file stands.
+/// Processing state of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Stage {
-    /// Nothing to do.
+    /// No work is pending.
     Idle,
-    /// In a queue since then.
+    /// The file is in a queue since this time.
     Waiting(Priority, Duration),
-    /// Being checked.
+    /// The file is being checked.
     Active(JobId),
 }
 
-/// One file.
+/// A file in the table.
 #[derive(Debug)]
 pub struct FileEntry {
     /// Absolute path.
     pub path: Arc<Path>,
-    /// What its name promises.
+    /// File kind according to its name.
     pub kind: FileKind,
     /// The newest stamp seen.
     pub stamp: Stamp,
-    /// Whether it is there; a file that has gone stays in the table until its job has ended.
+    /// Whether the file exists. A removed file stays in the table until its job has ended.
     pub present: bool,
     stage: Stage,
-    /// It changed while it was being checked, or something that it depends on changed at any time:
-    /// its verdict must not be taken to stand because its stamp is the same.
+    /// The verdict is stale: the file changed during its check, or a file that it depends on
+    /// changed. The verdict must not count as valid because of an unchanged stamp.
     pub stale: bool,
-    /// An event told of it while it was being read, under the stamp that it has: of a young file that
-    /// is what another write looks like.
+    /// An event reported the file with its present stamp while it was being read. For a young file
+    /// this may mean another write.
     pub touched: bool,
-    /// What it is accepted for was taken from behind the gate, until it is known to stand.
+    /// The accepted file was withdrawn from the gate until its acceptance is confirmed.
     pub unpublished: bool,
-    /// How many times it is about to be published again: nobody is told before that it is accepted.
+    /// Number of pending publications. The acceptance is not reported before they are done.
     pub opening: u32,
-    /// Not before then, after something failed for want of room or disk.
+    /// The file is not processed before this time, because something failed for lack of room or
+    /// disk space.
     pub not_before: Duration,
-    /// The bus had no place for it, and it waits for one.
+    /// The bus had no place for the file, and it waits for one.
     pub in_line: bool,
-    /// How often in a row something that passes kept it from being read.
+    /// Number of consecutive temporary failures to read the file.
     pub hindered: u32,
-    /// Its result says something that is so no more, though nothing that its verdict depends on has
-    /// changed: it is checked again even if it is read as before.
+    /// The result contains outdated statements although no input of the verdict has changed. The
+    /// file is checked again even if its inputs are unchanged.
     pub anew: bool,
-    /// Writing a result has failed since the last verdict, so one of other bytes may lie in its place.
+    /// Writing a result has failed since the last verdict, so a result of other bytes may be in its
+    /// place.
     pub half_written: bool,
-    /// When something last made it wait, or somebody asked for it while it did: what is read for its
+    /// Time when the file was last queued, or requested while it waited. Data that is read for its
     /// verdict must not be older.
     pub asked: Duration,
-    /// The verdict on some bytes, not always the present ones.
+    /// The verdict on some bytes, which may differ from the present ones.
     pub judged: Option<Arc<Judged>>,
-    /// What else was read with it, or looked for, the last time; also where no verdict came of it.
+    /// Other files that were read or looked up with it the last time, even if no verdict followed.
     depends_on: Vec<Arc<Path>>,
-    /// What reporters have said of it, by index into the reporters' table.
+    /// State of each reporter for this file, by index into the reporters' table.
     pub delivered: Vec<(u32, Reported)>,
-    /// It is here for a client that waits for its result, and nothing of it is kept.
+    /// The entry belongs to an on-demand check, and its outcome is not stored.
     pub on_demand: Option<OnDemand>,
 }
 
 impl FileEntry {
-    /// Whether a reporter has the result of this job.
+    /// Checks whether a reporter has the result of this job.
     pub fn has(&self, reporter: u32, job: JobId) -> bool {
         self.delivered.contains(&(reporter, Reported::Of(job)))
     }
 }
 
-/// The table.
+/// The files table.
 #[derive(Debug, Default)]
 pub struct Files {
     entries: BTreeMap<FileId, FileEntry>,
     by_path: HashMap<Arc<Path>, FileId>,
     dependents: HashMap<Arc<Path>, Vec<FileId>>,
-    /// Paths that nobody depends on any more, until somebody asks.
+    /// Paths that lost their last dependent verdict since they were last taken.
     forgotten: BTreeSet<Arc<Path>>,
     next: FileId,
     on_demand_checks: VecDeque<FileId>,
     fresh: VecDeque<FileId>,
     background: VecDeque<FileId>,
     since_background: u8,
-    /// The last that was taken was an errand.
+    /// The last dequeued file was an on-demand check.
     was_on_demand: bool,
     counts: Counts,
 }
 
-/// How many files are in which stage.
+/// Number of files in each stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
-    /// In the fresh queue, or for an errand.
+    /// Files in the fresh queue or in the queue of on-demand checks.
     pub fresh: u64,
-    /// In the background queue.
+    /// Files in the background queue.
     pub background: u64,
-    /// Being checked.
+    /// Files that are being checked.
     pub active: u64,
-    /// Neither.
+    /// All other files.
     pub idle: u64,
 }
 
@@ -158,45 +160,46 @@ impl FileEntry {
         }
     }
 
-    /// Where it stands.
+    /// Returns the stage of the file.
     pub fn stage(&self) -> &Stage {
         &self.stage
     }
 }
 
-/// One in this many files comes from the background even when fresh ones wait, so that the
-/// background gets on while a farm never rests.
+/// One in this many files comes from the background queue even if fresh files wait. Thus the
+/// background queue progresses under permanent load.
 const BACKGROUND_SHARE: u8 = 16;
 
 impl Files {
-    /// The entry of a path.
+    /// Returns the index of a path.
     pub fn id(&self, path: &Path) -> Option<FileId> {
         self.by_path.get(path).copied()
     }
 
-    /// The entry.
+    /// Returns an entry.
     pub fn get(&self, id: FileId) -> Option<&FileEntry> {
         self.entries.get(&id)
     }
 
-    /// The entry, to change.
+    /// Returns an entry for changes.
     pub fn get_mut(&mut self, id: FileId) -> Option<&mut FileEntry> {
         self.entries.get_mut(&id)
     }
 
-    /// All entries in the order in which they were first seen.
+    /// Returns all entries in the order in which they were first seen.
     pub fn iter(&self) -> impl Iterator<Item = (FileId, &FileEntry)> {
         self.entries.iter().map(|(id, entry)| (*id, entry))
     }
 
-    /// Adds a file that is not yet in the table.
+    /// Adds a new file to the table.
     pub fn insert(&mut self, path: &Arc<Path>, kind: FileKind, stamp: Stamp) -> FileId {
         let id = self.add(FileEntry::new(path, kind, stamp));
         self.by_path.insert(path.clone(), id);
         id
     }
 
-    /// Adds a file for an errand. Nobody finds it by its path, under which another may be watched.
+    /// Adds a file for an on-demand check. The entry cannot be found by its path, because a watched
+    /// file may have the same path.
     pub fn insert_on_demand(
         &mut self,
         path: &Arc<Path>,
@@ -217,7 +220,7 @@ impl Files {
         id
     }
 
-    /// Forgets a file for good.
+    /// Removes a file from the table.
     pub fn remove(&mut self, id: FileId) {
         self.set_dependencies(id, Vec::new());
         self.set_stage(id, Stage::Idle);
@@ -229,8 +232,8 @@ impl Files {
         }
     }
 
-    /// Puts an idle file into a queue; one that waits in the background moves up when fresh.
-    /// An active one is marked as changed by the caller, not here.
+    /// Puts an idle file into a queue. A file in the background queue moves to the fresh queue if
+    /// the priority is fresh. The caller marks an active file as changed.
     pub fn enqueue(&mut self, id: FileId, priority: Priority, now: Duration) {
         if let Some(entry) = self.entries.get_mut(&id) {
             entry.asked = now;
@@ -250,20 +253,20 @@ impl Files {
         }
     }
 
-    /// Moves a file that waits to the front: others wait for the verdict on it.
+    /// Moves a waiting file to the front, because other files wait for its verdict.
     pub fn hurry(&mut self, id: FileId, now: Duration) {
         if matches!(
             self.entries.get(&id).map(FileEntry::stage),
             Some(Stage::Waiting(..))
         ) {
             self.set_stage(id, Stage::Waiting(Priority::Fresh, now));
-            // Its other place in a queue is void.
+            // Its old place in a queue becomes invalid.
             self.fresh.push_front(id);
         }
     }
 
-    /// Moves a file to another stage; the queues themselves are the business of
-    /// [`Files::enqueue`] and [`Files::dequeue`].
+    /// Moves a file to another stage. Only [`Files::enqueue`] and [`Files::dequeue`] change the
+    /// queues themselves.
     pub fn set_stage(&mut self, id: FileId, stage: Stage) {
         let Some(entry) = self.entries.get_mut(&id) else {
             return;
@@ -281,8 +284,8 @@ impl Files {
         }
     }
 
-    /// Takes the next file that may be checked at `now`: every other one is an errand while there are any, and
-    /// the fresh come before the background.
+    /// Takes the next file that may be checked at `now`. Every second file is an on-demand check
+    /// while any of them wait. Fresh files precede background files.
     pub fn dequeue(&mut self, now: Duration) -> Option<FileId> {
         let mut order = [Priority::Fresh, Priority::Background];
         if self.since_background >= BACKGROUND_SHARE {
@@ -316,24 +319,24 @@ impl Files {
                     return Some(id);
                 }
                 Stage::Waiting(at, _) if at == priority => self.queue(priority).push_back(id),
-                // It moved to the other queue, or was taken from it: this place is void.
+                // The file moved to another queue or was taken from it, so this place is invalid.
                 _ => {}
             }
         }
         None
     }
 
-    /// Whether nothing waits and nothing is active.
+    /// Checks whether no file is waiting or active.
     pub fn is_quiet(&self) -> bool {
         self.counts.fresh + self.counts.background + self.counts.active == 0
     }
 
-    /// How many files are in which stage.
+    /// Returns the number of files in each stage.
     pub fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// How long the file at the head of the fresh queue has waited.
+    /// Returns how long the file at the head of the fresh queue has waited.
     pub fn oldest_wait(&self, now: Duration) -> Duration {
         let waiting = |id: &FileId| match self.entries.get(id)?.stage {
             Stage::Waiting(Priority::Fresh, since) => Some(now.saturating_sub(since)),
@@ -342,7 +345,7 @@ impl Files {
         self.fresh.iter().find_map(waiting).unwrap_or_default()
     }
 
-    /// Remembers what a file depends on, so that [`Files::dependents`] finds it.
+    /// Records the paths that a file depends on, so that [`Files::dependents`] finds it.
     pub fn set_dependencies(&mut self, id: FileId, new: Vec<Arc<Path>>) {
         let Some(entry) = self.entries.get_mut(&id) else {
             return;
@@ -371,12 +374,12 @@ impl Files {
         }
     }
 
-    /// The paths that nobody depends on any more, since this was last asked.
+    /// Takes the paths that have lost their last dependent verdict since the last call.
     pub fn take_forgotten(&mut self) -> Vec<Arc<Path>> {
         std::mem::take(&mut self.forgotten).into_iter().collect()
     }
 
-    /// The files whose verdict depends on this path (other than the file itself).
+    /// Returns the files with a verdict that depends on this path, except the file itself.
     pub fn dependents(&self, path: &Path) -> Vec<FileId> {
         self.dependents.get(path).cloned().unwrap_or_default()
     }

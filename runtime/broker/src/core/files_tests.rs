@@ -31,7 +31,7 @@ fn how_many_wait_where_is_counted() {
         idle,
     };
     assert_eq!(files.counts(), counts(1, 2, 1, 1));
-    // Somebody waits for it now.
+    // A client waits for it now.
     files.enqueue(1, Priority::Fresh, at(2));
     assert_eq!(files.counts(), counts(2, 1, 1, 1));
     files.remove(0);
@@ -78,7 +78,7 @@ fn a_file_that_moved_up_is_taken_once_and_in_its_new_place() {
 fn a_file_in_the_other_queue_does_not_go_by_its_former_place() {
     let mut files = files(2);
     files.enqueue(0, Priority::Background, at(1));
-    // It moved up; its former place is still in the background queue.
+    // It moved up, but its former place is still in the background queue.
     files.enqueue(0, Priority::Fresh, at(1));
     files.enqueue(1, Priority::Background, at(1));
     files.since_background = BACKGROUND_SHARE;

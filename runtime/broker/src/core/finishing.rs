@@ -1,4 +1,4 @@
-//! Finishing: from a job whose shares are all there to a stored result.
+//! Finishing: turns a job with completed tasks into a stored result.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use super::types::{FinishedJob, Judged, StoreOutcome};
 use super::{Actions, State};
 
 impl State {
-    /// When every share is there, the job is ready to be stored.
+    /// Marks the job as ready to be stored when all its tasks are completed.
     pub(super) fn finish_if_over(&mut self, id: JobId) {
         let Some(job) = self.jobs.get(&id) else {
             return;
@@ -28,7 +28,7 @@ impl State {
         }
     }
 
-    /// Gives finished jobs to the writers, as far as there is room.
+    /// Hands finished jobs to the writers as long as they have room.
     pub(super) fn store_finished(&mut self, actions: &mut Actions) {
         let now = self.now;
         for (id, job) in &mut self.jobs {
@@ -90,12 +90,12 @@ impl State {
         })
     }
 
-    /// Configured bundles that do not take files of this kind: their checkers are listed as
-    /// skipped, so that nobody takes them for lost.
+    /// Returns the outcomes of configured bundles that do not take files of this kind. Their
+    /// checkers are listed as skipped, so that they do not look lost.
     fn inapplicable(&self, job: &ActiveJob) -> Vec<TaskOutcome> {
         let mut outcomes = Vec::new();
         let kind = job.kind;
-        // What others would say of this kind is nothing that a shadow says.
+        // A shadow does not report on bundles that do not take this kind of file.
         let named = match job.is_trial() {
             true => Vec::new(),
             false => self.demand.named(),
@@ -117,7 +117,7 @@ impl State {
         outcomes
     }
 
-    /// Storing is over.
+    /// Handles the end of storing.
     pub(super) fn stored(&mut self, id: JobId, outcome: StoreOutcome, actions: &mut Actions) {
         let Some(job) = self.jobs.get_mut(&id) else {
             return;
@@ -147,7 +147,7 @@ impl State {
                 job.stage = JobStage::Checking;
                 self.reseat(id, actions);
             }
-            // What was found counts for nothing under another configuration.
+            // Findings from another configuration are invalid.
             StoreOutcome::Outdated => self.begin_anew(id, actions),
             StoreOutcome::Failed(why) => {
                 let entry = self.files.get_mut(file);
@@ -155,7 +155,7 @@ impl State {
                 job.stage = JobStage::Finished(self.now + self.settings.retry_after);
                 let same = job.config == self.config;
                 self.unpublish_unstored(file, actions);
-                // On a full disk every file would say the same with every try.
+                // On a full disk every file would repeat this notice at every try.
                 if is_new || self.now >= self.mute_unwritten_until {
                     self.mute_unwritten_until = self.now + NOTICE_PAUSE;
                     self.notice(Notice::NotWritten(why), actions);
@@ -169,8 +169,9 @@ impl State {
         }
     }
 
-    /// What was not stored may lie behind the gate all the same, because the journal is written last. It stays only
-    /// where the file was accepted before and that stands; nobody would take it away otherwise when the file changes.
+    /// Withdraws a file from the gate if it was not stored. The copy may already be published,
+    /// because the journal is written last. It stays only if a previous acceptance is still valid.
+    /// Otherwise it would remain behind the gate when the file changes.
     fn unpublish_unstored(&mut self, file: FileId, actions: &mut Actions) {
         let Some(entry) = self.files.get_mut(file) else {
             return;
@@ -199,7 +200,7 @@ impl State {
                 fresh,
             });
             if stale {
-                // It changed while its acceptance was on its way.
+                // The file changed while its acceptance was being stored.
                 entry.unpublished = true;
                 actions.push(Action::CloseGate { path: gated });
             }
@@ -209,7 +210,7 @@ impl State {
         self.let_shadows_try(file);
     }
 
-    /// The job counts for nothing, and its file is read again.
+    /// Discards the job, and its file is read again.
     pub(super) fn begin_anew(&mut self, id: JobId, actions: &mut Actions) {
         let file = self.jobs.get(&id).map(|job| job.file);
         if let Some(entry) = file.and_then(|file| self.files.get_mut(file)) {
@@ -218,8 +219,8 @@ impl State {
         self.end_job(id, actions);
     }
 
-    /// The job is over, whatever came of it. The file waits again if it changed meanwhile, or if
-    /// others must judge it by now.
+    /// Ends the job, whatever its outcome. The file is queued again if it changed meanwhile, or if
+    /// its required bundles have changed.
     pub(super) fn end_job(&mut self, id: JobId, actions: &mut Actions) {
         let Some(job) = self.jobs.remove(&id) else {
             return;
@@ -237,11 +238,11 @@ impl State {
             return self.on_demand_is_over(job.file, on_demand.request_id, actions);
         }
         self.what_follows(job.file, actions);
-        // It waits again by now, if it does.
+        // At this point the file is already queued again, if necessary.
         self.verdict_has_come(job.file, actions);
     }
 
-    /// A file whose job is over waits again, is withdrawn, or has a verdict that stands.
+    /// Decides what follows a job: the file is queued again, is withdrawn or has a valid verdict.
     fn what_follows(&mut self, file: FileId, actions: &mut Actions) {
         let Some(entry) = self.files.get(file) else {
             return;
@@ -259,8 +260,8 @@ impl State {
         }
     }
 
-    /// How soon a file is judged again whose verdict does not stand any more: at once where
-    /// somebody waits for it.
+    /// Returns the priority of a file with an invalid verdict. It is judged at once if a client
+    /// waits for it.
     pub(super) fn priority_of(&self, path: &Path) -> Priority {
         if self.is_awaited(path) {
             Priority::Fresh

@@ -1,4 +1,4 @@
-//! Jobs: from the queue through reading to the shares that bundles are given.
+//! Jobs: the way from the queue through reading to the tasks of the bundles.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,13 +18,13 @@ use super::required_set::{Epoch, Requirement, VersionDigest};
 use super::types::{Input, Judged, PrepareFailure, PreparedJob, Reading};
 use super::{Actions, State};
 
-/// Between two notices that there is no room, or that files cannot be read or results written for now.
+/// Minimum time between two notices about missing room, unreadable files or unwritten results.
 pub(super) const NOTICE_PAUSE: Duration = Duration::from_secs(10);
 
-/// Files without a place on the bus of which each is tried again in every pause.
+/// Number of files without a place on the bus that are retried in every pause.
 const TRIED_AT_ONCE: usize = 8;
 
-/// A job in flight.
+/// A job in progress.
 #[derive(Debug)]
 pub(super) struct ActiveJob {
     pub file: FileId,
@@ -34,22 +34,23 @@ pub(super) struct ActiveJob {
     pub stage: JobStage,
     pub prepared: Option<Arc<PreparedJob>>,
     pub unreadable: Option<String>,
-    /// In which its jury was called.
+    /// Epoch in which the required bundles were fixed.
     pub epoch: Epoch,
-    /// The configuration under which it is checked.
+    /// Configuration under which it is checked.
     pub config: Digest,
-    /// By bundle name.
+    /// Tasks by bundle name.
     pub tasks: BTreeMap<String, Task>,
-    /// It is done for a client, and nothing of it is kept.
+    /// The job is an on-demand check, and its outcome is not stored.
     pub on_demand: Option<OnDemand>,
-    /// While it is stored: the file was to be judged anew, and is again if nothing is stored.
+    /// Used while the job is stored: the file was to be judged again. This is restored if no result
+    /// is stored.
     pub anew: bool,
-    /// Its bundles have answered and it must wait: of its documents only the root is still on the bus.
+    /// Its bundles have answered and the job must wait. Only its root document is still on the bus.
     pub is_slim: bool,
 }
 
 impl ActiveJob {
-    /// Whether it is the trial of a shadow.
+    /// Checks whether the job is the trial of a shadow.
     pub fn is_trial(&self) -> bool {
         self.on_demand
             .as_ref()
@@ -57,41 +58,41 @@ impl ActiveJob {
     }
 }
 
-/// How far a job is.
+/// Stage of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum JobStage {
     Preparing,
     Checking,
-    /// All shares are there; waits for a place among the writers, not before the given time.
+    /// All tasks are completed. The job waits for a writer, but not before the given time.
     Finished(Duration),
     Storing,
 }
 
 impl JobStage {
-    /// Whether bundles are at work on it, or have just ended.
+    /// Checks whether bundles are working on it or have just finished.
     pub fn is_before_storing(self) -> bool {
         matches!(self, JobStage::Checking | JobStage::Finished(_))
     }
 }
 
-/// One bundle's share of a job.
+/// Task of one bundle in a job.
 #[derive(Debug)]
 pub(super) struct Task {
     pub state: TaskState,
     pub version: String,
-    /// As it was when the job was given out; `None` for a bundle that was never seen.
+    /// Catalogue at the time when the job was sent. `None` for a bundle that was never seen.
     pub catalogue: Option<Arc<Catalogue>>,
     pub version_digest: Option<VersionDigest>,
     pub demanded: Arc<[u32]>,
-    /// Nobody else has it before it goes to a writer.
+    /// Uniquely owned until it is handed to a writer thread.
     pub pending: Arc<BTreeMap<u32, Pending>>,
     pub pending_bytes: usize,
     pub micros: u64,
-    /// It was with a bundle that died; it is tried alone from now on.
+    /// The job was with a bundle that died. From now on it is retried alone, in quarantine.
     pub quarantined: bool,
-    /// How often the bundle died with this job alone in a fresh process.
+    /// Number of times that the bundle died with only this job in a new process.
     pub strikes: u8,
-    /// The failure means that the bundle was not there, not that it broke on this file.
+    /// The failure means that the bundle was missing, not that it failed on this file.
     pub missing: bool,
 }
 
@@ -104,8 +105,8 @@ pub(super) enum TaskState {
 }
 
 impl Task {
-    /// The share of who sits there. Nobody can check a file that cannot be read; who was never
-    /// seen is waited for nevertheless.
+    /// Returns the task for a requirement. If the file cannot be read, the task fails at once. The
+    /// broker still waits for a bundle that was never seen.
     pub fn of(requirement: &Requirement, unreadable: Option<&str>) -> Task {
         let why = unreadable.filter(|_| requirement.catalogue.is_some());
         Task {
@@ -127,7 +128,7 @@ impl Task {
         matches!(self.state, TaskState::Done | TaskState::Failed(_))
     }
 
-    /// Forgets what a session that has ended said.
+    /// Discards the pending findings of a session that has ended.
     pub fn unstage(&mut self) {
         self.pending = Arc::default();
         self.pending_bytes = 0;
@@ -135,7 +136,7 @@ impl Task {
 }
 
 impl State {
-    /// The jobs that have not gone to the writers.
+    /// Returns the jobs that were not handed to the writers yet.
     pub(super) fn under_way(&self) -> Vec<JobId> {
         let jobs = self.jobs.iter();
         let under_way = jobs.filter(|(_, job)| job.stage.is_before_storing());
@@ -158,13 +159,15 @@ impl State {
         }
     }
 
-    /// Jobs that wait for the verdicts that their own rest on, which need places to come.
+    /// Returns the number of jobs that wait for verdicts they rest on. These verdicts need
+    /// additional places.
     fn held_up(&self) -> usize {
         let held_up = self.jobs.keys().filter(|id| self.is_held_up(**id));
         held_up.count().min(self.settings.max_active)
     }
 
-    /// Documents that bundles read. Jobs that wait for other verdicts leave the room to those that they wait for.
+    /// Returns the number of documents that bundles read. Jobs that wait for other verdicts do not
+    /// count, so that the awaited files have room.
     fn documents_active(&self) -> usize {
         let documents = |job: &ActiveJob| {
             let prepared = job.prepared.as_ref();
@@ -174,7 +177,7 @@ impl State {
         active.map(documents).sum()
     }
 
-    /// Begins with one file, unless its verdict still stands.
+    /// Starts a job for one file, unless its verdict is still valid.
     pub(super) fn take(&mut self, id: FileId, actions: &mut Actions) {
         let Some(entry) = self.files.get(id).filter(|it| it.present) else {
             return;
@@ -223,7 +226,7 @@ impl State {
         actions.push(Action::Prepare { job, path, waited });
     }
 
-    /// Reading is over.
+    /// Handles the end of reading.
     pub(super) fn prepared(&mut self, id: JobId, result: ReadingEnd, actions: &mut Actions) {
         if !matches!(self.jobs.get(&id), Some(job) if job.stage == JobStage::Preparing) {
             return;
@@ -236,8 +239,8 @@ impl State {
             }
             Err(PrepareFailure::Vanished) => {
                 let file = self.jobs.get(&id).map(|job| job.file);
-                // First, so that nobody is told of the verdict that it had. One of which something was
-                // heard meanwhile may be back.
+                // This comes first, so that the old verdict is not reported. If an event arrived
+                // meanwhile, the file may exist again.
                 if let Some(entry) = file.and_then(|file| self.files.get_mut(file)) {
                     entry.present &= entry.stale;
                 }
@@ -245,7 +248,7 @@ impl State {
             }
             Err(PrepareFailure::NoRoom(why)) => {
                 self.trials_give_way(id, actions);
-                // Every file in the queue would say the same and push out all other notices.
+                // Otherwise every queued file would repeat this notice and displace all others.
                 if self.now >= self.mute_room_until {
                     self.mute_room_until = self.now + NOTICE_PAUSE;
                     self.notice(Notice::NoRoom(why.clone()), actions);
@@ -263,8 +266,8 @@ impl State {
         }
     }
 
-    /// Something kept the file from being read that will pass. It is tried again and again, with growing
-    /// pauses; then its verdict says so, and it is tried as everything that could not be read is.
+    /// Handles a temporary failure to read the file. It is retried with growing pauses. After that
+    /// its verdict states the failure, and it is retried like any unreadable file.
     fn hindered(&mut self, id: JobId, reason: String, actions: &mut Actions) {
         let file = self.jobs.get(&id).map(|job| job.file);
         let Some(entry) = file.and_then(|file| self.files.get_mut(file)) else {
@@ -283,8 +286,9 @@ impl State {
         self.requeue_later(id, pause, actions);
     }
 
-    /// There is no room for the file now. As long as anything moves there will be, so it waits; when
-    /// nothing has for long enough, it is undetermined. A verdict that it has stays meanwhile.
+    /// Handles a file that has no room now. It waits as long as other jobs progress, because room
+    /// will become free. If no job progresses for long enough, its verdict is undetermined. An
+    /// existing verdict stays meanwhile.
     fn wait_for_room(&mut self, id: JobId, why: &str, pause: Duration, actions: &mut Actions) {
         let moves = |job: &ActiveJob| job.stage != JobStage::Preparing && job.unreadable.is_none();
         if self.jobs.values().any(moves) {
@@ -300,8 +304,9 @@ impl State {
         self.not_read(id, reason, actions);
     }
 
-    /// The file is tried again when a place on the bus becomes free, one file for each; gives the pauses
-    /// after which it is tried anyway, more the longer the line is, because to try is to read.
+    /// Queues the file for the next free place on the bus. Each free place admits one file. Returns
+    /// the number of pauses after which the file is retried anyway. It grows with the queue,
+    /// because each try reads the file.
     fn stand_in_line(&mut self, id: JobId) -> u32 {
         let file = self.jobs.get(&id).map(|job| job.file);
         if let Some((file, entry)) = file.and_then(|id| Some((id, self.files.get_mut(id)?)))
@@ -312,7 +317,7 @@ impl State {
         u32::try_from(self.crowded.len() / TRIED_AT_ONCE + 1).unwrap_or(u32::MAX)
     }
 
-    /// A place on the bus has become free.
+    /// Admits one waiting file after a place on the bus has become free.
     pub(super) fn let_one_in(&mut self) {
         while let Some(id) = self.crowded.pop_front() {
             let Some(entry) = self.files.get_mut(id) else {
@@ -326,7 +331,7 @@ impl State {
         }
     }
 
-    /// Whether the file was read as it is now, and judged.
+    /// Checks whether the present bytes of the file were read and judged.
     fn has_verdict_on_these_bytes(&self, id: JobId) -> bool {
         let entry = self.jobs.get(&id).and_then(|job| self.files.get(job.file));
         entry
@@ -337,7 +342,7 @@ impl State {
             })
     }
 
-    /// The file cannot be read. That may be known, and said.
+    /// Handles a file that cannot be read. The existing verdict may already state this.
     fn not_read(&mut self, id: JobId, reason: String, actions: &mut Actions) {
         let Some(job) = self.jobs.get_mut(&id) else {
             return;
@@ -358,8 +363,8 @@ impl State {
         self.give_out(id, actions);
     }
 
-    /// What kept a file or a part of it from being read may have passed without an event: it is tried
-    /// again from time to time.
+    /// Retries unreadable files and parts of files from time to time. The obstacle may have
+    /// disappeared without an event.
     pub(super) fn read_again_what_was_unreadable(&mut self) {
         if self.settings.once || self.now < self.next_reading {
             return;
@@ -379,7 +384,8 @@ impl State {
         }
     }
 
-    /// The file is read: is the verdict known, has it changed meanwhile, or is there work?
+    /// Handles a file that was read. Its verdict may be known, the file may have changed meanwhile,
+    /// or bundles must check it.
     fn read(&mut self, id: JobId, prepared: &Arc<PreparedJob>, actions: &mut Actions) {
         let Some(job) = self.jobs.get_mut(&id) else {
             return;
@@ -422,7 +428,7 @@ impl State {
         }
     }
 
-    /// The bytes are the same under a new stamp.
+    /// Records the new stamp of unchanged bytes.
     fn restamp(
         &mut self,
         file: FileId,
@@ -445,7 +451,7 @@ impl State {
         }
     }
 
-    /// A verdict stands after all.
+    /// Confirms that a verdict is still valid.
     fn confirm(&mut self, file: FileId, judged: &Arc<Judged>, actions: &mut Actions) {
         let Some(entry) = self.files.get_mut(file) else {
             return;
@@ -468,7 +474,7 @@ impl State {
         let inputs = &prepared.inputs;
         let others = inputs.iter().skip(1);
         let new: Vec<Arc<Path>> = others.map(|input| input.path.clone()).collect();
-        // A link to a file is read, and the file itself has the verdict.
+        // The link to a file was read, but the verdict belongs to the file itself.
         let under = prepared.rests_on.iter().map(|it| it.path.clone());
         self.files
             .set_dependencies(file, new.iter().cloned().chain(under).collect());
@@ -481,7 +487,7 @@ impl State {
         }
     }
 
-    /// What no verdict depends on any more need not be watched.
+    /// Stops watching paths that no verdict depends on any more.
     pub(super) fn forget_dependencies(&mut self, actions: &mut Actions) {
         let paths = self.files.take_forgotten();
         if !paths.is_empty() {
@@ -489,7 +495,7 @@ impl State {
         }
     }
 
-    /// Tries the file again after a pause.
+    /// Retries the file after a pause.
     fn requeue_later(&mut self, id: JobId, pause: Duration, actions: &mut Actions) {
         let Some(file) = self.jobs.get(&id).map(|job| job.file) else {
             return;

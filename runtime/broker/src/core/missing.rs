@@ -1,5 +1,5 @@
-//! Bundles that must judge and are not there: how long they are waited for, and what their share of
-//! a job comes to.
+//! Missing required bundles: how long the broker waits for them, and when their tasks of a job
+//! fail.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -11,7 +11,7 @@ use super::jobs::TaskState;
 use super::required_set::Origin;
 
 impl State {
-    /// Fails the shares of bundles that are not there and will not come in time.
+    /// Fails the tasks of bundles that are missing and will not join in time.
     pub(super) fn fail_missing(&mut self) {
         let names: BTreeSet<String> = self
             .jobs
@@ -27,7 +27,7 @@ impl State {
         }
     }
 
-    /// Why there is no use in waiting for this bundle, if there is none.
+    /// Returns the reason why waiting for this bundle is useless, or `None` if it is not.
     pub(super) fn hopeless(&self, name: &str) -> Option<String> {
         let Some(bundle) = self.bundles.get(name) else {
             let text = format!("the configuration demands {name}, which has not joined");
@@ -56,7 +56,8 @@ impl State {
         }
     }
 
-    /// How long a bundle that is not there is waited for: one that starts slowly as long as it may take to start.
+    /// Returns how long to wait for a missing bundle. A bundle with a slow start has its whole
+    /// start limit.
     fn patience_with(&self, name: &str) -> Duration {
         let child = self.children.get(name);
         let slow = child.filter(|it| it.spec.slow_start && self.child_is_coming(name));

@@ -1,8 +1,8 @@
-//! The heart of the broker: a state machine without a clock and without I/O.
+//! Core of the broker: a state machine without a clock and without I/O.
 //!
-//! `State::handle(now, event)` turns everything that can happen into what is to be done. The loop
-//! around it (`crate::engine`) turns the world into events and carries the actions out. Nothing
-//! in here can block, fail or panic on input, and everything can be tested as a table.
+//! `State::handle(now, event)` turns events into actions. The loop around it (`crate::engine`)
+//! creates the events and executes the actions. The state machine cannot block, fail or panic on
+//! input, so all of it can be tested with tables.
 
 mod action;
 mod bundles;
@@ -78,7 +78,7 @@ use status::Rate;
 use trials::Trials;
 use waits::Waiter;
 
-/// What one event makes necessary.
+/// Actions that follow from one event.
 type Actions = Vec<Action>;
 
 /// The state machine.
@@ -90,12 +90,12 @@ pub struct State {
     jobs: BTreeMap<JobId, ActiveJob>,
     bundles: BTreeMap<String, Bundle>,
     reporters: Vec<Reporter>,
-    /// By name, how often bundles have changed lately.
+    /// Recent registration changes of bundles, by name.
     changes: BTreeMap<String, Changes>,
     sessions: BTreeMap<SessionId, (Role, Arc<str>)>,
     children: BTreeMap<String, Child>,
     retired: BTreeMap<SessionId, Retired>,
-    /// What former brokers started has joined or been killed.
+    /// All stale children have joined or were killed.
     stale_children_are_gone: bool,
     waiters: Vec<Waiter>,
     on_demand_checks: OnDemandChecks,
@@ -104,7 +104,7 @@ pub struct State {
     demand: Arc<dyn Demand>,
     epoch: Epoch,
     requirements: Requirements,
-    /// The roster has changed, or somebody on it has come back: jobs under way follow.
+    /// The registry has changed or a required bundle has returned, so active jobs must be adapted.
     reseat: bool,
     phase: Phase,
     scanned: bool,
@@ -112,44 +112,45 @@ pub struct State {
     storing: usize,
     next_job: u64,
     last_launch: Launch,
-    /// When what could not be read is tried again.
+    /// Time when unreadable files are retried.
     next_reading: Duration,
-    /// Each with the time when it was last true.
+    /// Notices, each with the time when it was last valid.
     notices: VecDeque<(Notice, Duration)>,
     rate: Rate,
     judged_once: bool,
-    /// What a run has read before those were there who judge.
+    /// Files that a run has read before its bundles joined.
     read_early: Vec<(JobId, ReadingEnd)>,
-    /// Until then nobody need be told again that there is no room.
+    /// Time until which the notice about missing room is not repeated.
     mute_room_until: Duration,
     mute_hindered_until: Duration,
     mute_unwritten_until: Duration,
-    /// Files for which the bus had no place, in their order: with each job that ends one is tried again.
+    /// Files that found no place on the bus, in order. Each job that ends admits one of them.
     crowded: VecDeque<files::FileId>,
-    /// Files that have gone, and how often that is to be written to the journal: until it is, no reporter takes back
-    /// what the journal knows him to have said.
+    /// Removed files, each with the number of pending journal entries. Until these are written, no
+    /// reporter withdraws a report that the journal still contains.
     withdrawing: BTreeMap<Arc<Path>, u32>,
-    /// Since when there has been no room for anything while nothing moved.
+    /// Time since which there has been no room while no job progressed.
     stuck_since: Option<Duration>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     Running,
-    /// No new jobs since then; what is there is finished.
+    /// Since this time no new jobs start, and existing jobs are finished.
     Draining(Duration),
-    /// Peers have been told to go.
+    /// Peers were told to leave at this time.
     Leaving(Duration),
     Stopped,
 }
 
-/// Notices kept for `status`.
+/// Maximum number of notices kept for `status`.
 const NOTICES: usize = 50;
 
 impl State {
-    /// A broker that knows nothing yet.
+    /// Returns the state of a new broker.
     pub fn new(settings: Settings, config: Digest, demand: Arc<dyn Demand>) -> State {
-        // Launches differ from those of earlier generations, whose children may be adopted.
+        // Launches must differ from those of earlier generations, because their children may be
+        // adopted.
         let last_launch = Launch::first_of(settings.generation);
         let epoch = Epoch::first_of(settings.numbers);
         let mut state = State {
@@ -194,7 +195,7 @@ impl State {
         state
     }
 
-    /// Puts in what the journal knows of a file. It counts as present only once a scan has seen it.
+    /// Adds a file from the journal. It counts as present only after a scan has found it.
     pub fn remember(&mut self, path: &Arc<Path>, judged: Judged, delivered: &[(String, Reported)]) {
         let Some(kind) = FileKind::of_path(path) else {
             return;
@@ -218,8 +219,8 @@ impl State {
         }
     }
 
-    /// The acceptance of a file that was remembered does not lie behind the gate: it is published when it is known
-    /// that it stands.
+    /// Marks a file from the journal as accepted but not published. It is published when its
+    /// acceptance is confirmed.
     pub fn remember_unpublished(&mut self, path: &Path) {
         let id = self.files.id(path);
         if let Some(entry) = id.and_then(|id| self.files.get_mut(id)) {
@@ -227,8 +228,8 @@ impl State {
         }
     }
 
-    /// Takes one event and says what is to be done. `now` is the time since the start and never
-    /// runs backwards.
+    /// Handles one event and returns the resulting actions. `now` is the time since the start and
+    /// never decreases.
     pub fn handle(&mut self, now: Duration, event: Event) -> Vec<Action> {
         self.now = self.now.max(now);
         let mut actions = Vec::new();
@@ -292,8 +293,8 @@ impl State {
         actions
     }
 
-    /// A peer says something. `false`: nothing follows from it for anybody else, as from most of what bundles
-    /// say, which is said hundreds of times for every file.
+    /// Handles a message of a peer. Returns `false` if it has no effect on other peers. This holds
+    /// for most messages of bundles, which arrive hundreds of times per file.
     fn message(
         &mut self,
         session: SessionId,
@@ -360,13 +361,13 @@ impl State {
         self.demand = demand;
         self.dismiss_on_demand("its configuration has changed", actions);
         self.begin_epoch();
-        // What is being checked is checked under the old configuration: it starts anew.
+        // Active checks use the old configuration, so they start again.
         for id in self.under_way() {
             self.begin_anew(id, actions);
         }
     }
 
-    /// Whether verdicts may be given: not before those who should take part have had their time.
+    /// Checks whether verdicts may be given. Expected bundles first have a limited time to join.
     fn may_judge(&mut self) -> bool {
         if self.phase != Phase::Running {
             return false;
@@ -392,7 +393,8 @@ impl State {
         self.expire_waits(actions);
     }
 
-    /// Everything that the verdict on a file depends on, as it was read: the one that is on its way, or the last.
+    /// Returns all inputs of the verdict on a file as they were read. An active job takes
+    /// precedence over the last verdict.
     pub fn inputs_of(&self, path: &Path) -> Vec<Input> {
         let Some(entry) = self.files.id(path).and_then(|id| self.files.get(id)) else {
             return Vec::new();
@@ -406,14 +408,14 @@ impl State {
         coming.or(last).cloned().unwrap_or_default()
     }
 
-    /// All that verdicts depend on, each with the stamp under which it was read.
+    /// Returns all paths that verdicts depend on, each with the stamp under which it was read.
     pub fn dependencies(&self) -> Vec<(Arc<Path>, Option<Stamp>)> {
         let files = self.files.iter().map(|(_, entry)| &entry.path);
         let inputs = files.flat_map(|path| self.inputs_of(path).into_iter().skip(1));
         inputs.map(|it| (it.path, it.content.stamp())).collect()
     }
 
-    /// Whether the first look through everything is over.
+    /// Checks whether the first scan is complete.
     pub fn has_looked(&self) -> bool {
         self.scanned
     }

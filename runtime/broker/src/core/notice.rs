@@ -1,78 +1,80 @@
-//! What a person should read: a closed list, so that `status`, JSON and tests need not read English.
+//! Notices for the user: a closed list, so that `status`, JSON and tests need not parse English
+//! text.
 
 use std::fmt;
 
 use qcbus_messages::control::Unseen;
 use qcbus_messages::shown;
 
-/// Something that a person should read.
+/// A notice for the user.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Notice {
-    /// A process may not take part, and why.
+    /// A process was rejected, with the reason.
     TurnedAway(String),
     /// A bundle or reporter has ended.
     Ended {
         /// Its name.
         name: String,
-        /// How.
+        /// How it ended.
         why: String,
     },
-    /// The broker has ended the session of a bundle or reporter, and its process where it started it.
+    /// The broker has ended the session of a bundle or reporter, and its process if the broker
+    /// started it.
     Killed {
         /// Its name.
         name: String,
-        /// What it did wrong.
+        /// Description of its fault.
         why: String,
     },
-    /// A bundle changes what it is all the time, and is not believed for a while.
+    /// A flapping bundle changes its registration repeatedly and is distrusted for a while.
     Flapping {
         /// Its name.
         name: String,
-        /// How often, and until when.
+        /// Number of changes, and the end of the pause.
         why: String,
     },
-    /// A child failed too often and is left alone for a while.
+    /// A child failed too often and is not restarted for a while.
     GaveUp {
         /// Its name.
         name: String,
-        /// How often, and how it failed.
+        /// Number and kind of the failures.
         why: String,
     },
-    /// The newer process of a child does not join; the older goes on.
+    /// The newer process of a child does not join. The older one continues.
     NotUpgraded {
         /// Its name.
         name: String,
-        /// Why.
+        /// The reason.
         why: String,
     },
     /// There is no room for a file's image.
     NoRoom(String),
-    /// A file cannot be read for now.
+    /// A file cannot be read at the moment.
     NotRead(String),
     /// A result could not be written.
     NotWritten(String),
     /// A result could not be read back for a reporter.
     NotDelivered(String),
-    /// A reporter could not do its work.
+    /// A reporter has failed.
     NotReported {
         /// The reporter.
         name: String,
-        /// Why.
+        /// The reason.
         why: String,
     },
-    /// Nobody can join any more.
+    /// No process can join any more.
     Lost(String),
-    /// What the system allows is less than may be needed.
+    /// A limit of the system is lower than may be needed.
     Limited(String),
-    /// Of the directories that are watched.
+    /// A notice about the watched directories.
     Watching(String),
-    /// Of the configuration and the manifests.
+    /// A notice about the configuration or the manifests.
     Loading(String),
-    /// An accepted file is not published, because of something that it depends on.
+    /// An accepted file is not published because of a file that it depends on.
     HeldBack(String),
-    /// Of the journal and the results on the disk.
+    /// A notice about the journal or the results on the disk.
     Storing(String),
-    /// Something in the directories that are looked at cannot be looked at.
+    /// A part of the watched directories cannot be read.
     Unseen(Unseen),
 }
 
@@ -92,7 +94,7 @@ impl Notice {
         Notice::NotReported { name, why }
     }
 
-    /// A word for programs, which never changes.
+    /// Returns a word for programs. It never changes.
     pub fn kind(&self) -> &'static str {
         match self {
             Notice::TurnedAway(_) => "turned-away",
@@ -116,7 +118,7 @@ impl Notice {
         }
     }
 
-    /// The bundle or reporter that it is about.
+    /// Returns the bundle or reporter that the notice is about.
     pub fn about(&self) -> Option<&str> {
         match self {
             Notice::Ended { name, .. }
@@ -129,7 +131,7 @@ impl Notice {
         }
     }
 
-    /// What it says, without whom it is about.
+    /// Returns the text without the name of the bundle or reporter.
     pub(super) fn why(&self) -> String {
         match self {
             Notice::Ended { why, .. }
@@ -144,7 +146,7 @@ impl Notice {
 }
 
 impl fmt::Display for Notice {
-    /// On one line, whoever has chosen the names and reasons in it.
+    /// Writes the notice on one line, even if names or reasons contain line breaks.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&shown::line(&self.text()))
     }

@@ -1,8 +1,8 @@
-//! Errands: checks that clients ask for, of any file that this broker may read.
+//! On-demand checks: clients request checks of any file that this broker may read.
 //!
-//! An errand is a job like others, without anything that lasts: no verdict that stands, no result among the others,
-//! no gate, no journal, no reporter. Whoever asked gets what a run of its own would find, or is told to
-//! make one: that is what becomes of all that would be otherwise here than there.
+//! An on-demand check is a job without lasting effects. It has no permanent verdict, stored result,
+//! gate, journal or reporter. The client gets the findings that its own run would give. If the
+//! broker cannot guarantee that, it tells the client to run the check itself.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,35 +20,35 @@ use super::trials::TrialEnd;
 use super::types::RequestId;
 use super::{Actions, Phase, State};
 
-/// What a client asked for.
+/// Request of a client for an on-demand check.
 #[derive(Debug, Clone)]
 pub struct OnDemand {
     /// The client.
     pub request_id: RequestId,
-    /// The bundles that are to look at the file, and nobody else.
+    /// The bundles that must check the file. No other bundle takes part.
     pub bundles: Arc<[String]>,
 }
 
-/// What became of an errand whose file was checked.
+/// Outcome of an on-demand check after its file was checked.
 #[derive(Debug, Clone, PartialEq)]
 pub enum OnDemandOutcome {
-    /// Here is what was found.
+    /// The pooled findings.
     Pooled(Box<Checked>),
-    /// This is what a shadow found.
+    /// The findings of a shadow.
     Tried(TrialEnd),
     /// The file has changed since it was read.
     Stale,
-    /// Others must judge by now, or otherwise.
+    /// The required bundles or the configuration have changed.
     Outdated,
-    /// It cannot be told; the reason is for a person.
+    /// The check failed, with the reason as a text for the user.
     Failed(String),
 }
 
-/// The errands that are under way, by client.
+/// On-demand checks in progress, by client.
 pub(super) type OnDemandChecks = BTreeMap<RequestId, FileId>;
 
 impl State {
-    /// A client wants a file checked.
+    /// Handles a client's request to check a file.
     pub(super) fn on_demand(
         &mut self,
         path: &Arc<Path>,
@@ -65,7 +65,7 @@ impl State {
         self.files.enqueue(id, Priority::OnDemand, self.now);
     }
 
-    /// Whether a job is done for a client alone.
+    /// Checks whether a job is an on-demand check.
     pub fn is_on_demand(&self, job: JobId) -> bool {
         self.jobs.get(&job).is_some_and(|it| it.on_demand.is_some())
     }
@@ -81,7 +81,7 @@ impl State {
         FileKind::of_path(path).ok_or_else(|| "it is no file that qcbus checks".to_owned())
     }
 
-    /// Whether a bundle is there as the very program that is started under its name now.
+    /// Checks whether a bundle has joined as exactly the program that its name starts now.
     fn is_as_started(&self, name: &str) -> bool {
         let bundle = self.bundles.get(name);
         let bundle = bundle.filter(|it| it.origin == Some(Origin::Supervised));
@@ -92,7 +92,7 @@ impl State {
             .is_some_and(|(launch, child)| launch.is_of(&child.spec))
     }
 
-    /// Those of the seats that an errand asks for.
+    /// Returns the requirements of a job. For an on-demand check these are only the requested ones.
     pub(super) fn requirements_of(&self, job: &ActiveJob) -> Arc<[Requirement]> {
         let requirements = self.requirements(job.kind);
         match &job.on_demand {
@@ -108,7 +108,8 @@ impl State {
         }
     }
 
-    /// An errand whose shares are all there is pooled, if what was found is what whoever asked would find.
+    /// Pools an on-demand check that has all its tasks back. Its findings must be the same as in
+    /// the client's own run.
     pub(super) fn pool_on_demand(&mut self, id: JobId, actions: &mut Actions) {
         let Some(job) = self.jobs.get_mut(&id) else {
             return;
@@ -121,10 +122,10 @@ impl State {
             return self.pool_trial(id, actions);
         }
         let whole = job.tasks.len() == on_demand.bundles.len();
-        // Why a bundle has failed need not lie in the file: another process of it may find what there is.
+        // The cause of a failed bundle may lie outside the file. Another process of it may succeed.
         let mut tasks = job.tasks.values();
         let done = tasks.all(|task| task.state == TaskState::Done);
-        // Whoever asks may have rights that this process has not.
+        // The client may have rights that this process does not have.
         let refused = |it: &MissingDocument| matches!(it.why, Absence::Unreadable { .. });
         let prepared = job.prepared.as_deref();
         if prepared.is_some_and(|it| it.missing.iter().any(refused)) {
@@ -144,7 +145,7 @@ impl State {
         }
     }
 
-    /// What became of an errand after its file was checked.
+    /// Handles the outcome of an on-demand check.
     pub(super) fn pooled(&mut self, id: JobId, outcome: OnDemandOutcome, actions: &mut Actions) {
         let Some(job) = self.jobs.get_mut(&id) else {
             return;
@@ -172,7 +173,7 @@ impl State {
                 self.end_job(id, actions);
             }
             OnDemandOutcome::Stale => self.end_job(id, actions),
-            // The configuration is the same, or the errand would have been dismissed.
+            // The configuration is the same, because a change would have dismissed the check.
             OnDemandOutcome::Outdated => {
                 job.stage = JobStage::Checking;
                 self.reseat(id, actions);
@@ -181,7 +182,7 @@ impl State {
         }
     }
 
-    /// Ends the job of an errand that cannot be done here.
+    /// Ends the job of an on-demand check that this broker cannot do.
     pub(super) fn send_elsewhere(&mut self, id: JobId, reason: String, actions: &mut Actions) {
         let on_demand = self.jobs.get(&id).and_then(|job| job.on_demand.as_ref());
         if let Some(request_id) = on_demand.map(|it| it.request_id)
@@ -196,7 +197,8 @@ impl State {
         self.end_job(id, actions);
     }
 
-    /// The job of an errand is over: it is begun again, unless somebody was answered or has left.
+    /// Handles the end of an on-demand job. The job starts again unless the client was answered or
+    /// has disconnected.
     pub(super) fn on_demand_is_over(
         &mut self,
         file: FileId,
@@ -221,8 +223,8 @@ impl State {
         }
     }
 
-    /// Nobody who has asked can be answered any more: configuration or bundles are others, so that what would be found
-    /// now is not what was asked for, or the broker has stopped.
+    /// Dismisses all on-demand checks. The configuration or the bundles have changed, so new
+    /// findings would not match the request, or the broker has stopped.
     pub(super) fn dismiss_on_demand(&mut self, reason: &str, actions: &mut Actions) {
         let request_ids: Vec<RequestId> = self.on_demand_checks.keys().copied().collect();
         for request_id in request_ids {
@@ -235,7 +237,7 @@ impl State {
         }
     }
 
-    /// Nobody needs any more what a client asked for.
+    /// Drops the request of a client that no longer needs it.
     pub(super) fn abandon(&mut self, request_id: RequestId, actions: &mut Actions) {
         let Some(file) = self.on_demand_checks.remove(&request_id) else {
             return;
@@ -253,8 +255,9 @@ impl State {
         }
     }
 
-    /// A bundle died that had errands. They are not tried again: a verdict would keep others from that, but of an errand
-    /// nothing is known when the next one asks, and this bundle is needed by all.
+    /// Rejects the on-demand checks of a bundle that died. They are not retried. A verdict would
+    /// protect other runs from the same file, but an on-demand check leaves no record. Every job
+    /// needs this bundle.
     pub(super) fn refuse_quarantined(&mut self, actions: &mut Actions) {
         let quarantined = |job: &ActiveJob| job.tasks.values().any(|task| task.quarantined);
         let jobs = self.jobs.iter();
@@ -269,7 +272,8 @@ impl State {
         }
     }
 
-    /// No new jobs are begun any more: whoever still waits for one makes it himself.
+    /// Rejects the on-demand checks that still wait. The broker starts no new jobs, so these
+    /// clients run the checks themselves.
     pub(super) fn refuse_waiting_on_demand(&mut self, actions: &mut Actions) {
         let waits = |file: &FileId| {
             let stage = self.files.get(*file).map(|entry| entry.stage());

@@ -1,4 +1,5 @@
-//! What a bundle said about a job, measured, cut to size and put in the form of a result.
+//! Outcome of tasks: measures what a bundle reported about a job, limits its size and converts it
+//! to a result.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -11,35 +12,36 @@ use qcbus_messages::{Catalogue, CheckerInfo};
 use super::jobs::{Task, TaskState};
 use super::pending_findings::Pending;
 
-/// What one bundle's share of a job came to.
+/// Outcome of one bundle's task in a job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TaskOutcome {
     /// The bundle.
     pub name: String,
     /// Its version.
     pub version: String,
-    /// Why the whole bundle failed, if it did.
+    /// Reason why the whole bundle failed, or `None`.
     pub failure: Option<String>,
-    /// The checkers that had to look, as the catalogue numbers them.
+    /// The checkers that had to run, as indexes into the catalogue.
     pub demanded: Arc<[u32]>,
-    /// What it said; see [`TaskOutcome::said`].
+    /// The answer of the bundle. See [`TaskOutcome::said`].
     pub answer: Answer,
-    /// What it offers; `None` for a bundle that was demanded and never seen.
+    /// Its catalogue. `None` for a demanded bundle that was never seen.
     pub catalogue: Option<Arc<Catalogue>>,
-    /// Time spent checking, in microseconds, as the bundle says.
+    /// Time spent checking, in microseconds, as reported by the bundle.
     pub micros: u64,
 }
 
-/// What a bundle said of a file.
+/// Answer of a bundle about a file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Answer {
-    /// By checker.
+    /// Findings by checker.
     Said(Arc<BTreeMap<u32, Pending>>),
-    /// It was not asked, for it does not take files of this kind.
+    /// The bundle was not asked, because it does not take files of this kind.
     OtherKind(FileKind),
 }
 
-/// What one share comes to. It is put in the form of a result by whoever stores it, and not in the loop.
+/// Returns the outcome of one task. The code that stores it converts it to a result, outside the
+/// loop.
 pub(super) fn outcome(name: &str, task: &Task) -> TaskOutcome {
     TaskOutcome {
         name: name.to_owned(),
@@ -55,7 +57,8 @@ pub(super) fn outcome(name: &str, task: &Task) -> TaskOutcome {
     }
 }
 
-/// A bundle that does not take files of this kind: each demanded checker says that it does not apply.
+/// Returns the outcome of a bundle that does not take files of this kind. Each demanded checker is
+/// reported as not applicable.
 pub(super) fn not_applicable(
     name: &str,
     version: &str,
@@ -75,7 +78,8 @@ pub(super) fn not_applicable(
 }
 
 impl TaskOutcome {
-    /// In the form of a result: every demanded checker, and those besides that kept one from looking.
+    /// Converts the answer to a result. It contains every demanded checker, and other checkers that
+    /// blocked one of them.
     pub fn said(&self) -> BundleOutcome {
         let mut demanded = self.demanded.to_vec();
         demanded.sort_unstable();
@@ -99,7 +103,7 @@ impl TaskOutcome {
         demanded: &[u32],
     ) -> Vec<CheckerOutcome> {
         let failure = self.failure.as_deref();
-        // A bundle that has failed has said nothing.
+        // The findings of a failed bundle do not count.
         let pending_of = |index| pending.get(&index).filter(|_| failure.is_none());
         let is_demanded = |index: &u32| demanded.binary_search(index).is_ok();
         let told = pending.iter().filter(|(_, pending)| pending.done.is_some());
@@ -175,7 +179,8 @@ fn bundle(task: &TaskOutcome, demanded: &[u32], checkers: Vec<CheckerOutcome>) -
     }
 }
 
-/// How many checkers there are to be asked: what is off by default is left out by nobody.
+/// Counts the checkers that can be requested. A checker that is off by default counts only if it is
+/// demanded.
 fn in_question(catalogue: &Catalogue, demanded: &[u32]) -> usize {
     let is_demanded = |index: &u32| demanded.binary_search(index).is_ok();
     let checkers = (0..).zip(&catalogue.checkers);
@@ -183,7 +188,7 @@ fn in_question(catalogue: &Catalogue, demanded: &[u32]) -> usize {
     counted.count()
 }
 
-/// What one checker said, or why it said nothing.
+/// Returns the outcome of one checker, or the reason why it has none.
 fn said(offered: &CheckerInfo, pending: Option<&Pending>, failure: Option<&str>) -> CheckerOutcome {
     let done = pending.and_then(|pending| pending.done.clone());
     let (mut ending, params, metadata) = done.unwrap_or_else(|| {
@@ -200,7 +205,8 @@ fn said(offered: &CheckerInfo, pending: Option<&Pending>, failure: Option<&str>)
         };
     }
     CheckerOutcome {
-        // Whatever it says of its end: pooling makes a failure of findings by one that did not look.
+        // Findings are kept regardless of the reported end. Pooling reports a failure if a checker
+        // has findings but did not run.
         issues: pending.map_or_else(Vec::new, |pending| pending.issues.clone()),
         ending: Some(ending),
         params,
@@ -209,7 +215,7 @@ fn said(offered: &CheckerInfo, pending: Option<&Pending>, failure: Option<&str>)
     }
 }
 
-/// Roughly the memory that an issue holds.
+/// Estimates the memory that an issue occupies.
 pub(crate) fn weight(issue: &Issue) -> usize {
     let place = |place: &Location| match place {
         Location::Xml { xpath } => 64 + xpath.len(),
@@ -235,7 +241,7 @@ pub(crate) fn weight(issue: &Issue) -> usize {
         + issue.domain_info.iter().map(infos).sum::<usize>()
 }
 
-/// Roughly the memory that what a checker says of its run holds.
+/// Estimates the memory of the parameters and metadata of a checker's run.
 pub(crate) fn facts_weight(params: &[Param], metadata: &[Metadata]) -> usize {
     let params = params.iter().map(|it| 48 + it.name.len() + it.value.len());
     let metadata = metadata
@@ -256,7 +262,7 @@ fn info_weight(element: &InfoElement) -> usize {
         + children.sum::<usize>()
 }
 
-/// Cuts an issue down to what may be kept.
+/// Cuts an issue down to the permitted size.
 pub(super) fn clip(issue: &mut Issue, max: usize) {
     clip_text(&mut issue.description, max);
     clip_text(&mut issue.rule_uid, 512);
@@ -275,7 +281,7 @@ pub(super) fn clip(issue: &mut Issue, max: usize) {
     }
 }
 
-/// Cuts a list, and gives back the memory of the rest.
+/// Truncates a list and frees the memory of the rest.
 fn clip_list<T>(list: &mut Vec<T>, max: usize) {
     if list.len() > max {
         list.truncate(max);
@@ -283,7 +289,7 @@ fn clip_list<T>(list: &mut Vec<T>, max: usize) {
     }
 }
 
-/// Cuts a text at a character, and gives back the memory of the rest.
+/// Truncates a text at a character boundary and frees the memory of the rest.
 pub(super) fn clip_text(text: &mut String, max: usize) {
     if text.len() > max {
         let end = (0..=max)
@@ -292,7 +298,7 @@ pub(super) fn clip_text(text: &mut String, max: usize) {
             .unwrap_or(0);
         text.truncate(end);
         text.push('…');
-        // What is only cut keeps all the memory that it had.
+        // Truncation alone would keep the whole memory.
         text.shrink_to_fit();
     }
 }

@@ -87,8 +87,8 @@ fn an_issue(text: &str) -> Issue {
     }
 }
 
-/// What stands in the result of a checker that ends so with these findings: its status, why, and
-/// what it found.
+/// Returns the entry of a checker with this ending and these findings in the result: status,
+/// reason, findings.
 fn in_the_result(ending: Ending, issues: Vec<Issue>) -> (Status, String, Vec<String>) {
     let pending = Pending {
         issues,
@@ -155,7 +155,8 @@ fn a_bundle_that_takes_no_such_files_says_so_of_each_checker_asked() {
     assert_eq!(only.ending, Some(Ending::NotApplicable { reason }));
 }
 
-/// Every text that a bundle chooses counts, byte for byte: what is kept of it is bounded by weight.
+/// Checks that every text from a bundle counts, byte for byte, because the weight limits the kept
+/// data.
 #[test]
 fn what_an_issue_weighs_grows_with_each_of_its_texts() {
     let place = |text: &str, which: usize| {
@@ -217,7 +218,7 @@ fn a_text_is_cut_at_a_character_and_says_so() {
     assert_eq!(cut("ä", 0), "…");
 }
 
-/// A text that is only cut keeps all the memory that it had: a few bytes are kept, and megabytes held.
+/// Checks that a cut text releases its memory. Otherwise a few bytes would hold megabytes.
 #[test]
 fn what_is_cut_gives_its_memory_back() {
     let mut text = "x".repeat(1 << 20);

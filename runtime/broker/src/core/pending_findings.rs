@@ -1,4 +1,4 @@
-//! What bundles have said about jobs that are not stored yet, and how much of it there may be.
+//! Pending findings: findings of jobs that are not stored yet, and their limits.
 
 use std::sync::Arc;
 
@@ -11,38 +11,39 @@ use super::bundles::Bundle;
 use super::jobs::{ActiveJob, JobStage, Task, TaskState};
 use super::outcome::{clip, clip_text, facts_weight, weight};
 
-/// More checkers need not be named as those in the way of one.
+/// Maximum number of checkers named as blocking another one.
 const MOST_IN_THE_WAY: usize = 64;
-/// Bytes of the identifier of a checker that is in the way.
+/// Maximum length in bytes of the identifier of a blocking checker.
 const MOST_OF_AN_ID: usize = 512;
 
-/// What one checker has said so far.
+/// Pending findings of one checker.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Pending {
     /// Its findings.
     pub issues: Vec<Issue>,
-    /// How many more there are than may be kept.
+    /// Number of further findings beyond the limit.
     pub withheld: u64,
-    /// Bytes that what it said of its end takes of its share's.
+    /// Bytes of its reported end within the limit of its task.
     pub done_bytes: usize,
-    /// How it ended, its parameters and metadata.
+    /// Its end, parameters and metadata.
     pub done: Option<(Ending, Vec<Param>, Vec<Metadata>)>,
 }
 
-/// Which jobs there is room for among the findings that are kept.
+/// Room for findings: determines the jobs that may be sent.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Room {
-    /// Any.
+    /// Any job may be sent.
     Free,
-    /// Only the oldest, if there is one. It must come to an end for room to come free, and jobs
-    /// that wait for each other's bundles would otherwise wait for ever.
+    /// Only the oldest job, if one exists, may be sent. Room becomes free only when it ends.
+    /// Otherwise jobs that wait for each other's bundles would wait forever.
     Full(Option<JobId>),
 }
 
 impl State {
-    /// While findings take up all the room that they may have, younger jobs stay queued.
+    /// Returns the room for findings. While findings occupy all permitted room, younger jobs stay
+    /// queued.
     pub(super) fn room_for_findings(&self) -> Room {
-        // A trial is kept to what one bundle may say of one file, and holds up nobody.
+        // A trial is limited to the findings of one bundle for one file and blocks no other job.
         let counts = |job: &&ActiveJob| !job.is_trial();
         let jobs = self.jobs.values().filter(counts);
         let pending = jobs.flat_map(|job| job.tasks.values());
@@ -57,7 +58,7 @@ impl State {
         Room::Full(under_way.next().map(|(id, _)| *id))
     }
 
-    /// A batch of findings; kept aside until the bundle says that it is done.
+    /// Adds a batch of findings. They stay pending until the bundle has finished.
     pub(super) fn issues(
         &mut self,
         name: &str,
@@ -88,7 +89,7 @@ impl State {
         true
     }
 
-    /// One checker has ended.
+    /// Handles the end of one checker.
     pub(super) fn checker_done(&mut self, name: &str, id: JobId, end: CheckerEnd) -> bool {
         let CheckerEnd {
             checker,
@@ -113,7 +114,7 @@ impl State {
             by.shrink_to_fit();
         }
         let pending = Arc::make_mut(&mut task.pending).entry(checker).or_default();
-        // What it says of its end a second time is said in the place of the first.
+        // A second end of the same checker replaces the first one.
         let others = task.pending_bytes - pending.done_bytes;
         let facts = facts_weight(&params, &metadata);
         let mut done = (ending, params, metadata);
@@ -136,7 +137,7 @@ impl State {
     }
 }
 
-/// Bytes of what a checker says of its end, besides facts: nothing where there is nothing to say.
+/// Returns the bytes of a checker's end without its facts. It is 0 if there is no text.
 fn ending_weight(ending: &Ending) -> usize {
     let by = match ending {
         Ending::Blocked { by, .. } => by.iter().map(|id| 24 + id.len()).sum(),
@@ -145,8 +146,8 @@ fn ending_weight(ending: &Ending) -> usize {
     by + ending.reason().len()
 }
 
-/// Why a checker failed that has more to say of its run than is kept. As with findings: whoever says
-/// more than can be kept has not answered.
+/// Returns the failure reason of a checker with more facts than can be kept. As with findings, a
+/// checker that exceeds the limit has not answered.
 fn said_too_much(facts: usize, max_facts: usize, max_bytes: usize) -> String {
     format!(
         "more than is kept of what it says beside its findings: its parameters and metadata take \
@@ -156,8 +157,8 @@ fn said_too_much(facts: usize, max_facts: usize, max_bytes: usize) -> String {
 }
 
 impl Bundle {
-    /// Takes the next job from the queues and says whether it is a suspect, to be tried alone.
-    /// Suspects come first.
+    /// Takes the next job from the queues. Returns whether it is quarantined and must run alone.
+    /// Quarantined jobs come first.
     pub(super) fn next_job(&mut self, room: Room) -> Option<(JobId, bool)> {
         let Room::Full(oldest) = room else {
             let quarantined = self.quarantine.pop_front().map(|id| (id, true));

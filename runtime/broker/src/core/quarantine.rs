@@ -1,15 +1,15 @@
-//! Suspects: after a death every job that the bundle had is tried alone. Only a pair of file and
-//! bundle that fails twice alone in a fresh process is given up.
+//! Quarantine: after the death of a bundle each of its jobs is retried alone. A pair of file and
+//! bundle is given up only if it fails twice, alone in a new process.
 
 use super::State;
 use super::jobs::TaskState;
 
-/// Deaths of a bundle, alone with a file in a fresh process, until it is not tried again.
+/// Number of deaths, alone with a file in a new process, after which the pair is given up.
 const STRIKES: u8 = 2;
 
 impl State {
-    /// Takes the jobs of a session that has ended back into the bundle's queue. After a death
-    /// each of them is under suspicion.
+    /// Returns the jobs of an ended session to the bundle's queue. After a death each of them is
+    /// quarantined.
     pub(super) fn take_back(&mut self, name: &str, died: bool) {
         let Some(bundle) = self.bundles.get_mut(name) else {
             return;
@@ -37,7 +37,7 @@ impl State {
         }
     }
 
-    /// Pairs of file and bundle that have had all their chances end here.
+    /// Fails the pairs of file and bundle that have used all their retries.
     pub(super) fn condemn(&mut self, name: &str, why: &str) {
         let Some(bundle) = self.bundles.get_mut(name) else {
             return;

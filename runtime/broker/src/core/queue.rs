@@ -1,26 +1,26 @@
-//! The jobs that wait for a bundle.
+//! Queue of the jobs that wait for a bundle.
 
 use std::collections::VecDeque;
 
 use qcbus_messages::JobId;
 
-/// Jobs that wait for a bundle, each kind in its order. Errands come before what nobody waits for, and never twice in
-/// a row, so that nothing else waits for ever while clients ask and ask.
+/// Jobs that wait for a bundle, in order within each kind. On-demand checks come first, but other
+/// jobs take every second turn. Thus a steady flow of requests cannot block the other jobs.
 #[derive(Debug, Default)]
 pub(super) struct Queue {
     on_demand_checks: VecDeque<JobId>,
     others: VecDeque<JobId>,
-    /// The last that was taken was an errand.
+    /// The last job that was taken was an on-demand check.
     was_on_demand: bool,
 }
 
 impl Queue {
-    /// Puts a job at the end.
+    /// Appends a job.
     pub fn push(&mut self, id: JobId, is_on_demand: bool) {
         self.of(is_on_demand).push_back(id);
     }
 
-    /// Puts a job where it was before it was taken.
+    /// Puts a job back to its former position at the front.
     pub fn put_back(&mut self, id: JobId, is_on_demand: bool) {
         self.of(is_on_demand).push_front(id);
     }
@@ -33,7 +33,7 @@ impl Queue {
         Some(id)
     }
 
-    /// Takes this job, if it is there.
+    /// Takes this job if it is in the queue.
     pub fn take(&mut self, id: JobId) -> Option<JobId> {
         [&mut self.on_demand_checks, &mut self.others]
             .into_iter()
@@ -43,18 +43,18 @@ impl Queue {
             })
     }
 
-    /// Forgets all of them.
+    /// Removes all jobs.
     pub fn clear(&mut self) {
         self.on_demand_checks.clear();
         self.others.clear();
     }
 
-    /// How many there are.
+    /// Returns the number of jobs.
     pub fn len(&self) -> usize {
         self.on_demand_checks.len() + self.others.len()
     }
 
-    /// Whether there are none.
+    /// Checks whether the queue is empty.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -1,4 +1,4 @@
-//! How a bundle stands that somebody has added or changed, and what those offer that are there.
+//! Readiness of bundles that a user has added or changed, and the catalogues of joined bundles.
 
 use std::collections::BTreeSet;
 
@@ -9,8 +9,9 @@ use super::bundles::Bundle;
 use super::children::{Child, ChildState};
 
 impl State {
-    /// How the bundle of this name stands; `None` when nobody wants or knows one. What is said of it is of the very
-    /// process that is wanted now: an older one that goes on beside it is told apart.
+    /// Returns the readiness of the bundle with this name, or `None` if it is neither wanted nor
+    /// known. It describes the process that is wanted now, and distinguishes it from an older one
+    /// that is still running.
     pub fn readiness(&self, name: &str) -> Option<BundleReadiness> {
         let (child, bundle) = (self.children.get(name), self.bundles.get(name));
         if child.is_none() && bundle.is_none() {
@@ -33,7 +34,7 @@ impl State {
         })
     }
 
-    /// What the bundles offer that are there and heard.
+    /// Returns the catalogues of all ready bundles.
     pub fn offers(&self) -> Vec<Offer> {
         let there = self.bundles.iter().filter(|(_, it)| it.is_heard());
         let offer = |(name, bundle): (&String, &Bundle)| {
@@ -46,7 +47,7 @@ impl State {
         there.filter_map(offer).collect()
     }
 
-    /// The bundle judges as what it is now: nothing is wrong with it any more.
+    /// Clears the failure of a bundle that now judges in its current version.
     pub(super) fn is_ready(&mut self, name: &str) {
         let child = self.children.get_mut(name);
         if let Some(child) = child.filter(|it| it.is_what_is_wanted()) {
@@ -79,14 +80,14 @@ impl State {
 }
 
 impl Child {
-    /// Whether the process that has joined is the one that is wanted, and not an older one.
+    /// Checks whether the joined process is the wanted one, and not an older one.
     pub fn is_what_is_wanted(&self) -> bool {
         self.state == ChildState::Joined && self.upgrade.is_none()
     }
 }
 
 impl Bundle {
-    /// Whether it is there, has said what it checks, and stays.
+    /// Checks whether the bundle is connected, has sent its catalogue and is not draining.
     pub fn is_heard(&self) -> bool {
         self.session.is_some() && self.ready && !self.draining
     }

@@ -1,5 +1,6 @@
-//! What bundles say that they are: how much that may be, and how often it may change. Every change has
-//! everything judged again, so one that changes all the time is believed at growing intervals only.
+//! Registration of bundles: limits the size of a catalogue and the rate of its changes. Every
+//! change causes all files to be judged again, so a flapping bundle is accepted only at growing
+//! intervals.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -15,37 +16,38 @@ use super::required_set::VersionDigest;
 use super::types::Launch;
 use super::{Actions, State};
 
-/// Checkers of one bundle.
+/// Maximum number of checkers of one bundle.
 const MOST_CHECKERS: usize = 4096;
-/// Bytes of a catalogue: each result holds all of it that was demanded.
+/// Maximum size of a catalogue in bytes. Each result holds the whole demanded part of it.
 const MOST_OF_A_CATALOGUE: usize = 1 << 20;
-/// Bytes of a name in it: of a checker, a rule, a parameter, and so on.
+/// Maximum length in bytes of a name in a catalogue: of a checker, a rule, a parameter and so on.
 const MOST_OF_A_NAME: usize = 256;
 
-/// Names whose changes are remembered at once.
+/// Maximum number of names with remembered changes.
 const MOST_FLAPPING: usize = 1024;
-/// All bundles that were started by somebody, taken together: no bundle is called so.
+/// Key for all bundles together that the broker does not start itself. No bundle can have this
+/// name.
 const EVERYBODY: &str = "";
 
-/// How often a name has changed what it is.
+/// Number of registration changes of one name.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Changes {
-    /// Changes that were believed since it was last calm.
+    /// Accepted changes since the name was last stable.
     changes: u32,
-    /// The last of them.
+    /// Time of the last change.
     last: Duration,
 }
 
-/// What a bundle says that it is, and is not believed yet.
+/// Registration of a bundle that is not accepted yet.
 #[derive(Debug)]
 pub(super) struct Registration {
     catalogue: Arc<Catalogue>,
-    /// From when it is believed.
+    /// Time from which it is accepted.
     at: Duration,
 }
 
 impl Changes {
-    /// When the next change may be believed.
+    /// Returns the time from which the next change is accepted.
     fn next(&self, forgiven: u32, shortest: Duration, longest: Duration) -> Duration {
         let Some(beyond) = self.changes.checked_sub(forgiven) else {
             return self.last;
@@ -60,7 +62,7 @@ impl Changes {
 }
 
 impl State {
-    /// A bundle says what it checks.
+    /// Handles the catalogue of a bundle.
     pub(super) fn catalogue(&mut self, name: &str, catalogue: Catalogue, actions: &mut Actions) {
         if let Some(why) = unsound(&catalogue) {
             return self.bundle_fails(name, &why, actions);
@@ -83,7 +85,7 @@ impl State {
         }
     }
 
-    /// Takes what bundles have said for true whose pause is over.
+    /// Accepts all registrations after the end of their pause.
     pub(super) fn accept_registrations(&mut self, actions: &mut Actions) {
         let now = self.now;
         let due = self.bundles.iter_mut().filter_map(|(name, bundle)| {
@@ -116,7 +118,8 @@ impl State {
         }
     }
 
-    /// Keeps what a restless bundle says for later. It may not judge as what it no longer is.
+    /// Keeps the registration of a flapping bundle for later. Until then the bundle must not judge
+    /// under its old registration.
     fn distrust(&mut self, name: &str, said: Registration, actions: &mut Actions) {
         let changes = self.changes.get(name).map_or(0, |it| it.changes);
         let pause = said.at.saturating_sub(self.now).as_secs_f64();
@@ -144,7 +147,7 @@ impl State {
         self.fail_missing();
     }
 
-    /// What a bundle would judge as.
+    /// Returns the version digest that the bundle would judge with.
     pub(super) fn version_digest_of(
         &self,
         name: &str,
@@ -156,12 +159,13 @@ impl State {
         VersionDigest::of(&bundle.version, catalogue, launch.map(Launch::started))
     }
 
-    /// When a change of this bundle may be believed.
+    /// Returns the time from which a change of this bundle is accepted.
     fn accepted_from(&self, name: &str, bundle: &Bundle) -> Duration {
         let settings = &self.settings;
         let started = bundle.launch.map(Launch::started);
         if self.children.contains_key(name) && bundle.accepted_spec != started {
-            // The change is not its own: somebody has changed what is started.
+            // The bundle did not cause the change: the user has changed the program that the broker
+            // starts.
             return self.now;
         }
         let of = |name: &str, forgiven: u32, longest: Duration| {
@@ -175,7 +179,8 @@ impl State {
             return own;
         }
         let all = settings.changes_forgiven.saturating_mul(8);
-        // For all of them no pause grows long: an honest newcomer pays for the others.
+        // The pause of the common key stays short, because a well-behaved new bundle also waits for
+        // it.
         own.max(of(EVERYBODY, all, settings.distrust * 4))
     }
 
@@ -195,7 +200,8 @@ impl State {
         }
     }
 
-    /// Why a bundle that is there is not asked: it is not believed for the time being.
+    /// Returns the reason why a joined bundle gets no tasks: it is distrusted for the time being.
+    /// `None` if it gets tasks.
     pub(super) fn is_flapping(&self, name: &str, bundle: &Bundle) -> Option<String> {
         bundle.registered.as_ref()?;
         let in_the_registry = bundle.session.is_some() && bundle.origin.is_some();
@@ -203,7 +209,7 @@ impl State {
     }
 }
 
-/// Why a catalogue is none, if so.
+/// Returns the reason why a catalogue is invalid, or `None`.
 fn unsound(catalogue: &Catalogue) -> Option<String> {
     let ids: BTreeSet<&str> = catalogue.checkers.iter().map(|it| &*it.id).collect();
     if catalogue.checkers.len() > MOST_CHECKERS {
@@ -230,7 +236,7 @@ fn unsound(catalogue: &Catalogue) -> Option<String> {
     ))
 }
 
-/// Whatever results and people call a thing by.
+/// Returns all names of a catalogue that results and users refer to.
 fn names(catalogue: &Catalogue) -> impl Iterator<Item = &str> {
     let checkers = catalogue.checkers.iter().flat_map(|checker| {
         let params = checker.params.iter().map(|param| param.name.as_str());
@@ -243,7 +249,7 @@ fn names(catalogue: &Catalogue) -> impl Iterator<Item = &str> {
         .chain(checkers)
 }
 
-/// Roughly the memory that a catalogue holds.
+/// Estimates the memory that a catalogue occupies.
 fn catalogue_weight(catalogue: &Catalogue) -> usize {
     let texts = |texts: &[&str]| texts.iter().map(|text| 24 + text.len()).sum::<usize>();
     let kinds = |kinds: &[FileKind]| size_of_val(kinds);

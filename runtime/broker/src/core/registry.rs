@@ -1,5 +1,5 @@
-//! The roster: the bundles that must judge, whether they are there or not. It lasts over restarts,
-//! and every change of it begins a new epoch.
+//! Registry of required bundles, whether or not they have joined. It survives restarts, and every
+//! change of it begins a new epoch.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -18,17 +18,17 @@ use super::required_set::{
 use super::types::Judged;
 use super::{Actions, State};
 
-/// The seats by kind of file, made anew with every epoch.
+/// The requirements by kind of file. They are computed again with every epoch.
 pub(super) type Requirements = BTreeMap<FileKind, Arc<[Requirement]>>;
 
 impl State {
-    /// The epoch of who must judge.
+    /// Returns the current epoch of the required bundles.
     pub fn epoch(&self) -> Epoch {
         self.epoch
     }
 
-    /// Puts in what the journal knows of a bundle. Children that nobody wants any more are struck
-    /// when it is known which are wanted.
+    /// Adds a bundle from the journal. Unwanted children are removed as soon as the wanted children
+    /// are known.
     pub fn remember_member(&mut self, member: Member) {
         let bundle = Bundle {
             version_digest: member
@@ -46,7 +46,8 @@ impl State {
         self.begin_epoch();
     }
 
-    /// Children that are bundles are on the roster as long as they are children, seen or not.
+    /// Adds all child bundles to the registry. They stay there as long as they are children, even
+    /// if they never joined.
     pub(super) fn enrol_children(&mut self, actions: &mut Actions) {
         let children = self.children.iter();
         let wanted: BTreeSet<String> = children
@@ -71,7 +72,7 @@ impl State {
                 note: "it has never joined".to_owned(),
                 ..Bundle::default()
             });
-            // One that is not there would be started by the manifest as it is now.
+            // A bundle that has not joined would be started from the current manifest.
             if let (None, Some(catalogue)) = (bundle.session, &bundle.catalogue) {
                 let child = self.children.get(&name).map(|it| it.spec.digest());
                 bundle.version_digest = Some(VersionDigest::of(&bundle.version, catalogue, child));
@@ -83,7 +84,7 @@ impl State {
         self.begin_epoch();
     }
 
-    /// A process that was told to go is replaced by the next one of its name, which is wanted again.
+    /// Lets a draining process be replaced by the next one of its name, which is wanted again.
     fn let_leave(&mut self, name: &str) {
         let now = self.now;
         let Some(bundle) = self.bundles.get_mut(name).filter(|it| it.draining) else {
@@ -100,7 +101,7 @@ impl State {
         }
     }
 
-    /// A bundle has said what it offers: from now on it must judge, until it leaves.
+    /// Registers a bundle with its catalogue. From now on it is required until it leaves.
     pub(super) fn enrol(&mut self, name: &str, actions: &mut Actions) {
         let supervised = self.children.contains_key(name);
         let Some(bundle) = self.bundles.get(name) else {
@@ -133,11 +134,12 @@ impl State {
             actions.extend(bundle.as_member(name).map(Action::Enrol));
             self.begin_epoch();
         }
-        // Also when it has only come back: what was judged without it is not settled.
+        // This also applies to a bundle that returns, because jobs that finished without it are not
+        // settled.
         self.reseat = true;
     }
 
-    /// Takes a bundle off the roster, if it is on it.
+    /// Removes a bundle from the registry.
     pub(super) fn strike(&mut self, name: &str, actions: &mut Actions) {
         let Some(bundle) = self.bundles.remove(name) else {
             return;
@@ -149,10 +151,10 @@ impl State {
         }
     }
 
-    /// A person wants a bundle off the roster.
+    /// Removes a bundle from the registry on request of a user.
     ///
     /// # Errors
-    /// Why not, for that person.
+    /// Returns the reason for the user if this is not possible.
     pub(super) fn remove_bundle(
         &mut self,
         name: &str,
@@ -177,7 +179,7 @@ impl State {
         Ok(format!("{name} need not judge any more"))
     }
 
-    /// Who must judge, or what is demanded of them, has changed.
+    /// Begins a new epoch, because the required bundles or the demand on them has changed.
     pub(super) fn begin_epoch(&mut self) {
         self.epoch = self.epoch.next();
         let kinds = FileKind::ALL.into_iter();
@@ -187,7 +189,7 @@ impl State {
         self.reseat = true;
     }
 
-    /// The bundles that must judge files of a kind, each with its checkers, by name.
+    /// Returns the required bundles for files of a kind with their checkers, by name.
     fn requirements_for(&self, kind: FileKind) -> Vec<Requirement> {
         let mut requirements: BTreeMap<String, Requirement> = BTreeMap::new();
         for (name, bundle) in &self.bundles {
@@ -209,12 +211,12 @@ impl State {
     }
 
     fn requirement_of(&self, name: &str, bundle: &Bundle, kind: FileKind) -> Option<Requirement> {
-        // Whoever leaves is off the roster, and no shadow is on it.
+        // A draining bundle is no longer in the registry, and a shadow never is.
         bundle.origin?;
         self.place_of(name, bundle, kind)
     }
 
-    /// What a bundle would have to look at in files of a kind.
+    /// Returns the requirement that a bundle would have for files of a kind.
     pub(super) fn place_of(
         &self,
         name: &str,
@@ -241,7 +243,8 @@ impl State {
         })
     }
 
-    /// Bundles that the configuration names and nobody has seen. A shadow that is named by its name need not judge.
+    /// Returns the bundles that the configuration names and that were never seen. A named shadow is
+    /// not required.
     pub(super) fn missing_by_name(&self) -> Vec<String> {
         let means = |named: &str, name: &str, alias: &str| self.demand.means(named, name, alias);
         let is_shadow = |named: &str| {
@@ -252,7 +255,7 @@ impl State {
             let mut bundles = self.bundles.iter();
             bundles.any(|(name, bundle)| {
                 let alias = bundle.catalogue.as_ref().map_or("", |it| it.alias.as_str());
-                // Who leaves, or looks without weight, does not judge.
+                // Draining bundles and shadows do not count.
                 let judges = bundle.catalogue.is_some() && bundle.origin.is_some();
                 judges && means(named, name, alias)
             })
@@ -267,7 +270,8 @@ impl State {
         self.requirements.get(&kind).cloned().unwrap_or_default()
     }
 
-    /// Whether a verdict was given under the configuration in force by those who must judge.
+    /// Checks whether a verdict was given under the current configuration by the bundles that are
+    /// required now.
     pub(super) fn stands(&self, kind: FileKind, judged: &Judged) -> bool {
         let requirements = self.requirements(kind);
         let same = |(requirement, required_bundle): (&Requirement, &RequiredBundle)| {
@@ -280,8 +284,8 @@ impl State {
             && requirements.iter().zip(&judged.required_set.0).all(same)
     }
 
-    /// Whether a seat has spoken its last word: as what it is now, or as one that is not there and
-    /// for which nobody waits.
+    /// Checks whether a requirement is met. Either the bundle answered with its current version
+    /// digest, or it is missing and waiting for it is useless.
     fn is_served_by(
         &self,
         requirement: &Requirement,
@@ -293,7 +297,7 @@ impl State {
         }
     }
 
-    /// Those who judged a job.
+    /// Returns the required set of a job.
     pub(super) fn required_set(tasks: &BTreeMap<String, Task>) -> Arc<RequiredSet> {
         let required_bundle = |(name, task): (&String, &Task)| RequiredBundle {
             name: name.clone(),
@@ -302,7 +306,7 @@ impl State {
         Arc::new(RequiredSet(tasks.iter().map(required_bundle).collect()))
     }
 
-    /// Queues every file whose verdict was given under another configuration or by others.
+    /// Queues every file with a verdict from another configuration or another required set.
     pub(super) fn requeue_outdated(&mut self) {
         if !self.may_judge() {
             return;
@@ -322,8 +326,8 @@ impl State {
         }
     }
 
-    /// After a change of the roster: jobs under way get the jury that is demanded now, and verdicts
-    /// of other juries are outdated.
+    /// Applies a change of the registry. Active jobs get the current required set, and verdicts of
+    /// other required sets become outdated.
     pub(super) fn follow_registry(&mut self, actions: &mut Actions) {
         if !std::mem::take(&mut self.reseat) {
             return;
@@ -335,7 +339,7 @@ impl State {
         self.fail_missing();
     }
 
-    /// Gives a job the jury that is demanded now. What those have said who stay is kept.
+    /// Gives a job the current required set. Answers of bundles that remain in it are kept.
     pub(super) fn reseat(&mut self, id: JobId, actions: &mut Actions) {
         let Some(job) = self.jobs.get(&id) else {
             return;
@@ -380,11 +384,11 @@ impl State {
         if job.tasks.values().any(|task| !task.is_over()) {
             job.stage = JobStage::Checking;
             if job.is_slim {
-                // Its documents have left the bus, and a bundle is to read them now.
+                // A bundle must read its documents, but they have left the bus.
                 return self.begin_anew(id, actions);
             }
         }
-        // Nothing is given out or stored before every job has followed.
+        // All jobs are adapted before any task is sent or any result is stored.
         self.finish_if_over(id);
     }
 
@@ -402,7 +406,7 @@ impl State {
         }
     }
 
-    /// How long nobody of this name has been there.
+    /// Returns how long a bundle has been missing, or `None` if it is connected.
     pub(super) fn away_for(&self, bundle: &Bundle) -> Option<Duration> {
         let since = bundle.away_since.filter(|_| bundle.session.is_none())?;
         Some(self.now.saturating_sub(since))

@@ -1,4 +1,5 @@
-//! Which reporters have not yet reported a verdict, for clients that wait for reports.
+//! Missing reports: finds the reporters that have not reported a verdict yet, for clients that wait
+//! for reports.
 
 use std::collections::BTreeSet;
 
@@ -8,11 +9,11 @@ use super::State;
 use super::files::FileId;
 
 impl State {
-    /// The reporters that are to have the newest result of a file and have not said that its report is written, each
-    /// with why. A reporter counts when it is there, or is to be kept running.
+    /// Returns the reporters that have not confirmed their report of a file's newest result, each
+    /// with the reason. A reporter counts if it is connected or if the broker keeps it running.
     pub(super) fn unreported(&self, id: FileId) -> Vec<String> {
         let judged = self.files.get(id).and_then(|entry| entry.judged.as_ref());
-        // Where there is no result, there is nothing to report.
+        // Without a result there is no report.
         let Some(job) = judged.filter(|it| it.is_written()).map(|it| it.job) else {
             return Vec::new();
         };

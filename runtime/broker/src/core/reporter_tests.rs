@@ -1,4 +1,4 @@
-//! What reporters are told of files that go, whoever dies in between.
+//! Tests of the messages to reporters about removed files, with crashes in between.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use crate::InForce;
 
 const TEXT: &str = "text";
 
-/// A state machine that knows one judged file from the journal.
+/// A state machine with one judged file from the journal.
 struct Requests {
     state: State,
     path: Arc<Path>,
@@ -23,7 +23,7 @@ struct Requests {
 }
 
 impl Requests {
-    /// `delivered`: the journal says that the reporter has it.
+    /// `delivered` means that the reporter has the result according to the journal.
     fn new(delivered: bool) -> Requests {
         let in_force = InForce::new(None, SearchPath::default()).unwrap();
         let mut state = State::new(Settings::default(), in_force.digest, in_force.demand());
@@ -69,7 +69,7 @@ impl Requests {
         (session, self.event(Event::Hello { session, hello }))
     }
 
-    /// The manifest of the reporter has come, or has changed. Returns which start follows.
+    /// Adds or changes the manifest of the reporter. Returns the resulting launch.
     fn wants(&mut self, version: u8) -> Launch {
         let specs = vec![spec(version)];
         let actions = self.event(Event::Children { specs });
@@ -84,7 +84,8 @@ impl Requests {
         self.state.settings.collect = Duration::MAX;
     }
 
-    /// The verdict is one of those who must judge now: nobody. It is about the bytes that are there.
+    /// Makes the verdict valid: no bundle is required now, and the verdict is about the present
+    /// bytes.
     fn makes_it_stand(&mut self) {
         let config = self.state.config;
         let path = self.path.clone();
@@ -102,7 +103,7 @@ impl Requests {
         actions
     }
 
-    /// It has gone, and the journal does not know it yet.
+    /// Removes the file. The journal does not yet contain this.
     fn vanish_unrecorded(&mut self) -> Vec<Action> {
         let path = self.path.clone();
         self.event(Event::Vanished { path })
@@ -177,14 +178,15 @@ fn a_reporter_that_is_there_is_told_at_once() {
     assert!(!is_over(&requests.say(session, withdrawn())), "only once");
 }
 
-/// Were the broker killed in between, the next one would take the report for there.
+/// Checks that a report is withdrawn only after the journal has recorded it. If the broker were
+/// killed in between, the next one would treat the report as present.
 #[test]
 fn nothing_is_taken_back_that_the_journal_knows_to_be_there() {
     let mut requests = Requests::new(true);
     let (session, _) = requests.join();
     let actions = requests.vanish_unrecorded();
     assert!(!is_told(&actions), "{actions:?}");
-    // It comes back, and goes again.
+    // The file returns and is removed again.
     let path = requests.path.clone();
     let stamp = Stamp::default();
     let actions = requests.event(Event::Settled { path, stamp });
@@ -312,7 +314,8 @@ fn a_newer_result_waits_until_the_one_before_it_has_arrived() {
 
 #[test]
 fn a_reporter_that_is_upgraded_finishes_what_it_has_begun() {
-    // It goes as it was told, or is killed meanwhile: its end may be known before its session's.
+    // The reporter leaves as requested or is killed meanwhile. The end of the process may be known
+    // before the end of its session.
     let leaves: fn(&mut Requests, SessionId, Launch) -> Vec<Action> =
         |requests, session, _| requests.say(session, FromPeer::Leaving);
     let is_killed: fn(&mut Requests, SessionId, Launch) -> Vec<Action> =
@@ -351,7 +354,8 @@ fn an_upgraded_reporter_finishes(ends: fn(&mut Requests, SessionId, Launch) -> V
     assert!(actions.iter().any(given), "{actions:?}");
 }
 
-/// Further judged files, each with as many findings as said, that the reporter does not have.
+/// Adds further judged files with these numbers of findings. The reporter does not have their
+/// results.
 fn more(requests: &mut Requests, findings: &[u64]) {
     for (number, count) in (8..).zip(findings) {
         let path: Arc<Path> = Path::new(&format!("/x/{number}.xodr")).into();
@@ -367,7 +371,7 @@ fn more(requests: &mut Requests, findings: &[u64]) {
     }
 }
 
-/// The jobs whose results are sent.
+/// Returns the jobs whose results are sent.
 fn sent(actions: &[Action]) -> Vec<u64> {
     let jobs = actions.iter().filter_map(|it| match it {
         Action::Deliver { delivery, .. } => Some(delivery.job.0),
@@ -395,8 +399,8 @@ fn results_with_many_findings_travel_one_after_the_other() {
     assert_eq!(sent(&requests.say(session, written(11))), [12]);
 }
 
-/// Large results are read back and kept, and there may be many reporters: a broker with eight of them took
-/// 600 MiB while a bundle reported far too much.
+/// Checks the limit for large results, which are read back and kept in memory. There may be many
+/// reporters: a broker with eight of them took 600 MiB while a bundle reported far too much.
 #[test]
 fn few_reporters_have_a_large_result_at_once() {
     let mut requests = Requests::new(true);
@@ -516,7 +520,7 @@ fn a_result_that_cannot_be_read_back_is_said_and_makes_room_for_the_next() {
     assert_eq!(sent(&actions), [9]);
 }
 
-/// Who is to take back what it said, as the journal is told.
+/// Returns the reporters that must withdraw their report, as recorded in the journal.
 fn named(actions: &[Action]) -> Vec<String> {
     let names = actions.iter().find_map(|it| match it {
         Action::Withdraw { reporters, .. } => Some(reporters.clone()),
@@ -564,7 +568,8 @@ fn a_reporter_that_leaves_goes_without_a_word_and_gets_the_rest_when_it_comes_ba
     assert_eq!(sent(&requests.join().1), [7]);
 }
 
-/// A reporter, told to take something back or sent a result, and what happens to it after a while.
+/// Checks whether a reporter that was told to withdraw a report is killed at its limit and just
+/// after it. `owes` is whether it was told, `beats` whether it sends heartbeats.
 fn waited(owes: bool, beats: bool, limit: fn(&Settings) -> Duration) -> Vec<bool> {
     let mut requests = Requests::new(true);
     let launch = requests.wants(1);
@@ -676,7 +681,7 @@ fn result_that_cannot_be_read_back_is_delivered_later() {
     assert_eq!(sent(&requests.state.handle(after, Event::Tick)), [7]);
 }
 
-/// A client waits for the verdict and the reports; what it is answered.
+/// Lets a client wait for the verdict and the reports. Returns the resulting actions.
 fn waits(requests: &mut Requests, timeout: Option<Duration>) -> Vec<Action> {
     let path = requests.path.clone();
     let reports = true;

@@ -1,4 +1,4 @@
-//! Reporters: who is there, what they say, and what they are to take back.
+//! Reporters: their sessions, their messages and the reports that they must withdraw.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::Path;
@@ -16,7 +16,7 @@ use super::retries::Retries;
 use super::types::{Launch, Reported, SessionId};
 use super::{Actions, State};
 
-/// A reporter by name.
+/// A reporter, identified by its name.
 #[derive(Debug, Default)]
 pub(super) struct Reporter {
     pub name: String,
@@ -26,35 +26,35 @@ pub(super) struct Reporter {
     pub pid: u32,
     pub launch: Option<Launch>,
     pub capacity: usize,
-    /// Sent and not acknowledged.
+    /// Results that were sent and not acknowledged yet.
     pub active: BTreeMap<JobId, Sent>,
-    /// Files whose newest result is to be sent.
+    /// Files with a newest result that must be sent.
     pub queue: VecDeque<FileId>,
-    /// Files that have gone and whose reports are to be taken back.
+    /// Removed files with reports that must be withdrawn.
     pub void: BTreeSet<Arc<Path>>,
-    /// Those of which it was told.
+    /// Removed files among them that the reporter already knows of.
     pub voiding: BTreeSet<Arc<Path>>,
-    /// Older processes that finish what they have begun, and the files that it is about.
+    /// Older processes that finish their work, each with the files that it is about.
     pub finishing: BTreeMap<SessionId, BTreeSet<FileId>>,
     pub heard: Duration,
     pub moved: Duration,
     pub done: u64,
     /// Reports that failed.
     pub retries: Retries,
-    /// Reports that it could not take back.
+    /// Number of reports that it could not withdraw.
     pub not_withdrawn: u64,
     pub note: String,
 }
 
 impl Reporter {
-    /// Whether something was sent that it has not answered.
+    /// Checks whether the reporter has not answered a message yet.
     pub fn owes(&self) -> bool {
         !self.active.is_empty() || !self.voiding.is_empty()
     }
 
-    /// Takes the next file out of the queue. A file of which a result is under way waits for its
-    /// turn: results are read back side by side, and the older one must not come last. So does one whose former
-    /// report is still to be taken back.
+    /// Takes the next file out of the queue. A file with a result in transit waits. Results are
+    /// read back in parallel, and an older result must not arrive last. A file with an old report
+    /// that must still be withdrawn waits as well.
     pub fn next_in_queue(&mut self, files: &Files) -> Option<FileId> {
         let under_way = |file: &FileId| {
             self.active.values().any(|sent| sent.file == *file)
@@ -67,12 +67,13 @@ impl Reporter {
         self.queue.remove(at)
     }
 
-    /// Reports that are not written or not taken back.
+    /// Returns the number of reports that are not written or not withdrawn.
     pub fn unreported(&self) -> u64 {
         self.retries.len() as u64 + self.not_withdrawn
     }
 
-    /// What a person should know of it: reports that are missing and why, or why it is down.
+    /// Returns the remark for the user: the missing reports and their reason, or the reason why it
+    /// is down.
     pub fn remark(&self, now: Duration) -> String {
         let missing = self.unreported();
         if missing == 0 {
@@ -85,7 +86,7 @@ impl Reporter {
         format!("{missing} not reported: {}{again}", self.note)
     }
 
-    /// A session is over: what was said in it counts no more.
+    /// Discards the state of a session that has ended.
     fn forget_session(&mut self) {
         self.active.clear();
         self.queue.clear();
@@ -99,7 +100,7 @@ impl State {
         self.reporters.iter().find(|reporter| reporter.name == name)
     }
 
-    /// The index of a reporter, which is made when it is new.
+    /// Returns the index of a reporter. A new reporter is added.
     pub fn reporter_index(&mut self, name: &str) -> u32 {
         let found = self
             .reporters
@@ -150,8 +151,9 @@ impl State {
         self.deliver(index, actions);
     }
 
-    /// A newer process of the same name takes over. The older one finishes what it has begun, and
-    /// until it has gone no newer result of those files is given out: it must not be overwritten.
+    /// Lets a newer process of the same name take over. The older process finishes its work. Until
+    /// it has ended, no newer results of its files are sent, because it could overwrite their
+    /// reports.
     fn reporter_is_replaced(
         &mut self,
         index: u32,
@@ -176,7 +178,7 @@ impl State {
         });
     }
 
-    /// A process that was told to go has gone.
+    /// Handles the end of a process that was told to leave.
     pub(super) fn retired_has_gone(&mut self, session: SessionId, actions: &mut Actions) {
         let finished = |it: &mut Reporter| it.finishing.remove(&session).is_some();
         if let Some(index) = self.reporters.iter_mut().position(finished) {
@@ -203,8 +205,8 @@ impl State {
         }
     }
 
-    /// A file has gone: whoever has, or may have, reported about it is to take that back. Returns
-    /// their names.
+    /// Handles a removed file. Every reporter that has or may have reported it must withdraw its
+    /// report. Returns the names of these reporters.
     pub(super) fn void_reports(&mut self, id: FileId) -> Vec<String> {
         let Some(entry) = self.files.get(id) else {
             return Vec::new();
@@ -218,7 +220,7 @@ impl State {
             reporter.retries.forget(id);
             let pending =
                 reporter.void.contains(&entry.path) || reporter.voiding.contains(&entry.path);
-            // A former broker may have sent it and died before it heard of the report.
+            // A former broker may have sent the result and died before the acknowledgement.
             let here = reporter.session.is_some() || self.children.contains_key(&reporter.name);
             if under_way || pending || entry.delivered.iter().any(has) || (judged && here) {
                 reporter.void.insert(entry.path.clone());
@@ -228,8 +230,7 @@ impl State {
         names
     }
 
-    /// Puts in what the journal knows of a file that has gone and of which a reporter may still
-    /// hold a report.
+    /// Adds a removed file from the journal. A reporter may still have a report of it.
     pub fn remember_void(&mut self, path: &Arc<Path>, reporter: &str) {
         let index = self.reporter_index(reporter);
         if let Some(reporter) = self.reporters.get_mut(index as usize) {
@@ -237,7 +238,7 @@ impl State {
         }
     }
 
-    /// Something from a reporter.
+    /// Handles a message of a reporter.
     pub(super) fn reporter_says(&mut self, name: &str, message: FromPeer, actions: &mut Actions) {
         let now = self.now;
         let index = self.reporter_index(name);
@@ -284,7 +285,7 @@ impl State {
     }
 
     pub(super) fn watch_reporters(&mut self, actions: &mut Actions) {
-        // One that had a large result may have gone.
+        // A reporter with a large result may have disconnected.
         self.deliver_what_waited(actions);
         self.report_again(actions);
         let limit = self.settings.job_deadline;

@@ -1,4 +1,4 @@
-//! Who must judge a file, and who did.
+//! Required sets: the bundles that must judge a file, and the bundles that did.
 
 use std::sync::Arc;
 
@@ -6,13 +6,13 @@ use qcbus_document::FileKind;
 use qcbus_messages::Catalogue;
 use sha2::{Digest as _, Sha256};
 
-/// Counts up with every change of who must judge, or of what is demanded of them. The upper half
-/// is above all that the journal knows, so that a number never comes back.
+/// Counter of changes of the required bundles or of the demand on them. The upper half exceeds all
+/// values in the journal, so a number never repeats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Epoch(pub u64);
 
 impl Epoch {
-    /// The first epoch of a broker's numbers (`Settings::numbers`).
+    /// Returns the first epoch of a broker's numbers (`Settings::numbers`).
     pub fn first_of(numbers: u64) -> Epoch {
         Epoch(numbers << 32)
     }
@@ -22,13 +22,13 @@ impl Epoch {
     }
 }
 
-/// Tells apart versions and catalogues of a bundle: with another one it judges otherwise.
+/// Version digest of a bundle. It distinguishes versions and catalogues that may judge differently.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct VersionDigest(pub u64);
 
 impl VersionDigest {
-    /// The mark of a version with what it offers; of a child, with what its manifest starts: scripts
-    /// and arguments change without a version.
+    /// Returns the digest of a version and its catalogue. For a child it includes the program that
+    /// its manifest starts, because scripts and arguments change without a new version.
     pub fn of(version: &str, catalogue: &Catalogue, started: Option<u64>) -> VersionDigest {
         let mut hash = Hash::default();
         hash.list(started, |hash, it| hash.0.update(it.to_le_bytes()));
@@ -41,7 +41,7 @@ impl VersionDigest {
             hash.list(checker.rule_uids.iter(), |hash, uid| hash.text(uid));
             hash.0.update([u8::from(checker.default_on)]);
             hash.kinds(&checker.kinds);
-            // Another default is another result.
+            // Another default value gives another result.
             hash.list(&checker.params, |hash, param| {
                 hash.text(&param.name);
                 hash.text(&param.default);
@@ -53,8 +53,8 @@ impl VersionDigest {
     }
 }
 
-/// A hash over parts none of which can be taken for another: a text begins with its length, and
-/// each part of a list with a mark.
+/// Hash over parts that cannot be confused with each other. A text begins with its length, and each
+/// part of a list with a marker byte.
 #[derive(Default)]
 struct Hash(Sha256);
 
@@ -77,23 +77,24 @@ impl Hash {
     }
 }
 
-/// One bundle that had to judge a file.
+/// One required bundle of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RequiredBundle {
     /// Its name.
     pub name: String,
-    /// What it judged as; `None`: it was not there.
+    /// Its version digest when it judged. `None` if the bundle was missing.
     pub version_digest: Option<VersionDigest>,
 }
 
-/// The bundles that had to judge a file, by name. A verdict stands as long as the same must.
+/// The required bundles of a file, by name. A verdict is valid as long as its required set stays
+/// the same.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct RequiredSet(pub Vec<RequiredBundle>);
 
 impl RequiredSet {
-    /// Nobody knows who judged: no verdict of this jury stands.
+    /// Returns an unknown required set. No verdict of this set is valid.
     pub fn unknown() -> RequiredSet {
-        // No peer may be called so.
+        // No peer may have this name.
         let name = "?".to_owned();
         RequiredSet(vec![RequiredBundle {
             name,
@@ -102,29 +103,30 @@ impl RequiredSet {
     }
 }
 
-/// A bundle that must judge files of a kind, as things are now.
+/// Requirement: a bundle that must currently judge files of one kind.
 #[derive(Debug, Clone)]
 pub(super) struct Requirement {
     pub name: String,
     pub version: String,
-    /// `None`: nobody has seen it, so nobody knows what it checks.
+    /// `None` if the bundle was never seen, so its checkers are unknown.
     pub catalogue: Option<Arc<Catalogue>>,
     pub version_digest: Option<VersionDigest>,
-    /// Indexes of the checkers that are to run.
+    /// Indexes of the checkers that must run.
     pub demanded: Arc<[u32]>,
 }
 
-/// What brought a bundle onto the roster.
+/// Reason why a bundle is in the registry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Origin {
-    /// A manifest, or it comes with the program: it leaves with its manifest.
+    /// It has a manifest or belongs to the program. It leaves the registry with its manifest.
     Supervised,
-    /// It was started by somebody and joined: it leaves by drain, or when somebody removes it.
+    /// It was started by another process and has joined. It leaves by draining or when a user
+    /// removes it.
     Joined,
 }
 
 impl Origin {
-    /// The word in the journal.
+    /// Returns the word for the journal.
     pub fn as_str(self) -> &'static str {
         match self {
             Origin::Supervised => "supervised",
@@ -132,23 +134,23 @@ impl Origin {
         }
     }
 
-    /// The origin of this word.
+    /// Returns the origin for a word of the journal.
     pub fn of(word: &str) -> Option<Origin> {
         let all = [Origin::Supervised, Origin::Joined];
         all.into_iter().find(|it| it.as_str() == word)
     }
 }
 
-/// A bundle on the roster, as the journal remembers it.
+/// Entry of the registry as stored in the journal.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Member {
     /// Its name.
     pub name: String,
     /// The version that joined last.
     pub version: String,
-    /// What it offered then, if that can still be read.
+    /// Its catalogue at that time, if that can still be read.
     pub catalogue: Option<Arc<Catalogue>>,
-    /// What brought it.
+    /// Reason for the entry.
     pub origin: Origin,
 }
 
@@ -163,7 +165,7 @@ mod tests {
 
     #[test]
     fn a_jury_that_nobody_knows_is_not_one_without_members() {
-        // That one is demanded where nobody checks a kind of file.
+        // The empty set is required for a kind of file that no bundle checks.
         assert_ne!(RequiredSet::unknown(), RequiredSet::default());
     }
 
@@ -218,7 +220,7 @@ mod tests {
             version_digests.push(VersionDigest::of("1", &changed, None));
         }
         assert_eq!(VersionDigest::of("1", &catalogue, None), version_digests[0]);
-        // All of a mark's bits tell them apart.
+        // All bits of a version digest must distinguish bundles.
         let halves = |shift: u32| {
             version_digests
                 .iter()

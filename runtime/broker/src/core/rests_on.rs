@@ -1,10 +1,10 @@
-//! What a file rests on: its map, catalogs that it takes entries from, scenarios that it is made of.
+//! Files that a file rests on: its map, its catalogs and the scenarios that it consists of.
 //!
-//! Accepted means that the file can be run, so the verdict on it is the worst of its own and of the files that
-//! it rests on. Those have verdicts of their own, which may come before or after it. A job whose bundles have
-//! answered waits for them, and moves them to the front of the queue. A verdict that was given without one of
-//! them, or with one that is another by now, is given anew. So the verdict does not depend on the order in
-//! which files came.
+//! An accepted file can be run. Therefore its verdict is the worst of its own verdict and the
+//! verdicts of the files that it rests on. Those verdicts may come earlier or later. A job with the
+//! answers of all bundles waits for them. It moves these files to the front of the queue. If a
+//! verdict was given without one of them, or one has changed, the verdict is given again. Thus it
+//! does not depend on the order of the files.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -18,16 +18,18 @@ use super::jobs::{ActiveJob, JobStage};
 use super::types::{Input, Judged, PreparedJob, Referenced, RestsOn};
 use super::{Actions, State};
 
-/// How long a job waits for the verdicts that its own rests on. What holds one up, such as a bundle that hangs,
-/// must not hold the places of all others: after this time the verdict is undetermined, until the missing
-/// verdict comes.
+/// Maximum time that a job waits for the verdicts that its own verdict rests on. A cause of delay,
+/// such as a hanging bundle, must not block the places of other jobs. After this time the verdict
+/// is undetermined until the missing verdict comes.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// The same in a run, which tells each verdict once, so that nobody would read a later one. No job takes longer.
+/// The same limit in a run. A run reports each verdict once, so a later verdict would be lost. No
+/// job takes longer.
 const PATIENCE_OF_A_RUN: Duration = Duration::from_secs(600);
 
 impl State {
-    /// Returns when a job whose bundles have answered may be stored: at once, unless it waits for the verdict on
-    /// a file that it rests on. Moves such files to the front of the queue.
+    /// Returns when a job with the answers of all bundles may be stored. This is at once, unless it
+    /// waits for the verdict on a file that it rests on. Moves such files to the front of the
+    /// queue.
     pub(super) fn storable_at(&mut self, id: JobId) -> Duration {
         let waited: Vec<Referenced> = self.awaited_by(id);
         for file in &waited {
@@ -42,13 +44,13 @@ impl State {
         }
     }
 
-    /// The files that a job rests on and whose verdicts are to be expected.
+    /// Returns the files that a job rests on if their verdicts are still expected.
     fn awaited_by(&self, id: JobId) -> Vec<Referenced> {
         let Some(job) = self.jobs.get(&id) else {
             return Vec::new();
         };
         if job.on_demand.is_some() {
-            // A client's run knows no verdicts of others.
+            // A client's own run does not know the verdicts on other files.
             return Vec::new();
         }
         let Some(prepared) = &job.prepared else {
@@ -59,10 +61,11 @@ impl State {
         awaited.cloned().collect()
     }
 
-    /// Whether a verdict on these bytes is to be expected.
+    /// Checks whether a verdict on these bytes is still expected.
     fn may_come(&self, file: &Referenced, prepared: &PreparedJob) -> bool {
         let Some(entry) = self.entry_of(&file.path) else {
-            // It is there, and the watcher has not told of it yet. A run knows all its files after its look.
+            // The file exists, but the watcher has not reported it yet. A run knows all its files
+            // after its scan.
             return !(self.settings.once && self.scanned);
         };
         let judged = entry.judged.as_ref();
@@ -74,8 +77,8 @@ impl State {
         }
     }
 
-    /// Whether a file waits itself for the verdict of a job, perhaps through others. Of files that rest on each
-    /// other one must come first.
+    /// Checks whether a file itself waits for the verdict of a job, directly or indirectly. In a
+    /// cycle of files one must come first.
     fn waits_for(&self, file: &Referenced, id: JobId) -> bool {
         let mut open = vec![file.path.clone()];
         let mut seen = Vec::new();
@@ -100,7 +103,7 @@ impl State {
         false
     }
 
-    /// A run also judges what its files rest on, wherever that lies.
+    /// Also judges the files that the files of a run rest on, regardless of their location.
     pub(super) fn judge_what_is_under(&mut self, prepared: &PreparedJob, actions: &mut Actions) {
         if !self.settings.once || self.settings.own_verdicts {
             return;
@@ -115,7 +118,7 @@ impl State {
         }
     }
 
-    /// The files that a job rests on, each with the verdict on it.
+    /// Returns the files that a job rests on, each with its verdict.
     pub(super) fn verdicts_under(&self, job: &ActiveJob) -> Vec<(Referenced, RestsOn)> {
         if job.on_demand.is_some() {
             return Vec::new();
@@ -132,7 +135,7 @@ impl State {
         let entry = self
             .entry_of(&file.path)
             .filter(|it| it.present && !it.stale);
-        // What others have judged who need not judge now counts for nobody.
+        // A verdict of bundles that are not required now does not count.
         let entry = entry.filter(|it| self.is_of_now(it));
         let judged = entry.and_then(|it| it.judged.as_ref());
         let judged = judged.filter(|it| is_of(it, file, prepared));
@@ -144,8 +147,8 @@ impl State {
         }
     }
 
-    /// Whether all that a verdict rests on still has the verdict that was counted in, given by those who must
-    /// judge now.
+    /// Checks whether all files that a verdict rests on still have the verdicts that were used.
+    /// These must come from the bundles that are required now.
     pub(super) fn rests_firmly(&self, judged: &Judged) -> bool {
         if self.settings.own_verdicts {
             return true;
@@ -162,7 +165,7 @@ impl State {
             .is_some_and(|all| all.iter().all(firm))
     }
 
-    /// Somebody waits for a verdict: those that it rests on come at once.
+    /// Moves the files that an awaited verdict rests on to the front of the queue.
     pub(super) fn hurry_under(&mut self, id: FileId) {
         let judged = self.files.get(id).and_then(|it| it.judged.clone());
         let under = judged
@@ -185,7 +188,8 @@ impl State {
         self.files.get(self.files.id(path)?)
     }
 
-    /// All files are known: jobs that waited for one which is none of them wait no longer.
+    /// Handles the end of the scan: all files are known, so no job waits for an unknown file any
+    /// more.
     pub(super) fn all_are_known(&mut self) {
         let waiting: Vec<JobId> = self.jobs.keys().copied().collect();
         for id in waiting {
@@ -193,8 +197,9 @@ impl State {
         }
     }
 
-    /// A broker may have been killed between a verdict and those of the files that rest on it: those that counted
-    /// in another one are given anew. So are those that rest on a file which is not judged any more.
+    /// Judges files again that have used an outdated verdict on another file. This happens if a
+    /// broker was killed between the two verdicts. Files that rest on a file without verdicts are
+    /// judged again as well.
     pub(super) fn count_again(&mut self) {
         let files = self.files.iter().filter(|(_, entry)| entry.present);
         let outdated = files.filter(|(_, entry)| {
@@ -210,7 +215,7 @@ impl State {
         }
     }
 
-    /// Whether a verdict counted in one on another file that has a different verdict by now.
+    /// Checks whether a verdict has used an outdated verdict on another file.
     pub(super) fn counted_otherwise(&self, judged: &Judged) -> bool {
         let mut under = judged.rests_on.iter().flatten();
         under.any(|it| {
@@ -219,8 +224,8 @@ impl State {
         })
     }
 
-    /// Whether a verdict counted in those on the files that a job with the same bytes would count in. A map is judged
-    /// no more, for instance, when its directory has become a symbolic link.
+    /// Checks whether a verdict rests on the same files as a job with the same bytes. For example,
+    /// a map is not judged any more when its directory has become a symbolic link.
     pub(super) fn rests_on_the_same(&self, judged: &Judged, prepared: &PreparedJob) -> bool {
         if self.settings.own_verdicts {
             return true;
@@ -240,7 +245,8 @@ impl State {
         self.files.enqueue(id, priority, self.now);
     }
 
-    /// The verdict on a file stands, or its job is over: jobs and clients that waited for it look again.
+    /// Handles a confirmed verdict or the end of a job. The jobs and clients that waited for it are
+    /// checked again.
     pub(super) fn verdict_has_come(&mut self, file: FileId, actions: &mut Actions) {
         for dependent in self.dependents_of(file) {
             match self.files.get(dependent).map(FileEntry::stage) {
@@ -254,8 +260,8 @@ impl State {
         }
     }
 
-    /// The broker stops, and no further file is judged: a job that waits for a verdict which does not come any more
-    /// ends without one of its own. The next broker judges its file.
+    /// Ends jobs that wait in vain because the broker stops and judges no further files. They end
+    /// without a verdict. The next broker judges their files.
     pub(super) fn end_held_up(&mut self, actions: &mut Actions) {
         let comes = |file: &Referenced| {
             let stage = self.entry_of(&file.path).map(FileEntry::stage);
@@ -268,7 +274,8 @@ impl State {
         }
     }
 
-    /// Whether the bundles have answered, and a job waits for the verdicts that its own rests on.
+    /// Checks whether a job has the answers of all bundles and waits for verdicts that its own
+    /// rests on.
     pub(super) fn is_held_up(&self, id: JobId) -> bool {
         let job = self.jobs.get(&id);
         job.is_some_and(|job| matches!(job.stage, JobStage::Finished(at) if at > self.now))
@@ -283,7 +290,8 @@ impl State {
         }
     }
 
-    /// A file has a verdict: files that rest on it and counted in another one are judged anew.
+    /// Handles a new verdict on a file. Files that rest on it and have used another verdict are
+    /// judged again.
     pub(super) fn counts_for_others(&mut self, file: FileId, now: &Judged) {
         let Some(path) = self.files.get(file).map(|entry| entry.path.clone()) else {
             return;
@@ -295,7 +303,7 @@ impl State {
             match *entry.stage() {
                 Stage::Active(job) => {
                     let job = self.jobs.get(&job);
-                    // Before that it asks for the verdict when it comes to its end.
+                    // In an earlier stage the job reads the verdict when it finishes.
                     let is_late = job.is_some_and(|job| {
                         job.stage == JobStage::Storing && referenced(job).any(|it| it.path == path)
                     });
@@ -323,8 +331,8 @@ fn referenced(job: &ActiveJob) -> impl Iterator<Item = &Referenced> {
     prepared.flat_map(|prepared| &prepared.rests_on)
 }
 
-/// Whether a verdict was given on the bytes that a job has read: those of the file, and those of what both depend
-/// on. The job may have read a newer part of a map whose verdict is of the older one.
+/// Checks whether a verdict belongs to the bytes that a job has read, including the common inputs.
+/// The job may have read a newer part of a map than the verdict.
 fn is_of(judged: &Judged, file: &Referenced, prepared: &PreparedJob) -> bool {
     let same = |input: &Input| {
         let mut read = prepared.inputs.iter();
@@ -334,14 +342,14 @@ fn is_of(judged: &Judged, file: &Referenced, prepared: &PreparedJob) -> bool {
     judged.digest == file.digest && judged.inputs.iter().all(same)
 }
 
-/// Whether a verdict is the one that was counted in.
+/// Checks whether a verdict is the one that was used.
 fn says(judged: &Judged, counted: &RestsOn) -> bool {
     judged.digest == counted.digest
         && Some(judged.verdict) == counted.verdict
         && judged.own_errors == counted.errors
 }
 
-/// Whether a verdict counted in another one on this file than it has now.
+/// Checks whether a verdict has used another verdict on this file than the present one.
 fn counts_otherwise(judged: &Judged, path: &Arc<Path>, now: &Judged) -> bool {
     let Some(rests_on) = &judged.rests_on else {
         return true;

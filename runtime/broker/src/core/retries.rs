@@ -1,4 +1,4 @@
-//! Reports that failed and are tried again: the disk may have had no room for a while.
+//! Retries of failed reports: for example, the disk may have been full for a while.
 
 use std::collections::BTreeSet;
 use std::ops::Bound::{Excluded, Unbounded};
@@ -6,36 +6,37 @@ use std::time::Duration;
 
 use super::files::FileId;
 
-/// Reports that are tried at once, to see whether the reporter can work again. There may be thousands.
+/// Number of reports that are retried at once to check whether the reporter works again. There may
+/// be thousands of failed reports.
 const PROBES: usize = 16;
 
 /// Longest pause between two tries.
 const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 
-/// What one reporter could not report. After a pause some of it is tried again; all of it as soon as one try
+/// Failed reports of one reporter. Some are retried after a pause, and all as soon as one retry
 /// succeeds.
 #[derive(Debug, Default)]
 pub(super) struct Retries {
     waiting: BTreeSet<FileId>,
     probed: BTreeSet<FileId>,
-    /// The last file that was probed: the others have their turn first.
+    /// The last file that was retried. The other files come first in the next round.
     last: FileId,
     pause: Duration,
     due: Option<Duration>,
 }
 
 impl Retries {
-    /// Reports that are not written.
+    /// Returns the number of reports that are not written.
     pub fn len(&self) -> usize {
         self.waiting.len() + self.probed.len()
     }
 
-    /// When the next of them is tried.
+    /// Returns the time of the next retry.
     pub fn due(&self) -> Option<Duration> {
         self.due
     }
 
-    /// A report failed. Returns whether it was none of those that had failed before.
+    /// Records a failed report. Returns whether it had not failed before.
     pub fn failed(&mut self, file: FileId, now: Duration, first_pause: Duration) -> bool {
         let is_new = !self.probed.remove(&file);
         self.waiting.insert(file);
@@ -46,7 +47,7 @@ impl Retries {
         is_new
     }
 
-    /// A report is written. Returns the files to be tried now.
+    /// Records a written report. Returns the files to retry now.
     pub fn written(&mut self, file: FileId) -> BTreeSet<FileId> {
         if !self.probed.remove(&file) {
             self.forget(file);
@@ -56,15 +57,15 @@ impl Retries {
         std::mem::take(&mut self.waiting)
     }
 
-    /// A file has gone, or its newer result is to be reported.
+    /// Removes a file because it was removed, or because a newer result will be reported.
     pub fn forget(&mut self, file: FileId) {
         self.waiting.remove(&file);
         self.probed.remove(&file);
     }
 
-    /// The files to be tried again at this moment.
+    /// Returns the files to retry now.
     pub fn probes(&mut self, now: Duration) -> Vec<FileId> {
-        // Those that were probed may all have gone.
+        // All files of the last round may have been removed.
         let is_due = self.due.map_or(self.probed.is_empty(), |due| due <= now);
         if !is_due || self.waiting.is_empty() {
             return Vec::new();

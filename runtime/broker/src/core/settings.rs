@@ -1,80 +1,82 @@
-//! Numbers that shape the state machine.
+//! Settings of the state machine.
 
 use std::time::Duration;
 
-/// Numbers that shape the state machine. All have defaults.
+/// Numeric settings of the state machine. All have defaults.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// Number of this broker's start.
+    /// Sequence number of this broker's start.
     pub generation: u64,
-    /// The upper half of every number of a job and an epoch: above that of all that the journal knows. The
-    /// generation alone would come back with a new runtime directory, as after a restart of the machine,
-    /// and whoever has the result of a job of that number would not be given this one's.
+    /// Upper half of every job and epoch number. It exceeds all numbers in the journal. The
+    /// generation alone would repeat with a new runtime directory, for example after a reboot. A
+    /// reporter with an old result of the same job number would then not get the new one.
     pub numbers: u64,
-    /// Jobs between being read and being stored.
+    /// Maximum number of jobs between reading and storing.
     pub max_active: usize,
-    /// Files being read at once.
+    /// Maximum number of files being read at once.
     pub max_preparing: usize,
-    /// Results being stored at once.
+    /// Maximum number of results being stored at once.
     pub max_storing: usize,
-    /// Documents of active jobs on the bus.
+    /// Maximum number of documents of active jobs on the bus.
     pub max_documents: usize,
-    /// A bundle must end a job within this time.
+    /// Maximum time for a bundle to finish a job.
     pub job_deadline: Duration,
-    /// A bundle with work that says nothing for this long is taken for dead.
+    /// Maximum time without a message from a bundle that has work. After that it counts as dead.
     pub silence_limit: Duration,
-    /// A demanded bundle that is not there is waited for this long.
+    /// Maximum time to wait for a missing demanded bundle.
     pub absence_limit: Duration,
-    /// At the start, how long hellos are collected before missing children are started.
+    /// Time after the start to collect hellos before missing children are started.
     pub collect: Duration,
-    /// First pause before a child is started again; doubles up to `backoff_max`.
+    /// First pause before a child is restarted. It doubles up to `backoff_max`.
     pub backoff: Duration,
     /// Longest pause.
     pub backoff_max: Duration,
-    /// A child that has run this long is taken for healthy and its pauses start anew.
+    /// A child that has run this long counts as healthy, and its pauses start again.
     pub healthy_after: Duration,
-    /// More restarts than this within `restart_window` and the broker gives up on a child.
+    /// Maximum number of restarts within `restart_window`. Beyond it the broker gives up on a
+    /// child.
     pub max_restarts: u32,
     /// See `max_restarts`.
     pub restart_window: Duration,
-    /// Changes of what a bundle is or checks, by its own will, that are believed at once.
+    /// Number of registration changes by a bundle itself that are accepted at once.
     pub changes_forgiven: u32,
-    /// Pause before the first change beyond them is believed; doubles up to `distrust_max`.
+    /// Pause before the first change beyond them is accepted. It doubles up to `distrust_max`.
     pub distrust: Duration,
     /// Longest such pause.
     pub distrust_max: Duration,
-    /// After this long without a change, earlier ones are forgotten.
+    /// Time without a change after which earlier changes are forgotten.
     pub calm_after: Duration,
-    /// Issues kept per checker and job.
+    /// Maximum number of issues kept per checker and job.
     pub max_issues: usize,
-    /// Bytes of parameters and metadata kept per checker and job.
+    /// Maximum bytes of parameters and metadata kept per checker and job.
     pub max_facts: usize,
-    /// Bytes of all that is kept per bundle and job.
+    /// Maximum bytes of pending findings kept per bundle and job.
     pub max_pending_bytes: usize,
-    /// Bytes of findings of all jobs that are not stored yet, beyond which no further job is given
-    /// out: what a bundle that reports far too much can make the broker hold.
+    /// Maximum bytes of findings of all jobs that are not stored yet. Beyond it no further jobs are
+    /// sent. It limits the memory that a bundle with far too many findings can occupy.
     pub max_findings_bytes: usize,
-    /// Longest text kept of anything a bundle says, in bytes.
+    /// Maximum length of any text kept from a bundle, in bytes.
     pub max_text: usize,
-    /// Pause before something that failed for want of room or disk is tried again.
+    /// Pause before a retry after a failure for lack of room or disk space.
     pub retry_after: Duration,
-    /// A file for which there is no room is waited for so long without anything moving; then it is
-    /// undetermined, and tried again as what cannot be read is.
+    /// Maximum time that a file waits for room while no job progresses. After that its verdict is
+    /// undetermined, and it is retried like an unreadable file.
     pub room_limit: Duration,
-    /// Pause before a file is tried again for which the bus had no place, unless a place becomes free before.
+    /// Pause before a file without a place on the bus is retried, unless a place becomes free
+    /// earlier.
     pub busy_pause: Duration,
-    /// First pause before a file is read again that something which passes kept from being read; it
-    /// doubles up to the pause after which a verdict says so.
+    /// First pause before a file is read again after a temporary failure. It doubles up to the
+    /// maximum, after which a verdict states the failure.
     pub moment_pause: Duration,
     /// See `moment_pause`.
     pub moment_pause_max: Duration,
-    /// How often what could not be read is tried again though nothing tells of a change.
+    /// Interval of retries of unreadable files without a reported change.
     pub read_again_after: Duration,
-    /// Drain limit after which unfinished work is given up.
+    /// Maximum time of draining. After that unfinished work is given up.
     pub drain_limit: Duration,
-    /// The verdict on a file is its own, whatever the verdicts on the files are that it rests on.
+    /// The verdict on a file ignores the verdicts on the files that it rests on.
     pub own_verdicts: bool,
-    /// Stop by itself once the scan is complete and everything has a verdict.
+    /// The broker stops by itself when the scan is complete and every file has a verdict.
     pub once: bool,
 }
 

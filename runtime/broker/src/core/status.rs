@@ -1,4 +1,4 @@
-//! What `qcbus status` shows.
+//! Data for `qcbus status`.
 
 use std::collections::VecDeque;
 use std::path::Path;
@@ -15,7 +15,7 @@ use super::children::ChildState;
 use super::files::{Priority, Stage};
 use super::notice::Notice;
 
-/// Verdicts of the last seconds.
+/// Number of verdicts in the last seconds.
 #[derive(Debug, Default)]
 pub(super) struct Rate {
     times: VecDeque<(Duration, u64)>,
@@ -24,7 +24,7 @@ pub(super) struct Rate {
 const RATE_WINDOW: Duration = Duration::from_secs(10);
 
 impl Rate {
-    /// Counts one, in buckets of a tenth of a second so that memory does not follow the rate.
+    /// Counts one verdict. Buckets of a tenth of a second keep the memory independent of the rate.
     pub fn note(&mut self, now: Duration) {
         let bucket = Duration::from_millis(u64::try_from(now.as_millis() / 100 * 100).unwrap_or(0));
         match self.times.back_mut() {
@@ -56,7 +56,7 @@ impl Rate {
 }
 
 impl State {
-    /// The part of the status that the state machine knows; the engine adds the rest.
+    /// Returns the part of the status that the state machine knows. The engine adds the rest.
     pub fn status(&self) -> Status {
         Status {
             generation: self.settings.generation,
@@ -74,7 +74,7 @@ impl State {
         }
     }
 
-    /// Why files cannot be accepted, whatever is in them.
+    /// Returns the reasons why no file can be accepted, regardless of its content.
     pub fn hindrances(&self) -> Vec<String> {
         let missing = self.missing_by_name().into_iter();
         let missing = missing.filter_map(|name| self.hopeless(&name));
@@ -88,7 +88,7 @@ impl State {
         missing.chain(unseated).collect()
     }
 
-    /// The files that are there, in the order of their paths.
+    /// Returns the present files, sorted by path.
     pub fn present_files(&self) -> Vec<Arc<Path>> {
         let files = self.files.iter();
         let present = files.filter(|(_, entry)| entry.present && entry.on_demand.is_none());
@@ -97,12 +97,12 @@ impl State {
         paths
     }
 
-    /// Keeps something for `status` that the state machine did not find out itself.
+    /// Adds a notice for `status` that comes from outside the state machine.
     pub fn remark(&mut self, notice: Notice) {
         self.notice(notice, &mut Vec::new());
     }
 
-    /// Nothing of this kind holds any more.
+    /// Removes all notices of this kind, because they are no longer valid.
     pub fn is_over(&mut self, of_this_kind: impl Fn(&Notice) -> bool) {
         self.notices.retain(|(notice, _)| !of_this_kind(notice));
     }
@@ -243,7 +243,8 @@ impl State {
         }
     }
 
-    /// A bundle is named as slow when jobs pile up at it and at none of the others.
+    /// Checks whether a bundle is shown as slow. This is so if jobs accumulate at it and at no
+    /// other bundle.
     fn is_slowest(&self, name: &str, waiting: usize) -> bool {
         let others = self.bundles.iter().filter(|(other, _)| *other != name);
         waiting >= 4 && others.map(|(_, it)| it.queue.len()).max().unwrap_or(0) * 4 <= waiting

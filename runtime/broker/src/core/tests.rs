@@ -1,5 +1,5 @@
-//! The state machine against a world that it cannot foresee: files come, change and go, bundles
-//! answer, lie, hang and die in any order, and still every file that is there gets one verdict.
+//! Tests of the state machine in random worlds. Files come, change and go, and bundles answer, lie,
+//! hang and die in any order. Every present file must still get one verdict.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -155,7 +155,7 @@ impl World {
             }
             Step::Leave(n) => self.leave(n),
             Step::Remove(n) => self.remove(["First", "Second", CHILD][usize::from(n)]),
-            // Absent, or one of two versions.
+            // The child is absent or has one of two versions.
             Step::Manifest(n) => self.manifest((n > 0).then_some(n)),
             Step::Shadow(n) => self.shadow_is((n > 0).then_some(n)),
             Step::ChildJoins => self.child_joins(),
@@ -186,7 +186,7 @@ impl World {
     }
 }
 
-/// How many random worlds there are: more of them for a night, by `QCBUS_WORLDS`.
+/// Returns the number of random worlds. `QCBUS_WORLDS` sets a larger number for nightly runs.
 fn worlds() -> u32 {
     let wanted = std::env::var("QCBUS_WORLDS").ok();
     wanted.and_then(|it| it.parse().ok()).unwrap_or(400)
@@ -195,9 +195,9 @@ fn worlds() -> u32 {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(worlds()))]
 
-    /// Whatever happens in whatever order: once the world calms down, every file that is there has
-    /// a verdict on its present bytes and those of all that it depends on, none that has gone has
-    /// one, whoever waits has an answer, and nothing is left in flight.
+    /// Checks the final state after random steps, once the world has settled. Every present file
+    /// has a verdict on its present bytes and those of all its dependencies. No removed file has a
+    /// verdict, every waiting client has an answer, and no work is in flight.
     #[test]
     fn every_file_gets_its_verdict_whatever_happens(steps in steps()) {
         let mut world = World::with_a_reporter();
@@ -217,7 +217,7 @@ proptest! {
             prop_assert_eq!(named(&judged.required_set), world.expected_set());
             prop_assert_eq!(&world.journal[file], &*judged, "the journal knows the same");
             prop_assert_eq!(judged.verdict, world.verdict_with_all(*file, judged.own));
-            // Once all are there, only a file that kills bundles keeps them from a judgement.
+            // When all bundles are present, only a file that kills bundles may prevent a verdict.
             let why = &world.failures[file];
             prop_assert!(why.iter().all(|it| it.contains("alone in a fresh process")), "{:?}", why);
         }
@@ -236,8 +236,8 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(worlds() / 4))]
 
-    /// Whatever happens before: a broker that is told to stop does, once, and nobody who waits is
-    /// left without an answer.
+    /// Checks that a broker always stops once after it is told to, and that every waiting client
+    /// gets an answer.
     #[test]
     fn every_broker_comes_to_its_end(steps in steps()) {
         let mut world = World::with_a_reporter();
@@ -252,7 +252,7 @@ proptest! {
 }
 
 impl World {
-    /// Gate, reporter and journal agree on the verdicts once the world has calmed down.
+    /// Asserts that gate, reporter and journal agree on the verdicts once the world has settled.
     fn all_know_the_same(&self) {
         let accepted = |(file, (_, verdict)): (&u8, &(Vec<Input>, Verdict))| {
             (*verdict == Verdict::Accepted).then_some(*file)
@@ -335,7 +335,8 @@ fn a_pair_that_dies_twice_alone_is_condemned_and_not_tried_again() {
         rounds += 1;
         assert!(rounds < 100, "a poison pair must end");
     }
-    // Once in company (it does not count), then twice alone in a fresh process.
+    // It dies once together with other jobs (this does not count), then twice alone in a fresh
+    // process.
     assert_eq!(deaths, 3);
     assert_eq!(world.judged[&1].1, Verdict::Undetermined);
     world.settle();
@@ -396,7 +397,8 @@ fn files_are_judged_again_without_a_bundle_that_has_left() {
     assert_eq!(world.stored.len(), stored + 1);
 }
 
-/// A bundle that a former broker started (it has a launch) and that no manifest names any more.
+/// Returns a world with a bundle that a former broker started (it has a launch) and that no
+/// manifest names any more.
 fn world_with_an_unwanted_bundle() -> (World, SessionId) {
     let mut world = World::new();
     world.join("First");
@@ -476,7 +478,7 @@ fn a_cancelled_job_makes_room_for_the_next() {
         world.write(file);
         world.prepare(0, true);
     }
-    // Both become suspects, which are given out one at a time.
+    // Both files are in quarantine now and are handed out one at a time.
     world.kill(0);
     world.join("First");
     let given = |world: &World| -> Vec<JobId> {
@@ -505,7 +507,7 @@ fn jobs_wait_while_findings_take_up_the_room() {
         let tasks = jobs.flat_map(|job| job.tasks.values());
         tasks.map(|task| task.pending_bytes).sum()
     };
-    // Both given jobs are answered with more than there is room for, and nothing is stored.
+    // Both jobs are answered with more findings than there is room for, and no result is stored.
     world.answer(2);
     world.answer(2);
     assert!(held(&world) > world.state.settings.max_findings_bytes);

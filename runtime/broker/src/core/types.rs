@@ -1,4 +1,4 @@
-//! The words of the state machine.
+//! Types of the state machine.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,64 +16,65 @@ use sha2::{Digest as _, Sha256};
 use super::outcome::TaskOutcome;
 use super::required_set::{Epoch, RequiredSet};
 
-/// A peer's session on the bus.
+/// Session of a peer on the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SessionId(pub u64);
 
-/// One start of a child process. The number counts up over all brokers of an instance: the generation,
-/// which of its starts, and in the last [`SPEC_BITS`] bits what was started, so that a broker knows
-/// of a process that a former one has started whether it still is what is wanted.
+/// One start of a child process. The number increases over all brokers of an instance. It consists
+/// of the generation, the start number and, in the last [`SPEC_BITS`] bits, a digest of what was
+/// started. Thus a broker knows whether a process of a former broker is still the wanted one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Launch(pub u64);
 
-/// Bits of a launch that tell manifests apart.
+/// Number of bits that distinguish manifests.
 const SPEC_BITS: u32 = 16;
-/// Bits that count the starts of one broker; above them is its generation.
+/// Number of bits that count the starts of one broker. The generation is above them.
 const START_BITS: u32 = 24;
 
 impl Launch {
-    /// Where the launches of a generation begin.
+    /// Returns the first launch of a generation.
     pub fn first_of(generation: u64) -> Launch {
         Launch(generation << (START_BITS + SPEC_BITS))
     }
 
-    /// The launch that follows.
+    /// Returns the next launch.
     pub fn next(self, spec: &ChildSpec) -> Launch {
         let start = (self.0 >> SPEC_BITS) + 1;
         Launch((start << SPEC_BITS) | spec.digest())
     }
 
-    /// Whether it was one of this very command and version.
+    /// Checks whether it is a launch of exactly this command and version.
     pub fn is_of(self, spec: &ChildSpec) -> bool {
         self.started() == spec.digest()
     }
 
-    /// What was started, as [`ChildSpec::digest`] has it.
+    /// Returns the digest of what was started, see [`ChildSpec::digest`].
     pub fn started(self) -> u64 {
         self.0 & ((1 << SPEC_BITS) - 1)
     }
 }
 
-/// A client of the control socket that waits for an answer.
+/// Request id of a client of the control socket that waits for an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct RequestId(pub u64);
 
-/// What `stat` says of a file: enough to see that it has changed.
+/// Values of `stat` that are sufficient to detect a change of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Stamp {
     /// Size in bytes.
     pub size: u64,
-    /// Modification time in nanoseconds since 1970; negative before.
+    /// Modification time in nanoseconds since 1970, negative for earlier times.
     pub mtime_ns: i128,
-    /// Time of the last change of anything, because the modification time can be set at will.
+    /// Time of the last change of content or metadata. It is needed because the modification time
+    /// can be set freely.
     pub ctime_ns: i128,
-    /// Inode, because a rename can keep size and time.
+    /// Inode. It is needed because a rename can keep size and time.
     pub inode: u64,
 }
 
 impl Stamp {
-    /// Whether only the time of change differs: the bytes may be the same (another link to the
-    /// file, other rights) or not (rewritten in place, with the time put back).
+    /// Checks whether only the change time differs. The bytes may be the same (new link to the
+    /// file, changed rights). They may also differ (rewritten in place with the old time restored).
     pub fn differs_in_ctime_only(&self, other: &Stamp) -> bool {
         self.ctime_ns != other.ctime_ns
             && *self
@@ -84,44 +85,44 @@ impl Stamp {
     }
 }
 
-/// A file that a verdict depends on, as it was when it was read.
+/// A file that a verdict depends on, in the state in which it was read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Input {
     /// Absolute path.
     pub path: Arc<Path>,
-    /// What was found there.
+    /// State found at this path.
     pub content: Reading,
 }
 
 impl Input {
-    /// The digest of the bytes that were read, if any were.
+    /// Returns the digest of the bytes that were read, or `None`.
     pub fn digest(&self) -> Option<Digest> {
         self.content.read().map(|(_, digest)| digest)
     }
 }
 
-/// A file that the broker has written for others, and that somebody has removed or changed since.
+/// An output file of the broker that another process has removed or changed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LostOutput {
-    /// The file that it is about, or of which it is a copy.
+    /// The file that the output belongs to or is a copy of.
     pub file: Arc<Path>,
-    /// Where it was.
+    /// Path of the output.
     pub output: Arc<Path>,
 }
 
-/// What was found where a file was to be read.
+/// State found at the path of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reading {
-    /// It was looked for and not there.
+    /// The file did not exist.
     Absent,
-    /// Something is there that could not be read: a directory, say.
+    /// The entry exists but could not be read, for example a directory.
     Unread(Stamp),
-    /// Its bytes were read, or its names if it is a directory whose files count.
+    /// The bytes were read, or the file names of a directory with relevant files.
     Read(Stamp, Digest),
 }
 
 impl Reading {
-    /// The stamp of what is there.
+    /// Returns the stamp of the existing entry.
     pub fn stamp(&self) -> Option<Stamp> {
         match *self {
             Reading::Absent => None,
@@ -129,7 +130,7 @@ impl Reading {
         }
     }
 
-    /// Stamp and digest of what was read.
+    /// Returns stamp and digest of the data that was read.
     pub fn read(&self) -> Option<(Stamp, Digest)> {
         match *self {
             Reading::Absent | Reading::Unread(_) => None,
@@ -138,170 +139,171 @@ impl Reading {
     }
 }
 
-/// What reading a file and its dependencies gave.
+/// Result of reading a file and its dependencies.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PreparedJob {
-    /// Everything the verdict depends on, the root first.
+    /// All files that the verdict depends on, the root first.
     pub inputs: Vec<Input>,
     /// Digest over all inputs, see [`crate::intake`].
     pub basis: Digest,
-    /// Whether some stamp is so young that the file may have changed unnoticed since.
+    /// Whether a stamp is so young that the file may have changed unnoticed since.
     pub racy: bool,
     /// The published documents, the root first.
     pub documents: Vec<JobDocument>,
-    /// What could not be had.
+    /// Documents that could not be read.
     pub missing: Vec<MissingDocument>,
-    /// Those of the documents that the root rests on and that get verdicts of their own.
+    /// Documents that the root rests on and that get their own verdicts.
     pub rests_on: Vec<Referenced>,
-    /// Those that the root rests on and that nobody judges, because they lie outside of all that is watched.
+    /// Files that the root rests on and that get no verdict, because they are outside all watched
+    /// directories.
     pub unwatched: Vec<Referenced>,
     /// Source bytes in total.
     pub bytes: u64,
 }
 
-/// A file with a verdict of its own that another file rests on: its map, a catalog that it takes entries from,
-/// a scenario that it is made of.
+/// A file with its own verdict that another file rests on: its map, a used catalog, or a scenario
+/// in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Referenced {
     /// Absolute path, under which it is judged.
     pub path: Arc<Path>,
     /// Digest of the bytes that were read.
     pub digest: Digest,
-    /// What it is to the file that rests on it.
+    /// Its role for the file that rests on it.
     pub role: DocumentRole,
-    /// Byte offset of the referring element in the image of that file.
+    /// Byte offset of the referring element in the image of the referring file.
     pub referred_at: u32,
 }
 
-/// A file that a verdict rests on, with the verdict on it that was counted in.
+/// A file that a verdict rests on, with its verdict that was used.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RestsOn {
     /// Absolute path, under which it is judged.
     pub path: Arc<Path>,
     /// Digest of the bytes that were read.
     pub digest: Digest,
-    /// The verdict on these bytes; `None` while there was none.
+    /// The verdict on these bytes. `None` if there was none.
     pub verdict: Option<Verdict>,
-    /// Errors found in it, without those of the files that it rests on.
+    /// Number of errors found in it, without those of the files that it rests on.
     pub errors: u64,
 }
 
 impl PreparedJob {
-    /// Stamp and digest of the root.
+    /// Returns stamp and digest of the root.
     pub fn root(&self) -> Option<(Stamp, Digest)> {
         self.inputs.first().and_then(|input| input.content.read())
     }
 }
 
-/// Why a file could not be prepared.
+/// Reason why a file could not be prepared.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum PrepareFailure {
-    /// It is no longer there.
+    /// The file does not exist any more.
     Vanished,
-    /// It is there and cannot be checked; the reason is for a person.
+    /// The file exists and cannot be checked. The reason is for the user.
     Unreadable(String),
-    /// Something that passes kept it, or what it refers to, from being read: no descriptors, a disk that
-    /// did not answer. Worth other tries, with growing pauses; the reason is for a person.
+    /// A temporary failure prevented reading the file or its dependencies: no descriptors, or a
+    /// disk that did not respond. It is retried with growing pauses. The reason is for the user.
     Moment(String),
-    /// No room for its image now; worth another try later.
+    /// There is no room for its image now. It is retried later.
     NoRoom(String),
-    /// As many documents as the bus carries are in use; worth another try at once.
+    /// The bus carries its maximum number of documents. The file is retried at once.
     Busy,
 }
 
-/// A verdict as the files table remembers it.
+/// A verdict as stored in the files table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Judged {
-    /// The job that gave it.
+    /// The job of the verdict.
     pub job: JobId,
-    /// The verdict: the worst of its own and of the files that it rests on.
+    /// The verdict: the worst of its own and those of the files that it rests on.
     pub verdict: Verdict,
     /// The verdict without the files that it rests on.
     pub own: Verdict,
-    /// Errors without the findings about files that it rests on.
+    /// Number of errors without those of files that it rests on.
     pub own_errors: u64,
-    /// The files that it rests on; `None` in a journal from before this was recorded.
+    /// The files that it rests on. `None` in a journal that does not record them yet.
     pub rests_on: Option<Vec<RestsOn>>,
     /// Digest of the root's bytes.
     pub digest: Digest,
     /// Digest over all inputs.
     pub basis: Digest,
-    /// Configuration it was given under.
+    /// Configuration of the verdict.
     pub config: Digest,
-    /// Those who had to judge, and did.
+    /// Required set that has judged.
     pub required_set: Arc<RequiredSet>,
-    /// The epoch in which they were called.
+    /// Epoch in which the required bundles were fixed.
     pub epoch: Epoch,
-    /// Everything it depends on.
+    /// All files that it depends on.
     pub inputs: Vec<Input>,
-    /// Whether the stamps in `inputs` are too young to be trusted alone.
+    /// Whether the stamps in `inputs` are too young to prove that the files are unchanged.
     pub racy: bool,
-    /// Issues by level: errors, warnings, information.
+    /// Number of issues by level: errors, warnings, information.
     pub counts: [u64; 3],
-    /// For undetermined: which checkers failed and why.
+    /// Failed checkers and their reasons for an undetermined verdict.
     pub why: Vec<String>,
-    /// Where the result lies; `None` when it could not be written anywhere.
+    /// Path of the result. `None` if it could not be written.
     pub xqar: Option<PathBuf>,
 }
 
 impl Judged {
-    /// Whether the verdict is an acceptance.
+    /// Checks whether the verdict is an acceptance.
     pub fn is_accepted(&self) -> bool {
         self.verdict == Verdict::Accepted
     }
 
-    /// Whether there is a result.
+    /// Checks whether a result exists.
     pub fn is_written(&self) -> bool {
         self.xqar.is_some()
     }
 }
 
-/// What a reporter has said of a file, as far as the broker knows.
+/// State of a reporter for a file, as far as the broker knows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reported {
-    /// It has the result of this job.
+    /// The reporter has the result of this job.
     Of(JobId),
-    /// The file had gone, and the report is not known to have been taken back.
+    /// The file was removed, and the withdrawal of the report is not confirmed.
     OfGone,
 }
 
-/// A job whose checking is over, ready to be pooled and stored.
+/// A job with completed checks, ready to be pooled and stored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FinishedJob {
-    /// Its number.
+    /// Number of the job.
     pub job: JobId,
     /// The file.
     pub path: Arc<Path>,
     /// Its kind.
     pub kind: FileKind,
-    /// Configuration.
+    /// Configuration of the job.
     pub config: Digest,
-    /// What was read; `None` when it could not be.
+    /// The data that was read. `None` if the file could not be read.
     pub prepared: Option<Arc<PreparedJob>>,
-    /// Why it could not be read.
+    /// Reason why the file could not be read.
     pub unreadable: Option<String>,
-    /// By bundle.
+    /// Outcome of each bundle.
     pub bundles: Vec<TaskOutcome>,
-    /// The files that it rests on, each with the verdict on it.
+    /// The files that it rests on, each with its verdict.
     pub rests_on: Vec<(Referenced, RestsOn)>,
-    /// Those who had to judge, and did.
+    /// Required set that has judged.
     pub required_set: Arc<RequiredSet>,
-    /// The epoch in which they were called: in a later one the job is not to be stored.
+    /// Epoch in which the required bundles were fixed. In a later epoch the job must not be stored.
     pub epoch: Epoch,
     /// Time since the job was taken from the queue.
     pub elapsed: Duration,
 }
 
-/// What storing a result gave.
+/// Outcome of storing a result.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StoreOutcome {
-    /// Written and in the journal.
+    /// The result is written and recorded in the journal.
     Stored(Box<Judged>),
-    /// The file has changed since it was read; nothing was written.
+    /// The file has changed since it was read. No result was written.
     Stale,
-    /// Others must judge it by now; nothing was written.
+    /// The required bundles have changed. No result was written.
     Outdated,
-    /// It could not be written; worth another try.
+    /// The result could not be written. Storing is retried.
     Failed(String),
 }
 
@@ -319,34 +321,34 @@ pub struct Delivery {
 /// A child process that the broker keeps running.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct ChildSpec {
-    /// The name under which it will say hello.
+    /// Name in its hello.
     pub name: String,
     /// Bundle or reporter.
     pub role: Role,
-    /// Version from the manifest, if it says one; a change makes an upgrade.
+    /// Version in the manifest, if any. A change causes an upgrade.
     pub version: Option<String>,
-    /// Program and arguments; the bus options are appended.
+    /// Program and arguments. The bus options are appended.
     pub command: Vec<String>,
-    /// When to start it again.
+    /// Condition for a restart.
     pub restart: Restart,
-    /// What it may do although it is confined.
+    /// Permissions beyond the sandbox.
     pub may: May,
-    /// The files that the command of a manifest runs, as they were when it was read. What comes with the
-    /// program has none.
+    /// Files that the command of a manifest runs, with their stamps when the manifest was read.
+    /// Empty for children that belong to the program.
     pub programs: Vec<(PathBuf, Option<Stamp>)>,
-    /// It is a bundle that looks at files and has no weight in any verdict.
+    /// The bundle is a shadow: it checks files and has no weight in any verdict.
     pub shadow: bool,
-    /// It may take long until it says hello: it runs programs before that.
+    /// The child may take long until its hello, because it runs other programs first.
     pub slow_start: bool,
 }
 
 impl ChildSpec {
-    /// Whether it is a bundle that must judge.
+    /// Checks whether it is a required bundle.
     pub fn judges(&self) -> bool {
         self.role == Role::Bundle && !self.shadow
     }
 
-    /// Tells command, version and programs from others, in as many bits as a launch has for it.
+    /// Returns a digest of command, version and programs, with as many bits as a launch can hold.
     pub fn digest(&self) -> u64 {
         let mut hash = Sha256::new();
         hash.update(format!("{:?}{:?}", self.version, self.command));
@@ -363,19 +365,19 @@ impl ChildSpec {
     }
 }
 
-/// How a child process has ended.
+/// End of a child process.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ChildEnd {
-    /// There is no such program, or it cannot be run: for a person.
+    /// The program does not exist or cannot be run. The reason is for the user.
     NotStarted(String),
-    /// With exit status 0.
+    /// It ended with exit status 0.
     Done(String),
-    /// With another status or by a signal.
+    /// It ended with another status or by a signal.
     Failed(String),
 }
 
 impl ChildEnd {
-    /// How, for a person.
+    /// Returns the description of the end for the user.
     pub fn how(&self) -> &str {
         match self {
             ChildEnd::NotStarted(how) | ChildEnd::Done(how) | ChildEnd::Failed(how) => how,
@@ -383,31 +385,31 @@ impl ChildEnd {
     }
 }
 
-/// When a child is started again.
+/// Condition for the restart of a child.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Restart {
-    /// Never.
+    /// The child is never restarted.
     Never,
-    /// When it ended with an error or a signal.
+    /// The child is restarted after an error or a signal.
     OnFailure,
-    /// Whenever it ended without having been asked to.
+    /// The child is restarted whenever it ended without a request.
     Always,
 }
 
-/// What a configuration demands, as far as the state machine must know.
+/// Demand of a configuration, as far as the state machine needs it.
 pub trait Demand: Send + Sync + std::fmt::Debug {
-    /// Whether this bundle is to check anything at all.
+    /// Checks whether this bundle must check files at all.
     fn wants_bundle(&self, name: &str, alias: &str) -> bool;
-    /// The indexes of the catalogue's checkers that are to run on a file of this kind.
+    /// Returns the indexes of the catalogue's checkers that must run on a file of this kind.
     fn checkers(&self, name: &str, catalogue: &Catalogue, kind: FileKind) -> Vec<u32>;
-    /// Bundles demanded by name, whether they have been seen or not.
+    /// Returns the bundles that are demanded by name, whether or not they were ever seen.
     fn named(&self) -> Vec<String>;
-    /// Whether `name` (as in [`Demand::named`]) means this bundle.
+    /// Checks whether `name` (as in [`Demand::named`]) refers to this bundle.
     fn means(&self, named: &str, name: &str, alias: &str) -> bool;
 }
 
-/// A verdict as a client is told.
+/// Returns a verdict in the form for clients.
 pub fn file_verdict(path: &Path, judged: &Judged) -> FileVerdict {
     FileVerdict {
         file: path.to_path_buf(),
@@ -421,7 +423,7 @@ pub fn file_verdict(path: &Path, judged: &Judged) -> FileVerdict {
     }
 }
 
-/// The job as a bundle is told.
+/// Returns the job in the form for bundles.
 pub fn job_message(job: JobId, config: Digest, kind: FileKind, prepared: &PreparedJob) -> Job {
     Job {
         job,

@@ -27,7 +27,7 @@ fn launches_count_up_within_their_generation_and_tell_what_was_started() {
         assert!(!next.is_of(if number % 2 == 0 { &other } else { &one }));
         launch = next;
     }
-    // Whatever a digest is, the next start is another launch.
+    // The next start is another launch, whatever the digest is.
     let full = Launch(launch.0 | ((1 << SPEC_BITS) - 1));
     assert!(full.next(&one) > full);
 }

@@ -1,4 +1,4 @@
-//! Upgrades: a newer process of a child joins and takes over beside the older, which then drains.
+//! Upgrades: a newer process of a child joins and takes over from the older one, which then drains.
 
 use std::time::Duration;
 
@@ -8,12 +8,12 @@ use super::notice::Notice;
 use super::types::{Launch, Restart};
 use super::{Actions, State};
 
-/// How far the newer process of a child is, beside the older that goes on.
+/// State of the newer process of a child while the older one continues.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Upgrade {
-    /// To be started then.
+    /// It is started at this time.
     Due(Duration),
-    /// Started, has not said hello.
+    /// It was started at this time and has not sent hello yet.
     Starting(Launch, Duration),
 }
 
@@ -22,7 +22,7 @@ impl Child {
         matches!(self.upgrade, Some(Upgrade::Starting(it, _)) if it == launch)
     }
 
-    /// Starts the newer process when it is due. Returns its launch when it should have joined by now.
+    /// Starts the newer process when it is due. Returns its launch if it should have joined by now.
     pub fn watch_upgrade(
         &mut self,
         now: Duration,
@@ -47,13 +47,13 @@ impl Child {
 }
 
 impl State {
-    /// Whether this launch is the newer one of a child that runs.
+    /// Checks whether this launch is the newer process of a running child.
     pub(super) fn is_successor(&self, name: &str, launch: Launch) -> bool {
         let child = self.children.get(name);
         child.is_some_and(|child| child.is_upgraded_by(launch))
     }
 
-    /// The newer process of a child has ended, or hangs, before it joined: it is tried again.
+    /// Handles a newer process that has ended or hangs before it joined. It is started again later.
     pub(super) fn upgrade_failed(&mut self, name: &str, why: &str, actions: &mut Actions) {
         let (now, draining, settings) = (self.now, self.draining(), &self.settings);
         let Some(child) = self.children.get_mut(name) else {

@@ -1,4 +1,4 @@
-//! Clients that wait for the verdict on a file's present bytes.
+//! Waits: clients that wait for the verdict on a file's present bytes.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -14,25 +14,25 @@ use super::files::{FileEntry, FileId, Priority, Stage};
 use super::types::{Judged, RequestId, Stamp, file_verdict};
 use super::{Actions, State};
 
-/// For what a client of the control socket waits, and when it gives up.
+/// Goal and timeout of a client of the control socket.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Until {
-    /// When to give up; never, when absent.
+    /// Time after which the wait ends. `None` means no limit.
     pub timeout: Option<Duration>,
-    /// Also for every reporter to have its report written.
+    /// The client also waits until every reporter has written its report.
     pub reports: bool,
 }
 
-/// One client.
+/// A waiting client.
 #[derive(Debug)]
 pub(super) struct Waiter {
     request_id: RequestId,
     path: Arc<Path>,
     until: Option<Duration>,
-    /// It waits for the reports, too.
+    /// The client also waits for the reports.
     reports: bool,
-    /// Whether the file has been seen to be there since it was asked for. A verdict is kept while a
-    /// watched directory is away, and nobody may be told that what is not there was accepted.
+    /// Whether the file was found to exist since the request. A verdict is kept while a watched
+    /// directory is missing, but a missing file must not be reported as accepted.
     seen: bool,
 }
 
@@ -43,8 +43,8 @@ impl Waiter {
 }
 
 impl State {
-    /// A client asks. The stamp is of now, so a file that was written a moment ago and whose
-    /// change nobody has reported yet is judged anew before the answer.
+    /// Handles the wait of a client. The stamp is current. Thus a file that was just written is
+    /// judged again first, even if its change is not reported yet.
     pub(super) fn wait(
         &mut self,
         request_id: RequestId,
@@ -81,7 +81,7 @@ impl State {
         }
     }
 
-    /// A file is there: who waits for it is told what stands.
+    /// Answers the clients that wait for an existing file, if its verdict is valid.
     pub(super) fn seen(&mut self, id: FileId, actions: &mut Actions) {
         let Some(path) = self.files.get(id).map(|entry| entry.path.clone()) else {
             return;
@@ -95,13 +95,12 @@ impl State {
         }
     }
 
-    /// Whether somebody waits for the verdict on this file.
+    /// Checks whether a client waits for the verdict on this file.
     pub fn is_awaited(&self, path: &Path) -> bool {
         self.waiters.iter().any(|it| *it.path == *path)
     }
 
-    /// Somebody waits for a verdict that is not there: the file need not wait for its turn among
-    /// those that nobody asks for.
+    /// Moves a file with an awaited verdict out of the background queue.
     fn hurry(&mut self, id: FileId) {
         let there = |it: &FileEntry| it.present && it.judged.is_some();
         if self.files.get(id).is_some_and(there) {
@@ -110,7 +109,7 @@ impl State {
         self.hurry_under(id);
     }
 
-    /// Answers everybody who waits for this file, if there is nothing more to wait for.
+    /// Answers all clients that wait for this file if its verdict is final.
     pub(super) fn settle_waits(&mut self, id: FileId, actions: &mut Actions) {
         let Some((path, judged)) = self.standing_verdict(id) else {
             return;
@@ -124,10 +123,10 @@ impl State {
         });
     }
 
-    /// The verdict on a file, if there is nothing more to wait for.
+    /// Returns the verdict on a file if it is final.
     fn standing_verdict(&self, id: FileId) -> Option<(Arc<Path>, Arc<Judged>)> {
         let entry = self.files.get(id)?;
-        // One that waits in the background may have a verdict that stands nevertheless.
+        // A file in the background queue may still have a valid verdict.
         let settled = matches!(
             entry.stage(),
             Stage::Idle | Stage::Waiting(Priority::Background, _)
@@ -144,7 +143,7 @@ impl State {
         Some((entry.path.clone(), judged))
     }
 
-    /// An acceptance lies behind the gate again: who waits for it may be told.
+    /// Notes that an acceptance is behind the gate again, and answers the clients that wait for it.
     pub(super) fn opened(&mut self, path: &Path, actions: &mut Actions) {
         let Some(id) = self.files.id(path) else {
             return;
@@ -155,7 +154,8 @@ impl State {
         self.settle_waits(id, actions);
     }
 
-    /// Answers clients that wait for reports of which nobody is in debt any more: a reporter may have been removed.
+    /// Answers clients that wait for reports after the last missing report. For example, a reporter
+    /// may have been removed.
     pub(super) fn settle_reported(&mut self, actions: &mut Actions) {
         let waiting = self.waiters.iter().filter(|it| it.reports && it.seen);
         let files: BTreeSet<FileId> = waiting.filter_map(|it| self.files.id(&it.path)).collect();
@@ -164,7 +164,7 @@ impl State {
         }
     }
 
-    /// A person wants a bundle off the roster.
+    /// Handles the request of a user to remove a bundle from the registry.
     pub(super) fn removal(&mut self, request_id: RequestId, name: &str, actions: &mut Actions) {
         let response = match self.remove_bundle(name, actions) {
             Ok(what) => Response::Removed { what },
@@ -215,7 +215,7 @@ impl State {
         }
     }
 
-    /// The answer to a client whose time is over.
+    /// Returns the answer to a client after its timeout.
     fn in_vain(&self, waiter: &Waiter) -> Response {
         let id = self.files.id(&waiter.path);
         let id = id.filter(|_| waiter.reports && waiter.seen);
@@ -229,7 +229,7 @@ impl State {
         }
     }
 
-    /// The broker stops: nobody is left without an answer.
+    /// Answers all remaining clients, because the broker stops.
     pub(super) fn end_waits(&mut self, actions: &mut Actions) {
         for waiter in std::mem::take(&mut self.waiters) {
             actions.push(Action::Answer {

@@ -1,4 +1,4 @@
-//! What the state machine wants done.
+//! Execution of the actions of the state machine.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use crate::stages::reached;
 use crate::writers::Order;
 
 impl Broker {
-    /// Does what the state machine wants. `false`: it was to stop.
+    /// Executes an action. Returns `false` for the action to stop.
     pub(super) fn act(&mut self, action: Action) -> bool {
         match action {
             Action::Stop => return false,
@@ -56,7 +56,7 @@ impl Broker {
                 response,
             } => {
                 if let Some(answer) = self.request_ids.remove(&request_id) {
-                    // A client that has left needs no answer.
+                    // The error is ignored, because a client that has disconnected needs no answer.
                     let _ = answer.send(response);
                 }
             }
@@ -83,7 +83,8 @@ impl Broker {
         true
     }
 
-    /// What concerns one file on the disk or in the journal is done by its writer, in order.
+    /// Hands an action about one file on the disk or in the journal to its writer. The writer keeps
+    /// the order.
     fn order(&mut self, action: Action) {
         let (path, order) = match action {
             Action::Withdraw { path, reporters } => {
@@ -125,7 +126,8 @@ impl Broker {
             .order(&path, Order::Store { job, config, root });
     }
 
-    /// Whoever asked is not held up by what is to be written for others.
+    /// Pools an on-demand check outside the writers, so that the client does not wait for other
+    /// results.
     fn pool_on_demand(&mut self, mut job: Box<FinishedJob>) {
         let root = self.intake.root(job.job);
         let config = self.in_force.config.clone();
@@ -138,7 +140,7 @@ impl Broker {
                 None => store.pool_on_demand(&mut job, config, document),
             };
             drop(root);
-            // After the end of the loop nobody waits for this.
+            // The error is ignored: after the end of the loop the outcome is not needed.
             let _ = events.send(Event::Pooled {
                 job: job.job,
                 outcome,
@@ -155,7 +157,7 @@ impl Broker {
         });
     }
 
-    /// What concerns one peer.
+    /// Executes an action about one peer.
     fn act_on_peer(&mut self, action: Action) {
         match action {
             Action::Send { session, message } => {
@@ -201,15 +203,16 @@ impl Broker {
         }));
     }
 
-    /// Who must judge is in the journal before anybody has judged. It happens seldom, so the loop
-    /// can wait for it; where the journal cannot be written now, a writer tries until it can.
+    /// Records a registry change in the journal before any bundle judges under it. This is rare, so
+    /// the loop can wait for it. If the journal cannot be written now, a writer retries until it
+    /// can.
     fn remember_at_once(&mut self, entry: Entry) {
         if !self.journal_is_behind {
             let Err(why) = self.store.record(std::slice::from_ref(&entry)) else {
                 return;
             };
             self.say(Notice::Storing(why));
-            // What comes next must not overtake what waits.
+            // Later entries must not overtake the waiting ones.
             self.journal_is_behind = true;
         }
         self.writers.order(Path::new(""), Order::Record(entry));
@@ -226,12 +229,13 @@ impl Broker {
     }
 
     pub(super) fn prepare(&self, job: JobId, path: Arc<Path>, waited: Duration) {
-        // The clock of the state machine may stand still, ours does not: this is never too early.
+        // The clock of the state machine may stand still, but the real clock does not. Thus this
+        // time is never too early.
         let begin = now();
         let asked = begin.checked_sub(waited).unwrap_or(begin);
         let (intake, events) = (self.intake.clone(), self.inbox.events_in.clone());
         let io_watchdog = self.looks.io_watchdog();
-        // A run of its own watches nothing.
+        // An on-demand check watches no files.
         let within = match self.state.is_on_demand(job) {
             true => Within::Beside,
             false => Within::Watched,
@@ -244,12 +248,13 @@ impl Broker {
                 // The job has ended meanwhile.
                 return intake.release(job);
             }
-            // Whatever was made of it: a disk that did not answer is no file that is missing.
+            // This overrides any result, because a disk that does not respond must not count as a
+            // missing file.
             if let Some((at, why)) = attendance.moment() {
                 let reason = format!("read {}: {why}", to_text(&at));
                 result = Err(PrepareFailure::Moment(reason));
             }
-            // After the end of the loop nobody waits for this.
+            // The error is ignored: after the end of the loop the result is not needed.
             let _ = events.send(Event::Prepared { job, result });
         });
     }
@@ -268,7 +273,7 @@ impl Broker {
                 config.as_ref(),
             );
             let message = message.map(|message| Box::new(ToPeer::Result(Box::new(message))));
-            // After the end of the loop nobody waits for this.
+            // The error is ignored: after the end of the loop the message is not needed.
             let _ = deliveries.send(Ready {
                 session,
                 job,
@@ -277,7 +282,7 @@ impl Broker {
         });
     }
 
-    /// Tells a reporter that a file has gone.
+    /// Tells a reporter that a file was removed.
     fn void(&mut self, session: SessionId, reporter: &str, path: &Arc<Path>) {
         let config = self.in_force.config.as_ref();
         let left = self.left.get(&(reporter.to_owned(), path.clone()));

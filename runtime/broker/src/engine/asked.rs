@@ -1,4 +1,4 @@
-//! What commands ask, and what a change of configuration or manifests sets off.
+//! Requests of commands, and the effects of a changed configuration or manifest.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -31,7 +31,7 @@ impl Broker {
                 | Request::Offers { .. }
         );
         if only_tells && asked.answer.is_closed() {
-            // Nobody is there to be told.
+            // The client has already disconnected.
             return true;
         }
         match asked.request {
@@ -107,7 +107,7 @@ impl Broker {
         }
     }
 
-    /// How a bundle stands, with what the manifest in force says of it.
+    /// Returns the readiness of a bundle with the data of its current manifest.
     fn standing(&self, name: &str) -> Option<BundleReadiness> {
         let mut standing = self.state.readiness(name)?;
         standing.said = self.children.final_output(name);
@@ -118,7 +118,7 @@ impl Broker {
         Some(standing)
     }
 
-    /// A client wants a file checked as it would do it itself.
+    /// Handles an on-demand check. The client must have the same check context.
     fn check(
         &mut self,
         file: &Path,
@@ -142,7 +142,7 @@ impl Broker {
         })
     }
 
-    /// Forgets clients that have left without their answer.
+    /// Removes clients that have disconnected without their answer.
     pub(super) fn forget_clients(&mut self) {
         self.downs.retain(|it| !it.is_closed());
         let left = self.request_ids.iter().filter(|(_, it)| it.is_closed());
@@ -153,7 +153,7 @@ impl Broker {
         }
     }
 
-    /// Keeps what somebody waits for until the state machine answers.
+    /// Keeps the channel of a client until the state machine answers. Returns its request id.
     fn request_id(&mut self, answer: oneshot::Sender<Response>) -> RequestId {
         self.next_request_id += 1;
         let request_id = RequestId(self.next_request_id);
@@ -161,7 +161,7 @@ impl Broker {
         request_id
     }
 
-    /// A client waits for the verdict on a file that has just been looked at.
+    /// Handles the wait of a client for a file after its lookup.
     pub(super) fn wait(&mut self, look: Look, seen: LookedUp) -> bool {
         let LookedUp {
             file,
@@ -176,7 +176,7 @@ impl Broker {
             self.handle(Event::OutputsLost { lost });
         }
         if let (Some(reason), None) = (hidden, &unwatched) {
-            // A client that has left needs no answer.
+            // The error is ignored, because a client that has disconnected needs no answer.
             let _ = look.answer.send(Response::Unanswered { reason });
             return true;
         }
@@ -185,12 +185,12 @@ impl Broker {
         let request_id = self.request_id(look.answer);
         if let (None, Some(watcher)) = (&unwatched, &self.watcher) {
             match stamp {
-                // The watcher may not have come to it, and must tell when it goes.
+                // The watcher may not have seen the file yet, and must report its removal.
                 Some(stamp) if self.state.is_settled(file, stamp) || self.is_nobody_watching() => {
                     watcher.learn(file.into(), stamp);
                 }
-                // It may still be written to. Should it be back before the watcher has missed it, nothing else
-                // would tell.
+                // The file may still be written to. If it returns before the watcher notices its
+                // absence, no other event would follow.
                 Some(_) | None => {
                     at_rest = None;
                     watcher.look(file.into());
@@ -198,7 +198,7 @@ impl Broker {
             }
         }
         if stamp.is_some() && at_rest.is_none() {
-            // It is there, whatever the first look of the watcher has come to.
+            // The file exists, regardless of the progress of the first scan.
             self.handle(Event::Present { path: file.into() });
         }
         self.handle(Event::Wait {
@@ -210,10 +210,11 @@ impl Broker {
         })
     }
 
-    /// A client that asks must not be told what was true a moment ago: changes of dependencies
-    /// that the watcher has not come to yet are seen here.
+    /// Processes changes of dependencies that the watcher has not reported yet, so that a client
+    /// never gets an outdated verdict.
     pub(super) fn take_in(&mut self, moved: Vec<(Arc<Path>, Option<Stamp>)>) {
-        // The verdict on what is being written comes when it has settled; nothing rests on the last one meanwhile.
+        // A file that is being written gets its verdict when it has settled. Meanwhile no verdict
+        // rests on the last one.
         let is_settling =
             |path: &Path| FileKind::of_path(path).is_some() && self.unfinished.contains_key(path);
         let moved: Vec<_> = moved
@@ -228,14 +229,15 @@ impl Broker {
                     path: path.clone(),
                     stamp,
                 },
-                // Whether it has gone, or its watched directory is away as a whole, the watcher tells.
+                // The watcher decides whether the file was removed or its whole watched directory
+                // is missing.
                 (None, Some(_)) => Event::Unfinished {
                     path: path.clone(),
                     stamp,
                 },
                 (None, None) => Event::Vanished { path: path.clone() },
             };
-            // It may have a verdict of its own, which is of other bytes now.
+            // The file may have a verdict of its own, which belongs to other bytes now.
             if let Some(watcher) = watcher {
                 watcher.look(path);
             }
@@ -243,7 +245,7 @@ impl Broker {
         }
     }
 
-    /// Reads configuration and manifests again and applies them as a whole, or not at all.
+    /// Reads configuration and manifests again and applies all or none of them.
     pub(super) fn reload(&mut self) -> Result<Vec<String>, LoadError> {
         let loaded = self.load_anew();
         self.not_in_force = loaded.as_ref().err().map(ToString::to_string);
@@ -271,7 +273,7 @@ impl Broker {
                 demand: in_force.demand(),
             });
         } else {
-            // Other shadows may be left out when results are pooled.
+            // The shadows that are left out of pooling may have changed.
             self.in_force = in_force;
         }
         if let Some(specs) = children {
@@ -280,7 +282,8 @@ impl Broker {
         Ok(changes)
     }
 
-    /// What was wrong with former configurations and manifests is over; of those in force it still holds.
+    /// Removes the notices about former configurations and manifests. The notices about the current
+    /// ones remain.
     fn forget_older_attempts(&mut self) {
         self.state.is_over(|it| matches!(it, Notice::Loading(_)));
         for notice in &self.loaded.notices {
@@ -288,15 +291,15 @@ impl Broker {
         }
     }
 
-    /// Sends a scout to configuration, manifests and programs, unless one is on his way: they may lie on a disk that
-    /// does not answer, for which the loop must not wait.
+    /// Starts a probe of configuration, manifests and programs, unless one is running. They may be
+    /// on a disk that does not respond, and the loop must not wait for it.
     pub(super) fn look_for_changes(&mut self) {
         if self.looks.changes.is_some() {
             return;
         }
         let (sources, read) = (self.sources.clone(), self.loaded.read.clone());
         let (lock, store) = (self.state_directory.lock.clone(), self.store.clone());
-        // Where no thread can be started now, one may in a second.
+        // If no thread can be started now, the next try follows in a second.
         let look = move || {
             store.gate.iter().for_each(|it| it.keep_its_file());
             let around = Around {
@@ -309,7 +312,7 @@ impl Broker {
         self.looks.changes = self.probe(look).ok();
     }
 
-    /// Somebody may have removed the state directory, or put another one in its place.
+    /// Notes whether the state directory was removed or replaced.
     pub(super) fn look_at_state(&mut self, is_gone: bool) {
         let was_gone = std::mem::replace(&mut self.state_directory.is_gone, is_gone);
         if let Some(text) = self.said_of_state().filter(|_| !was_gone) {
@@ -327,7 +330,7 @@ impl Broker {
         ))
     }
 
-    /// A scout has come back with the stamps of all that was read for what is in force.
+    /// Handles the stamps that a probe has read of all configuration files in force.
     pub(super) fn reload_if_changed(&mut self, now: Fingerprint) {
         self.looks.changes = None;
         if now == self.fingerprint {
@@ -337,7 +340,8 @@ impl Broker {
         self.reload_and_say();
     }
 
-    /// Reads configuration and manifests again for a service manager. One that stops needs no others.
+    /// Reads configuration and manifests again for a service manager. A stopping broker does not
+    /// need them.
     pub(super) fn reload_on_signal(&mut self) {
         if !self.state.draining() {
             tracing::info!("SIGHUP: configuration and manifests are read again");
@@ -345,7 +349,8 @@ impl Broker {
         }
     }
 
-    /// Nobody waits for an answer: it is said in the log and in the status.
+    /// Reloads and reports the outcome in the log and in the status, because no client waits for an
+    /// answer.
     fn reload_and_say(&mut self) {
         match self.reload() {
             Ok(changes) if changes.is_empty() => {}
@@ -362,7 +367,7 @@ impl Broker {
     }
 }
 
-/// Answers at once; whoever has left needs no answer.
+/// Answers at once. A failed send is ignored, because the client has disconnected.
 fn answer(client: oneshot::Sender<Response>, response: Response) -> bool {
     let _ = client.send(response);
     true

@@ -1,4 +1,4 @@
-//! What a broker starts before it is there itself.
+//! Early start: children that the broker starts before it is complete itself.
 
 use qcbus_bus::SharedMemory;
 
@@ -9,12 +9,13 @@ use crate::environment::Children;
 use crate::options::Options;
 use crate::reload::Loaded;
 
-/// The first generation of an instance that nobody has used.
+/// The first generation of an unused instance.
 const FIRST_GENERATION: u64 = 1;
 
-/// Where a broker is the first and the last of its instance, what it is going to start is known beforehand. When it
-/// cannot be started yet, or the broker is not the first, it is started later; and nothing is where the bus has no
-/// room, which is waited for and tried again and again.
+/// Starts the children early. This is possible if the broker is the only one of its instance,
+/// because its children are then known beforehand. Otherwise, and if the early start fails, they
+/// are started later. If the bus has no room, no child is started early. The broker then retries
+/// until room is free.
 pub(super) fn early_children(
     options: &mut Options,
     loaded: &Loaded,
@@ -35,7 +36,7 @@ pub(super) fn early_children(
     Some(children)
 }
 
-/// Those that were started early, if they are this broker's.
+/// Returns the early children if they belong to this broker, or new ones.
 pub(super) fn early_or_now(
     early: Option<Children>,
     options: &Options,

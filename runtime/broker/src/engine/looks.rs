@@ -1,4 +1,4 @@
-//! What the loop wants to know of files: it sends scouts, because it must never wait for a disk.
+//! File lookups of the loop: it starts probes, because it must never wait for a disk.
 
 use std::collections::{BTreeSet, HashMap};
 use std::io;
@@ -21,18 +21,18 @@ use crate::watch::{
     FileLookup, NoFile, hidden_above, is_behind_a_link, is_left_alone, is_looked_at, look_at,
 };
 
-/// Who looks at files, and for whom.
+/// State of all file lookups and of the clients that wait for them.
 pub(super) struct Looks {
-    /// Sees who waits for which file.
+    /// Monitors the threads that wait for a file.
     io_watchdog: Arc<IoWatchdog>,
     probes: Probes,
-    /// Files that did not answer when they were last asked for.
+    /// Files that did not respond to the last access.
     hanging: BTreeSet<PathBuf>,
-    /// Who waits for a look at a file, by the number of the scout.
+    /// Clients that wait for a file lookup, by the number of the probe.
     pending: HashMap<u64, Look>,
-    /// Files that have gone while somebody waits for them, which are looked at once more.
+    /// Removed files that a client waits for. They are looked up once more.
     missed: HashMap<u64, Arc<Path>>,
-    /// The scout who looks whether configuration, manifests and programs are what they were.
+    /// The probe that checks configuration, manifests and programs for changes.
     pub(super) changes: Option<u64>,
     pub(super) around: Around,
 }
@@ -53,7 +53,7 @@ impl Default for Looks {
 }
 
 impl Looks {
-    /// For whoever else looks at files.
+    /// Returns the probes for other parts of the broker.
     pub(super) fn probes(&self) -> Probes {
         self.probes.clone()
     }
@@ -67,43 +67,43 @@ impl Looks {
     }
 }
 
-/// A client that waits for the verdict on a file, which is being looked at for it.
+/// A client that waits for the verdict on a file, and the file lookup for it.
 pub(super) struct Look {
     pub file: PathBuf,
     pub until: Until,
     pub answer: oneshot::Sender<Response>,
-    /// The path that was given led to this file.
+    /// The path of the client was resolved to this file.
     pub is_led: bool,
 }
 
-/// A file that is not what it was; `None` when it has gone.
+/// A changed file. The stamp is `None` if the file was removed.
 type Changed = (Arc<Path>, Option<Stamp>);
 
-/// What a scout has seen.
+/// Result of a file lookup.
 pub(super) struct LookedUp {
-    /// The file as it is watched: a link from elsewhere to a watched file means that file.
+    /// The watched file. An outside link to a watched file stands for that file.
     pub file: PathBuf,
     pub stamp: Option<Stamp>,
-    /// Those of the files that its verdict depends on which are not what they were.
+    /// Changed files that its verdict depends on.
     pub inputs: Vec<Changed>,
-    /// What was written for it and is not there any more.
+    /// Missing output files of it.
     pub lost: Vec<LostOutput>,
-    /// Why nobody watches it.
+    /// Reason why it is not watched, or `None`.
     pub unwatched: Option<String>,
-    /// Why it cannot be looked at, and will not be soon.
+    /// Reason why it cannot be read now or soon, or `None`.
     pub hidden: Option<String>,
 }
 
-/// What a scout says, and which one.
+/// Result of a probe, with the number of the probe.
 pub(super) struct Looked {
     probe: u64,
     seen: Seen,
 }
 
-/// What is around the broker, looked at once a second for whoever asks how it is.
+/// Environment of the broker, checked once a second for the status.
 #[derive(Default)]
 pub(super) struct Around {
-    /// What lies in place of the program that runs.
+    /// Description of the file that has replaced the running program.
     pub replaced: Option<String>,
     /// The state directory was removed or replaced.
     pub state_is_gone: bool,
@@ -111,12 +111,12 @@ pub(super) struct Around {
 }
 
 pub(super) enum Seen {
-    /// What configuration, manifests and programs are now, and what is around the broker.
+    /// Present state of configuration, manifests, programs and the environment of the broker.
     Sources(Fingerprint, Around),
-    /// The path means another file.
+    /// The path stands for another file.
     Elsewhere(PathBuf),
     LookedUp(LookedUp),
-    /// What there is of a file that was missed, and what its verdict depends on that is not what it was.
+    /// Present state of a file that was missing, and the changed files that its verdict depends on.
     Again {
         stamp: Option<Stamp>,
         inputs: Vec<Changed>,
@@ -124,7 +124,7 @@ pub(super) enum Seen {
 }
 
 impl Broker {
-    /// Sends a scout to a file that a client asks for.
+    /// Starts a probe of a file that a client requests.
     pub(super) fn look_at(&mut self, look: Look) -> bool {
         let (file, is_led) = (look.file.clone(), look.is_led);
         let inputs = self.state.inputs_of(&file).into_iter().skip(1).collect();
@@ -152,8 +152,8 @@ impl Broker {
         })
     }
 
-    /// A file that somebody waits for has gone, and may be there again by now: he must not be told then
-    /// that it has gone.
+    /// Looks up a removed file that a client waits for. It may exist again, and then the client
+    /// must not receive its removal.
     pub(super) fn look_whether_it_is_back(&mut self, path: Arc<Path>) -> bool {
         let (at, roots) = (path.clone(), self.options.roots.clone());
         let inputs = self.state.inputs_of(&path).into_iter().skip(1).collect();
@@ -175,7 +175,7 @@ impl Broker {
     fn missed(&mut self, path: Arc<Path>, stamp: Option<Stamp>) -> bool {
         let go_on = stamp.is_some() || self.handle(Event::Vanished { path: path.clone() });
         if let Some(watcher) = &self.watcher {
-            // It may have told meanwhile that the file is back.
+            // The watcher may have reported meanwhile that the file is back.
             if stamp.is_none() {
                 watcher.forget(path.clone());
             }
@@ -184,13 +184,14 @@ impl Broker {
         go_on
     }
 
-    /// Sends a scout, who tells the loop what he sees; gives his number.
+    /// Starts a probe that sends its result to the loop. Returns its number.
     pub(super) fn probe(&self, see: impl FnOnce() -> Seen + Send + 'static) -> io::Result<u64> {
         let (tell, told) = std::sync::mpsc::channel();
         let inbox = self.inbox.looked_in.clone();
         let sent = self.looks.probes.send(move || {
             let seen = see();
-            // It is told its number right after it was sent. After the end of the loop nobody listens.
+            // The number follows right after the start. A failed send is ignored, because the loop
+            // has ended.
             if let Ok(probe) = told.recv() {
                 let _ = inbox.send(Looked { probe, seen });
             }
@@ -206,7 +207,7 @@ impl Broker {
             }
             Err(error) => {
                 let reason = format!("cannot look at {}: {error}", to_text(&look.file));
-                // A client that has left needs no answer.
+                // The error is ignored, because a client that has disconnected needs no answer.
                 let _ = look.answer.send(Response::Failed { reason });
             }
         }
@@ -227,7 +228,7 @@ impl Broker {
                 self.take_in(inputs);
                 path.is_none_or(|path| self.missed(path, stamp))
             }
-            // A look that is not there any more was given up, and answered.
+            // A missing entry means that the lookup was given up and answered.
             Seen::Elsewhere(file) => match self.looks.pending.remove(&probe) {
                 Some(look) => {
                     let is_led = true;
@@ -246,7 +247,7 @@ impl Broker {
         }
     }
 
-    /// Ends what waits for a file that does not answer, and says so as long as it is so.
+    /// Ends waits for files that do not respond, and reports these files as long as they hang.
     pub(super) fn give_up_the_overdue(&mut self) {
         for overdue in self.looks.io_watchdog.overdue(PATIENCE) {
             self.give_up(&overdue);
@@ -271,16 +272,17 @@ impl Broker {
     }
 
     fn give_up(&mut self, overdue: &Overdue) {
-        // Without an owner: the only look that there is, which nobody can take over.
+        // Without an owner it is a single lookup that no other thread can take over.
         let Some(owner) = overdue.owner else { return };
-        // What changed there is seen when it answers.
+        // Changes there are noticed when the file responds again.
         if self.is_watcher(owner) || self.looks.changes == Some(owner) {
             return;
         }
         let (path, seconds) = (to_text(&overdue.path), overdue.waited.as_secs());
         let reason = format!("read {path}: the system has not answered for {seconds} s");
         if let Some(look) = self.looks.pending.remove(&owner) {
-            // As when no verdict came in time: there is none, and nothing of the question is wrong.
+            // The answer is the same as after a timeout: there is no verdict, but the request is
+            // valid.
             let _ = look.answer.send(Response::Unanswered { reason });
             return;
         }
@@ -295,8 +297,8 @@ impl Broker {
     }
 }
 
-/// A link from elsewhere to a watched file means that file, and so does a path to it through a link to its
-/// directory.
+/// Returns the watched file that a path stands for. The path may be an outside link to the file, or
+/// may lead through a link to its directory.
 fn meant(file: &Path, places: &ResultPaths, roots: &[PathBuf]) -> Option<PathBuf> {
     if !places.contains(file) {
         return led_to(file, |at| places.contains(at));
@@ -309,10 +311,10 @@ fn meant(file: &Path, places: &ResultPaths, roots: &[PathBuf]) -> Option<PathBuf
     is_looked_at(roots, &real).then_some(real)
 }
 
-/// More links in a row than the kernel follows.
+/// Maximum number of consecutive links. The kernel does not follow more.
 const MOST_LINKS: usize = 40;
 
-/// Follows links to a file one by one, because one of them may be the name under which a file is judged.
+/// Follows links to a file one by one, because each may be the path under which it is judged.
 fn led_to(file: &Path, is_meant: impl Fn(&Path) -> bool) -> Option<PathBuf> {
     let mut next = file.to_path_buf();
     for _ in 0..MOST_LINKS {
@@ -334,7 +336,8 @@ fn moved(inputs: Vec<Input>) -> Vec<Changed> {
     now.flatten().collect()
 }
 
-/// Whether an error is none of those that pass within a second; a server that does not answer passes, but who knows when.
+/// Checks whether an error is permanent. Errors that pass within a second are not. A server that
+/// does not respond counts as permanent, because the end of its failure is unknown.
 fn is_there_to_stay(error: &io::Error) -> bool {
     error.kind() == io::ErrorKind::TimedOut || !foreign::is_of_the_moment(error)
 }
@@ -343,14 +346,14 @@ fn hides(file: &Path, error: &io::Error) -> String {
     format!("cannot look at {}: {error}", to_text(file))
 }
 
-/// What lies at the path of a file that is not there and hinders it from coming.
+/// Returns a description of the entry that occupies the path of a missing file.
 fn what_instead(file: &Path, stamp: Option<Stamp>, roots: &[PathBuf]) -> Option<String> {
     if stamp.is_some() {
         return None;
     }
     let what = match look_at(file, roots) {
         FileLookup::Directory | FileLookup::Known => "it is a directory".to_owned(),
-        // What it leads to may come.
+        // The target of the link may still be created.
         FileLookup::NoFile(NoFile::Dangling(_)) => return None,
         FileLookup::NoFile(what) => what.to_string(),
         FileLookup::File(_) | FileLookup::Nothing | FileLookup::Hidden(_) => return None,

@@ -1,4 +1,4 @@
-//! The one loop: the world becomes events, the state machine's actions become deeds.
+//! Main loop: turns inputs into events and executes the actions of the state machine.
 
 mod act;
 mod asked;
@@ -45,66 +45,66 @@ use crate::store::Store;
 use crate::watch::{Seen, Watcher, Why};
 use crate::writers::Writers;
 
-/// Why a broker cannot start.
+/// Reason why a broker cannot start.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
-    /// The bus.
+    /// The bus failed.
     #[error("{0}")]
     Bus(#[from] BusError),
-    /// The journal.
+    /// The journal failed.
     #[error("{0}")]
     Journal(#[from] JournalError),
-    /// The configuration or a manifest.
+    /// The configuration or a manifest is invalid.
     #[error("{0}")]
     Load(#[from] LoadError),
-    /// The directory of results is somebody else's.
+    /// The results directory is locked by another process.
     #[error("{0}")]
     Results(#[from] LockError),
-    /// The gate cannot be had.
+    /// The gate cannot be used.
     #[error("{0}")]
     Gate(#[from] GateError),
-    /// Anything that the system refuses.
+    /// The system has returned an error.
     #[error("{what}: {source}")]
     System {
-        /// What was tried.
+        /// The failed operation.
         what: String,
-        /// What the system says.
+        /// Error of the system.
         source: std::io::Error,
     },
 }
 
-/// What a person at the keyboard or a service manager wants.
+/// Request of a user at the keyboard or of a service manager.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OperatorSignal {
-    /// Finish what is there, and stop.
+    /// Finish the active work and stop.
     Drain,
     /// Stop at once.
     Quit,
-    /// Read configuration and manifests again, and go on.
+    /// Read configuration and manifests again and continue.
     Reload,
 }
 
-/// A verdict as the loop's owner is told.
+/// A verdict for the owner of the loop.
 #[derive(Debug, Clone)]
 pub struct Announcement {
     /// The file.
     pub path: Arc<Path>,
     /// Its verdict.
     pub judged: Arc<Judged>,
-    /// `false`: it stood already.
+    /// `false` if the verdict was already valid before.
     pub fresh: bool,
 }
 
-/// What the loop's owner is told while it runs.
+/// Message of the running loop to its owner.
 #[derive(Debug, Clone)]
 pub enum Told {
     /// A verdict.
     Verdict(Announcement),
-    /// Something for a person.
+    /// A notice for the user.
     Notice(Notice),
-    /// The first look at everything is done.
+    /// The first scan is complete.
     Scanned {
-        /// The files known, in the order of their paths.
+        /// The known files, sorted by path.
         files: Vec<Arc<Path>>,
     },
 }
@@ -122,31 +122,32 @@ pub struct Broker {
     children: Children,
     sources: Sources,
     loaded: Loaded,
-    /// Why the configuration or a manifest as it lies there now is not in force.
+    /// Reason why the present configuration or a present manifest is not in force.
     not_in_force: Option<String>,
     in_force: Arc<InForce>,
-    /// Of all that was last looked at for what is in force: at first from before it was read, because what has
-    /// changed since is not.
+    /// Fingerprint of the files that were last checked for the configuration in force. The first
+    /// one is taken before they are read, because later changes are not in force.
     fingerprint: Fingerprint,
     watcher: Option<Watcher>,
     watching: Option<Watching>,
     output_watch: Option<OutputWatch>,
     watch_mode: String,
-    /// What could not be looked at, and why.
+    /// Paths that could not be read, each with the reason.
     unseen: BTreeMap<PathBuf, String>,
-    /// What is being written to, and is not judged until it has settled.
+    /// Files that are being written to and are judged when they have settled.
     unfinished: BTreeMap<Arc<Path>, Why>,
     looks: Looks,
     sessions: Sessions,
     request_ids: HashMap<RequestId, oneshot::Sender<Response>>,
     downs: Vec<oneshot::Sender<Response>>,
     next_request_id: u64,
-    /// Where the results of files lay that have been withdrawn, by reporter and file, until the
-    /// reporter has taken back its report.
+    /// Paths of withdrawn results, by reporter and file. They are kept until the reporter has
+    /// withdrawn its report.
     left: HashMap<(String, Arc<Path>), PathBuf>,
-    /// Results were stored or delivered since free memory was last given back.
+    /// Results were stored or delivered since free memory was last returned.
     untrimmed: bool,
-    /// Who must judge could not be recorded at once: from then on a writer does it, in order.
+    /// A registry change could not be recorded at once. From then on a writer records the changes,
+    /// in order.
     journal_is_behind: bool,
     inbox: Inbox,
     tell: Box<dyn FnMut(Told) + Send>,
@@ -175,14 +176,14 @@ struct Inbox {
     deliveries_in: mpsc::UnboundedSender<Ready>,
 }
 
-/// A result read back for a reporter, or why it could not be.
+/// A result that was read back for a reporter, or the reason why this failed.
 struct Ready {
     session: SessionId,
     job: JobId,
     message: Result<Box<ToPeer>, String>,
 }
 
-/// Sessions as the state machine and the bus number them.
+/// Mapping between the session numbers of the state machine and of the bus.
 #[derive(Debug, Default)]
 struct Sessions {
     peers: BTreeMap<SessionId, PeerId>,
@@ -206,8 +207,8 @@ impl Sessions {
     }
 }
 
-/// The time in which the loop was about. While the broker stands still, nobody can hear what bundles
-/// say: they are not silent for that, and no deadline of theirs passes.
+/// Time during which the loop was running. While the broker stands still, it cannot receive
+/// messages of bundles. Therefore they do not count as silent, and no deadline of theirs passes.
 #[derive(Debug)]
 struct AttendedTime {
     last: Instant,
@@ -215,7 +216,7 @@ struct AttendedTime {
 }
 
 impl AttendedTime {
-    /// Longer than any turn of the loop takes.
+    /// Longer than any iteration of the loop takes.
     const LONGEST_TURN: Duration = Duration::from_secs(1);
 
     fn new() -> AttendedTime {
@@ -233,20 +234,20 @@ impl AttendedTime {
     }
 }
 
-/// How often the loop looks at the clock.
+/// Interval of the loop's timer.
 const TICK: Duration = Duration::from_millis(50);
 
-/// How often configuration and manifests are looked at.
+/// Interval of the checks of configuration and manifests.
 const RELOAD_INTERVAL: Duration = Duration::from_secs(1);
 
-/// How often the history of jobs is pruned.
+/// Interval of pruning the history of jobs.
 const PRUNE_INTERVAL: Duration = Duration::from_secs(3600);
 
-/// While files are judged, how often free memory is given back.
+/// Interval of returning free memory while files are judged.
 const TRIM_INTERVAL: Duration = Duration::from_secs(10);
 
 impl Broker {
-    /// Runs until everything is done (`once`) or somebody wants it to stop.
+    /// Runs until all files are judged (`once`) or a user requests the end.
     pub async fn run(mut self, mut signals: mpsc::Receiver<OperatorSignal>) {
         let children = self.loaded.children.clone();
         self.handle(Event::Children { specs: children });
@@ -256,7 +257,7 @@ impl Broker {
         let mut tick = tokio::time::interval(TICK);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         let mut next_reload = now() + RELOAD_INTERVAL;
-        // What is remembered for one run has no history.
+        // A single run without a state directory has no history.
         let lasts = self.options.state.is_some();
         let mut next_prune = now();
         let mut next_trim = now() + TRIM_INTERVAL;
@@ -306,45 +307,45 @@ impl Broker {
         self.children.kill_all();
         self.children.kill_what_they_started();
         if !quit {
-            // A disk that does not answer must not keep anybody from stopping.
+            // A disk that does not respond must not block the shutdown.
             for writer in self.writers.finish(self.options.settings.drain_limit) {
                 let what =
                     format!("{writer} hangs; what it did not write is made good at the next start");
                 (self.tell)(Told::Notice(Notice::Storing(what)));
             }
         }
-        // They have had the time to die.
+        // The children have had time to end.
         self.children.bury_all();
         self.children.forget_launches();
         for down in self.downs.drain(..) {
-            // A client that has left needs no answer.
+            // The error is ignored, because a client that has disconnected needs no answer.
             let _ = down.send(Response::Stopped);
         }
         self.request_ids.clear();
         self.control.flush().await;
-        // Nothing is to outlive the process, which ends now: its documents go with it, too.
+        // The process ends now and nothing outlives it, so its documents are freed with it.
         if self.options.die_with_broker && self.host.end_with_process() {
             std::mem::forget(self.intake);
         }
     }
 
-    /// Forgets the history of jobs beyond the retention time, off the loop.
+    /// Prunes the history of jobs beyond the retention time, outside the loop.
     fn prune(&self) {
         let (store, keep) = (self.store.clone(), self.options.retention);
         let notices = self.inbox.notices_in.clone();
         spawn_blocking(move || {
             if let Err(why) = store.prune(keep) {
-                // After the end of the loop nobody listens.
+                // The error is ignored: after the end of the loop the notice is not needed.
                 let _ = notices.send(Notice::Storing(why));
             }
         });
     }
 
-    /// Gives one event to the state machine and does what it wants. `false`: the end.
+    /// Passes one event to the state machine and executes its actions. Returns `false` at the end.
     fn handle(&mut self, event: Event) -> bool {
         let now = self.clock.now(now());
         let actions = self.state.handle(now, event);
-        // Before any of the actions: what is stored from now on is of this epoch.
+        // This precedes all actions, because results stored from now on belong to this epoch.
         self.store
             .epoch
             .store(self.state.epoch().0, Ordering::Release);
@@ -367,14 +368,14 @@ impl Broker {
         self.handle(event)
     }
 
-    /// A process that was killed may have been writing a report: what it left half-written is
-    /// removed, off the loop.
+    /// Removes half-written files of dead processes, outside the loop. A killed process may have
+    /// been writing a report.
     fn sweep_dead(&self) {
         let out = self.options.out.clone();
         spawn_blocking(move || qcbus_disk::sweep_dead(&out));
     }
 
-    /// Looks through all processes of the machine, off the loop.
+    /// Searches all processes of the machine for stale children and kills them, outside the loop.
     fn kill_stale_children(&self, joined: BTreeSet<Launch>) {
         let Some(stale_children) = self.children.stale_children() else {
             return;
@@ -385,7 +386,7 @@ impl Broker {
                 let why = format!(
                     "process {pid}, which an earlier broker had started, did not join this one"
                 );
-                // After the end of the loop nobody listens.
+                // The error is ignored: after the end of the loop the notice is not needed.
                 let _ = notices.send(Notice::Killed { name, why });
             }
         });
@@ -423,7 +424,7 @@ impl Broker {
         }
     }
 
-    /// Somebody who has proven which process it is wants to take part. `proof` is of who has started it.
+    /// Handles the hello of a peer with a proven process. `proof` shows the broker that started it.
     fn peer_says_hello(
         &mut self,
         peer: PeerId,
@@ -432,7 +433,7 @@ impl Broker {
         proof: &str,
     ) -> bool {
         if let Some(launch) = hello.launch.map(Launch) {
-            // One that has died since it said hello would keep its name from the next.
+            // A process that has died since its hello would block its name for the next one.
             if process.is_some_and(|it| !it.is_alive()) {
                 self.host.disconnect(peer);
                 return true;
@@ -466,7 +467,7 @@ impl Broker {
                 self.look_whether_it_is_back(path)
             }
             Seen::Vanished(path) => self.handle(Event::Vanished { path }),
-            // It has been named, and why.
+            // The path and the reason were already reported.
             Seen::Unseen(unseen) if self.looks.is_hanging(&unseen.path) => true,
             Seen::Unseen(unseen) => {
                 self.unseen(unseen);

@@ -1,6 +1,5 @@
-//! The loop as a simulation runs it: the same sources and the same deeds as in [`Broker::run`], but the
-//! simulation says which of the sources that have something comes next. Configuration and
-//! manifests stay as they are.
+//! Loop of a simulation. It has the same sources and actions as [`Broker::run`]. The simulation
+//! selects the next of the ready sources. Configuration and manifests do not change.
 
 use super::{Broker, StartError, TICK, Told};
 use crate::core::{Event, Notice};
@@ -22,12 +21,13 @@ enum Source {
     Tick,
 }
 
-/// A broker from its start until it is killed.
+/// Runs a broker from its start until it is killed.
 pub fn simulate(options: &Options, tell: impl FnMut(Told) + Clone + Send + 'static) {
     loop {
         match Broker::start(options.clone(), tell.clone()) {
             Ok(broker) => return broker.run_simulated(),
-            // Another test of this process starts a program, which holds for a moment what is open here.
+            // Another test of this process may be starting a program, which briefly inherits the
+            // open descriptors.
             Err(error) if is_held(&error) => std::thread::yield_now(),
             Err(error) => panic!("a simulated broker does not start: {error}"),
         }
@@ -144,7 +144,7 @@ fn said(event: &Event) -> String {
     }
 }
 
-/// A notice for a line.
+/// Returns a notice as one line.
 pub fn line_of(told: &Told) -> Option<String> {
     match told {
         Told::Verdict(it) => Some(format!(

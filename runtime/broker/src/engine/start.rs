@@ -1,4 +1,4 @@
-//! How a broker starts: the instance, the journal, the configuration, the first look.
+//! Start of a broker: the instance, the journal, the configuration and the first scan.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
@@ -34,11 +34,11 @@ use crate::watch::{Seen, is_looked_at, scan_directory};
 use qcbus_disk::foreign;
 
 impl Broker {
-    /// Takes the instance, opens the journal, reads the configuration. Must be called within a
-    /// tokio runtime.
+    /// Locks the instance, opens the journal and reads the configuration. It must be called within
+    /// a tokio runtime.
     ///
     /// # Errors
-    /// See [`StartError`]; nothing is left behind.
+    /// See [`StartError`]. After an error nothing is left behind.
     pub fn start(
         mut options: Options,
         tell: impl FnMut(Told) + Send + 'static,
@@ -100,7 +100,7 @@ impl Broker {
         Ok(broker)
     }
 
-    /// Takes over from the journal who must judge, and what reporters are to take back.
+    /// Restores the registry and the pending withdrawals of reports from the journal.
     fn take_up(&mut self, members: Vec<Member>, voids: Vec<Void>) {
         for member in members {
             self.state.remember_member(member);
@@ -110,8 +110,8 @@ impl Broker {
         }
     }
 
-    /// Takes over what stands; what has changed while nobody watched is looked at again. Returns
-    /// what the verdicts depend on.
+    /// Restores the valid verdicts. Files that changed while no broker was watching are checked
+    /// again. Returns the paths that the verdicts depend on.
     fn remember(&mut self, found: Reconciled) -> Vec<(Arc<Path>, Option<Stamp>)> {
         for mut file in found.standing {
             for input in file.judged.inputs.iter().skip(1) {
@@ -127,11 +127,11 @@ impl Broker {
         found.stamps.into_iter().collect()
     }
 
-    /// Begins to look at what this broker has written: it may not stay as it is.
+    /// Starts to watch the output files of this broker, because other processes may change them.
     fn look_at_outputs(&mut self) -> Result<(), StartError> {
         let events = self.inbox.events_in.clone();
         let tell = move |lost| {
-            // After the end of the loop nobody listens.
+            // The error is ignored: after the end of the loop the event is not needed.
             let _ = events.send(Event::OutputsLost { lost });
         };
         let watch = self.store.outputs.watch(Box::new(tell));
@@ -139,7 +139,7 @@ impl Broker {
         Ok(())
     }
 
-    /// A reporter is to take back its report; `left` says where the result lay.
+    /// Restores the pending withdrawal of a report. `left` is the path of the result.
     fn remember_void(&mut self, path: &Arc<Path>, reporter: &str, left: Option<PathBuf>) {
         if let Some(xqar) = left {
             self.left.insert((reporter.to_owned(), path.clone()), xqar);
@@ -147,8 +147,8 @@ impl Broker {
         self.state.remember_void(path, reporter);
     }
 
-    /// Takes over what stands, and begins to look at the files: by watching, together with what verdicts depend on,
-    /// or once.
+    /// Restores the valid verdicts and starts to look at the files. They are either watched,
+    /// together with the paths that verdicts depend on, or scanned once.
     fn look(
         &mut self,
         found: Reconciled,
@@ -193,7 +193,7 @@ fn tell_at_the_start(
     let first = limited.map(Notice::Limited).into_iter();
     let identity = difference_of(options).map(Notice::Storing);
     for notice in first.chain(identity).chain(open).chain(right) {
-        // The loop that listens has not ended before it began.
+        // The send cannot fail, because the receiving loop starts later.
         let _ = notices.send(notice);
     }
 }
@@ -212,8 +212,8 @@ fn sources_of(options: &Options) -> Sources {
     }
 }
 
-/// The bus is made for those who are expected. Nobody else joins what ends by itself; a newer process
-/// may stand beside each that was started.
+/// Returns the dimensions of the bus for the expected peers. A broker that ends by itself has no
+/// other peers. Each started process may have a newer one beside it.
 pub(super) fn shape(options: &Options, loaded: &Loaded) -> HostOptions {
     let expected_peers = loaded.children.len();
     let most = match options.watch {
@@ -223,7 +223,7 @@ pub(super) fn shape(options: &Options, loaded: &Loaded) -> HostOptions {
     HostOptions {
         expected_peers,
         max_peers: options.host.max_peers.min(most),
-        // Where there is none, none comes.
+        // Without a configuration file none is added later.
         config_grows: options.watch || options.config.is_some(),
         ..options.host
     }
@@ -242,7 +242,7 @@ fn intake(options: &Options, host: &Host, in_force: &InForce) -> Arc<Intake> {
     Arc::new(intake)
 }
 
-/// A file that a link leads to is judged under its own path.
+/// Returns the function that maps a link to the path under which its file is judged.
 fn judged_as(options: &Options) -> Box<JudgedAs> {
     let (roots, files) = (options.roots.clone(), options.files.clone());
     let judges_all = options.settings.once && !options.settings.own_verdicts;
@@ -280,7 +280,7 @@ pub(super) fn children(
 }
 
 fn look_once(roots: &[PathBuf], files: &[PathBuf], seen: &mpsc::UnboundedSender<Seen>) {
-    // The loop may have been told to quit meanwhile; then nobody listens.
+    // The loop may have ended meanwhile, so a failed send is ignored.
     let tell = |what| drop(seen.send(what));
     for root in roots {
         let found = scan_directory(root, roots);

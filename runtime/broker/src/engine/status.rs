@@ -1,4 +1,4 @@
-//! How the broker is, for whoever asks.
+//! Status of the broker.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use super::Broker;
 use crate::gate::Gate;
 use crate::watch::Why;
 
-/// Most that is told of what could not be looked at, or is not finished.
+/// Maximum number of listed paths that could not be read or have not settled.
 const UNSEEN_SHOWN: usize = 100;
 
 impl Broker {
@@ -38,7 +38,7 @@ impl Broker {
         }
     }
 
-    /// What keeps the broker from its work at this moment.
+    /// Returns the failures that currently prevent the broker from working.
     fn troubles(&self) -> Vec<String> {
         let mut troubles: Vec<String> = self.writers.troubles().into_iter().collect();
         if self.is_nobody_watching() {
@@ -70,7 +70,7 @@ impl Broker {
             path: path.clone(),
             why: why.clone(),
         };
-        // Whoever asks wants to see where to look, and no answer of any length.
+        // The status lists only the first paths to keep the answer short.
         self.unseen.iter().take(UNSEEN_SHOWN).map(unseen).collect()
     }
 }

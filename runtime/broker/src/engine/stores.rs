@@ -1,4 +1,5 @@
-//! What a starting broker writes to: the journal, the directory of results, the gate; and what it finds there.
+//! Stores of a starting broker: opens the journal, the results directory and the gate, and reads
+//! their content.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -25,9 +26,9 @@ use crate::store::{Reconciled, Store, TrialResults, remove_earlier_results};
 use crate::watch::is_looked_at;
 use crate::writers::Writers;
 
-/// The directory in which the journal lies.
+/// The directory of the journal.
 pub(super) struct StateDirectory {
-    /// `None` where there is no journal.
+    /// `None` if there is no journal.
     pub lock: Option<Arc<DirectoryLock>>,
     /// It was removed or replaced while the broker ran.
     pub is_gone: bool,
@@ -48,7 +49,8 @@ pub(super) fn journal_of(options: &Options) -> Result<Option<Journal>, JournalEr
     opened.transpose()
 }
 
-/// From where on numbers are new, and who must judge; nothing where there is no journal.
+/// Returns the first new number and the registry from the journal. Both are empty without a
+/// journal.
 pub(super) fn remembered_by(journal: Option<&Journal>) -> Result<(u64, Vec<Member>), JournalError> {
     let Some(journal) = journal else {
         return Ok((0, Vec::new()));
@@ -56,7 +58,7 @@ pub(super) fn remembered_by(journal: Option<&Journal>) -> Result<(u64, Vec<Membe
     Ok((journal.numbers()?, journal.members()?))
 }
 
-/// Nobody else may write results there meanwhile, but for other runs of `check`.
+/// Locks the results directory. Runs of `check` share it with each other.
 pub(super) fn results_of(options: &Options) -> Result<DirectoryLock, LockError> {
     if options.watch {
         DirectoryLock::take(&options.out, Purpose::Results, options.instance.name())
@@ -65,7 +67,8 @@ pub(super) fn results_of(options: &Options) -> Result<DirectoryLock, LockError> 
     }
 }
 
-/// What a broker writes is looked at as long as it runs; what a run writes belongs to whoever has it done.
+/// Returns the outputs. A broker watches its output files while it runs. The results of a run
+/// belong to the user who started it.
 fn outputs_of(options: &Options) -> Result<Outputs, StartError> {
     if !options.watch || is_simulated() {
         return Ok(Outputs::default());
@@ -138,15 +141,14 @@ fn gate_of(
         outside: options.gate_outside,
         is_judged: Box::new(move |path| is_looked_at(&roots, path)),
         say: Box::new(move |text| {
-            // After the end of the loop nobody listens.
+            // The error is ignored: after the end of the loop the notice is not needed.
             let _ = notices.send(Notice::HeldBack(text));
         }),
     };
     Gate::open(gate, options.instance.name())
 }
 
-/// Sweeps and brings in agreement what is on the disk and what is remembered, before anything is
-/// judged.
+/// Removes leftovers and reconciles the disk with the journal before any file is judged.
 pub(super) fn reconcile(
     options: &Options,
     loaded: &Loaded,

@@ -1,4 +1,4 @@
-//! What a service manager is told.
+//! Messages to a service manager.
 
 use super::Broker;
 
@@ -25,7 +25,7 @@ impl Broker {
     }
 }
 
-/// Tells systemd, if it started us.
+/// Notifies systemd if it has started this process.
 fn notify(states: &[sd_notify::NotifyState<'_>]) {
     if let Err(error) = sd_notify::notify(states) {
         tracing::debug!("systemd was not told: {error}");

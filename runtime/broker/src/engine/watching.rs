@@ -1,7 +1,8 @@
-//! The watcher, and another in its place once it waits for a file that does not answer.
+//! Watcher of the loop, and its replacement when it waits for a file that does not respond.
 //!
-//! A thread that waits for a disk in vain cannot be ended. Its work can be given to another, which
-//! the lookout keeps from going there; the first has nothing to say any more, should it ever come back.
+//! A thread that waits for a disk in vain cannot be ended, but another one can take over its work.
+//! The I/O watchdog keeps the new thread away from that disk. Messages of the old thread are
+//! ignored if it ever returns.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,14 +14,14 @@ use super::Broker;
 use crate::core::Notice;
 use crate::watch::{Known, Seen, WatchOptions, Watcher};
 
-/// Numbers of watchers at the lookout; jobs and scouts never come here.
+/// First number of watchers at the I/O watchdog. Numbers of jobs and probes never reach it.
 const FIRST: u64 = 3 << 62;
 
-/// Whose word counts, and where it goes.
+/// The current watcher and the channel for its messages.
 pub(super) struct Watching {
     current: Arc<AtomicU64>,
     seen: UnboundedSender<Seen>,
-    /// It waits in vain, and no successor could be started yet.
+    /// The current watcher waits in vain, and no replacement could be started yet.
     is_alone: bool,
 }
 
@@ -34,7 +35,7 @@ impl Watching {
         }
     }
 
-    /// Whether nobody watches for changes now.
+    /// Checks whether no thread currently watches for changes.
     fn is_alone(&self) -> bool {
         self.is_alone
     }
@@ -45,7 +46,7 @@ impl Watching {
 }
 
 impl Broker {
-    /// Begins to watch; `known` is what is gone on with.
+    /// Starts a watcher. `known` is the state that it continues with.
     pub(super) fn watch(
         &self,
         watching: &Watching,
@@ -61,7 +62,7 @@ impl Broker {
         let (current, seen) = (watching.current.clone(), watching.seen.clone());
         let tell = move |what| {
             if current.load(Ordering::Acquire) == own {
-                // After the end of the loop nobody listens.
+                // The error is ignored: after the end of the loop the message is not needed.
                 let _ = seen.send(what);
             }
         };
@@ -73,7 +74,8 @@ impl Broker {
         started
     }
 
-    /// Whether this is the number of a watcher. One that waits in vain has a successor then.
+    /// Checks whether this is the number of a watcher. If it is the current watcher, it waits in
+    /// vain and is replaced.
     pub(super) fn is_watcher(&mut self, number: u64) -> bool {
         let is_current = |it: &mut Watching| it.number() == number;
         if let Some(mut watching) = self.watching.take_if(is_current) {
@@ -87,7 +89,7 @@ impl Broker {
         self.watching.as_ref().is_some_and(Watching::is_alone)
     }
 
-    /// Tries again what could not be done for want of a thread.
+    /// Tries again to start a replacement after no thread could be started.
     pub(super) fn watch_again(&mut self) {
         if let Some(mut watching) = self.watching.take_if(|it| it.is_alone) {
             self.succeed(&mut watching);
@@ -101,7 +103,7 @@ impl Broker {
         });
         match self.watch(watching, known) {
             Ok(watcher) => {
-                // What still cannot be looked at is named again.
+                // Paths that still cannot be read are reported again.
                 self.unseen.retain(|path, _| self.looks.is_hanging(path));
                 self.unfinished.clear();
                 watcher.depend(self.state.dependencies());
@@ -118,7 +120,7 @@ impl Broker {
         }
     }
 
-    /// What did not answer does again: it may have changed meanwhile.
+    /// Handles a path that responds again. It may have changed meanwhile.
     pub(super) fn answers_again(&mut self, path: PathBuf) {
         self.unseen.remove(&path);
         if let Some(watcher) = &self.watcher {

@@ -1,4 +1,4 @@
-//! What lies in the directory of a gate, whoever put it there.
+//! Contents of a gate directory, including files from other programs.
 
 use std::collections::{HashMap, HashSet};
 use std::io;
@@ -13,13 +13,13 @@ use qcbus_messages::path_text::to_text;
 use crate::directory_lock::{GATE_FILE, LockError};
 use crate::store::digest_of;
 
-/// Why a directory cannot be a gate, with the way out.
+/// Reason why a directory cannot be a gate, with a way to fix it.
 #[derive(Debug, thiserror::Error)]
 pub enum GateError {
-    /// Another broker has it, or it cannot be taken.
+    /// Another broker uses the directory, or the lock cannot be taken.
     #[error("{0}")]
     Lock(#[from] LockError),
-    /// Somebody else's files are in it.
+    /// The directory contains files of another program.
     #[error(
         "the gate {} holds files and is no gate of qcbus, which removes whatever it has not published: choose an empty directory with --gate, or `touch {}` to let it have this one with all that is in it",
         to_text(directory), to_text(&directory.join(GATE_FILE))
@@ -28,7 +28,7 @@ pub enum GateError {
         /// The directory.
         directory: PathBuf,
     },
-    /// It cannot be looked through, or something in it cannot be removed.
+    /// The directory cannot be searched, or something in it cannot be removed.
     #[error(
         "cannot clear the gate {}: {source}; choose another with --gate",
         to_text(directory)
@@ -36,12 +36,12 @@ pub enum GateError {
     Contents {
         /// The directory.
         directory: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: io::Error,
     },
 }
 
-/// Refuses a directory that has files and was no gate before.
+/// Refuses a directory that contains files and was no gate before.
 pub(super) fn refuse_foreign(directory: &Path) -> Result<(), GateError> {
     let found = files(directory).map_err(|source| GateError::Contents {
         directory: directory.to_path_buf(),
@@ -55,8 +55,9 @@ pub(super) fn refuse_foreign(directory: &Path) -> Result<(), GateError> {
     })
 }
 
-/// Everything below the directory but directories and the gate's own file, with sizes in bytes.
-/// Directories that cannot be looked into, such as `lost+found`, hold nothing of ours.
+/// Returns everything below the directory except directories and the gate's own file, with sizes in
+/// bytes. Unreadable directories, such as `lost+found`, are skipped because they contain no
+/// published files.
 pub(super) fn files(directory: &Path) -> io::Result<HashMap<PathBuf, u64>> {
     let mut found = HashMap::new();
     let mut open = vec![directory.to_path_buf()];
@@ -73,7 +74,8 @@ pub(super) fn files(directory: &Path) -> io::Result<HashMap<PathBuf, u64>> {
             if data.is_dir() {
                 open.push(entry.path());
             } else if entry.file_name() != GATE_FILE || next != *directory {
-                // Nothing but a file has the size of one, and who has another name of it can change it at any time.
+                // Another program can change an entry that is no regular file, or has another hard
+                // link, at any time.
                 let is_ours = data.is_file() && data.nlink() == 1;
                 let size = if is_ours { data.len() } else { u64::MAX };
                 found.insert(entry.path(), size);
@@ -83,14 +85,14 @@ pub(super) fn files(directory: &Path) -> io::Result<HashMap<PathBuf, u64>> {
     Ok(found)
 }
 
-/// The digest of a file of this size in bytes; `None` when it cannot be read.
+/// Returns the digest of a file of this size in bytes, or `None` if it cannot be read.
 pub(super) fn digest_at(path: &Path, size: u64) -> Option<Digest> {
     let bytes = foreign::read(path, size).ok()?;
     Some(digest_of(&bytes))
 }
 
-/// Removes all files that are not kept, what refers to others before what others refer to, and the
-/// directories that are empty then.
+/// Removes all files that are not in `kept`, and the directories that become empty. Files that
+/// refer to others are removed before the files that they refer to.
 pub(super) fn remove_others(
     directory: &Path,
     there: &HashMap<PathBuf, u64>,

@@ -1,12 +1,12 @@
-//! The gate: a directory in which accepted files lie, and nothing else. What lies there is complete
-//! and judged as it lies there.
+//! The gate: a directory that contains accepted files only. Each file in it is complete and was
+//! judged with exactly these bytes.
 //!
-//! A *claim* is an acceptance with the digests of all that it depends on. A file is published if it
-//! has a claim, and each file below the watched directories that it depends on and that is judged
-//! by itself has a claim on the same bytes and is published, too. What it depends on and nobody
-//! judges by itself (an included file, one that is ignored) is published with it. The accepted
-//! file gets its name last and loses it first, so that it is never there without what it needs.
-//! Only files that refer to each other come one after the other.
+//! A *publication* is an acceptance with the digests of all files that it depends on. A file is
+//! published if it has a publication and its judged dependencies are published with the same bytes,
+//! too. A judged dependency lies below the watched directories and gets its own verdict. Other
+//! dependencies (an included file, an ignored file) are published with the file. The accepted file
+//! gets its name last and loses it first, so it is never there without its dependencies. Only files
+//! that refer to each other appear one after the other.
 
 mod contents;
 mod publications;
@@ -35,45 +35,45 @@ use qcbus_disk::{foreign, is_for_good, write_ahead};
 pub use contents::GateError;
 use publications::{Copies, Need, Plan, Publication, PublicationState, Publications};
 
-/// What becomes of an accepted file that depends on one outside of the watched directories.
+/// Treatment of an accepted file that depends on a file outside of the watched directories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Outside {
-    /// It is published; the verdict file names the other.
+    /// The file is published. The verdict file names the file outside.
     #[default]
     Name,
-    /// It is not published.
+    /// The file is not published.
     Refuse,
 }
 
-/// Whether a file gets a verdict of its own.
+/// Predicate: whether a file gets a verdict of its own.
 pub type IsJudged = Box<dyn Fn(&Path) -> bool + Send + Sync>;
 
-/// Tells a person.
+/// Function that shows a message to the user.
 pub type Say = Box<dyn Fn(String) + Send + Sync>;
 
-/// How a gate is to be.
+/// Options of a gate.
 pub struct GateOptions {
-    /// The directory.
+    /// Directory of the gate.
     pub directory: PathBuf,
-    /// What lies where.
+    /// Mapping from files to their places in the directory.
     pub paths: ResultPaths,
-    /// Whether copies are on the disk before they get their names.
+    /// Whether copies are flushed to the disk before they get their names.
     pub durable: bool,
-    /// What depends on files outside.
+    /// Treatment of accepted files that depend on files outside.
     pub outside: Outside,
-    /// Most bytes of a file; one that has more is not what was accepted.
+    /// Maximum size of a file in bytes. A larger file is not the accepted one.
     pub max_file: u64,
-    /// Who looks at files.
+    /// Probe threads that read the files.
     pub probes: Probes,
-    /// Keeps what lies there.
+    /// Monitors the published files.
     pub outputs: Outputs,
-    /// Whether a file gets a verdict of its own.
+    /// Predicate: whether a file gets a verdict of its own.
     pub is_judged: IsJudged,
-    /// Tells a person.
+    /// Function that shows a message to the user.
     pub say: Say,
 }
 
-/// The gate. Shared by the threads that write.
+/// The gate. The writer threads share it.
 pub struct Gate {
     options: GateOptions,
     publications: Mutex<Publications>,
@@ -89,10 +89,10 @@ impl fmt::Debug for Gate {
 }
 
 impl Gate {
-    /// Takes the directory for the broker of an instance.
+    /// Locks the directory for the broker of an instance.
     ///
     /// # Errors
-    /// See [`GateError`]; each says what to do.
+    /// See [`GateError`]. Each error names a fix.
     pub fn open(options: GateOptions, instance: &str) -> Result<Gate, GateError> {
         contents::refuse_foreign(&options.directory)?;
         let lock = DirectoryLock::take(&options.directory, Purpose::Gate, instance)?;
@@ -108,7 +108,7 @@ impl Gate {
         })
     }
 
-    /// Makes sure that the directory that lies there is this broker's. Somebody may have put another one in its place.
+    /// Makes sure that this broker owns the directory. Another program may have replaced it.
     fn hold(&self) -> io::Result<()> {
         if self.lock.is_in_place() {
             return Ok(());
@@ -119,17 +119,19 @@ impl Gate {
         self.lock.hold().map_err(io::Error::other)
     }
 
-    /// Puts the file by which a start knows the gate in its place again, if somebody has removed it alone.
+    /// Restores the marker file, by which a start recognises the gate, if only this file was
+    /// removed.
     pub fn keep_its_file(&self) {
         if self.lock.has_lost_its_file() {
-            // The next file that is written there says why it cannot be.
+            // The next write into the directory reports the error.
             let _ = self.hold();
         }
     }
 
-    /// Brings the directory in agreement with the journal: what belongs to none of its acceptances is
-    /// removed. Returns the accepted files that are not published. They have no claim, because others may
-    /// have to judge them by now: [`Gate::accept`] publishes those whose verdict stands.
+    /// Makes the directory agree with the journal: removes each file that belongs to no acceptance
+    /// in it. Returns the accepted files that are not published. They have no publication, because
+    /// the required set may have changed: [`Gate::accept`] publishes those with a verdict that
+    /// still holds.
     ///
     /// # Errors
     /// When the directory cannot be read, or something in it cannot be removed.
@@ -169,25 +171,25 @@ impl Gate {
         Ok(waiting)
     }
 
-    /// Where a file lies behind the gate when it is published.
+    /// Returns the place of a published file behind the gate.
     pub fn place(&self, path: &Path) -> PathBuf {
         self.options
             .directory
             .join(self.options.paths.relative(path))
     }
 
-    /// The files outside of the watched directories that a verdict depends on.
+    /// Returns the files outside of the watched directories that a verdict depends on.
     pub fn outside<'i>(&self, inputs: &'i [Input]) -> Vec<&'i Path> {
         let files = inputs.iter().filter(|input| is_file(input));
         let outside = files.filter(|input| !self.options.paths.contains(&input.path));
         outside.map(|input| &*input.path).collect()
     }
 
-    /// Before a new acceptance is written: what lies there of other bytes goes, with everything
-    /// that rests on it.
+    /// Removes an older version of a file before a new acceptance is written, with everything that
+    /// depends on it.
     ///
     /// # Errors
-    /// When something cannot be removed.
+    /// When a file cannot be removed.
     pub fn make_way(&self, path: &Arc<Path>, judged: &Judged) -> io::Result<()> {
         let publication = self.publication(judged);
         self.make_way_for(path, &publication).map(|_| ())
@@ -209,11 +211,11 @@ impl Gate {
         Ok(publications)
     }
 
-    /// A file is accepted: it is published if everything that it needs is. The files that waited
-    /// for it come with [`Gate::follow`].
+    /// Accepts a file, and publishes it if everything that it needs is published. [`Gate::follow`]
+    /// publishes the files that waited for it.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// When the file cannot be written.
     pub fn accept(&self, path: &Arc<Path>, judged: &Judged) -> io::Result<()> {
         let publication = self.publication(judged);
         let mut publications = self.make_way_for(path, &publication)?;
@@ -224,11 +226,11 @@ impl Gate {
         self.publish(path)
     }
 
-    /// Before another verdict than an acceptance is written: the file goes, with everything that
-    /// rests on it.
+    /// Removes a file before a verdict other than an acceptance is written, with everything that
+    /// depends on it.
     ///
     /// # Errors
-    /// When something cannot be removed.
+    /// When a file cannot be removed.
     pub fn refuse(&self, path: &Arc<Path>) -> io::Result<()> {
         self.hold()?;
         let mut publications = self.publications();
@@ -249,19 +251,19 @@ impl Gate {
         Ok(())
     }
 
-    /// The file goes, with everything that rests on it, until it is accepted again.
+    /// Removes a file, with everything that depends on it, until it is accepted again.
     ///
     /// # Errors
-    /// When something cannot be removed.
+    /// When a file cannot be removed.
     pub fn revoke(&self, path: &Arc<Path>) -> io::Result<()> {
         self.hold()?;
         self.publications().revoke(path)
     }
 
-    /// As [`Gate::revoke`] for a file that is no more.
+    /// Works as [`Gate::revoke`], for a file that no longer exists.
     ///
     /// # Errors
-    /// When something cannot be removed.
+    /// When a file cannot be removed.
     pub fn forget(&self, path: &Arc<Path>) -> io::Result<()> {
         self.hold()?;
         let mut publications = self.publications();
@@ -269,10 +271,11 @@ impl Gate {
         publications.revoke(path)
     }
 
-    /// Publishes an accepted file if that has not been done, and then whatever waited for it.
+    /// Publishes an accepted file if it is not published yet, and then all files that waited for
+    /// it.
     ///
     /// # Errors
-    /// When something cannot be written now, with the first such file; all others were tried.
+    /// When a file cannot be written now. Returns the first such file. All others were tried.
     pub fn follow(&self, path: &Arc<Path>) -> Result<(), (Arc<Path>, io::Error)> {
         let mut failed = None;
         let mut open = VecDeque::from([path.clone()]);
@@ -290,7 +293,8 @@ impl Gate {
         failed.map_or(Ok(()), Err)
     }
 
-    /// No waiting brings a file to a place where something else is in the way.
+    /// Records a failed publication. A permanent error, such as an obstacle at the place, is not
+    /// retried.
     fn not_published(
         &self,
         path: &Arc<Path>,
@@ -309,7 +313,8 @@ impl Gate {
         (self.options.say)(held(path, &why));
     }
 
-    /// How many files are published, and which accepted ones are not.
+    /// Returns the number of published files, and examples of accepted files that are not
+    /// published.
     pub fn status(&self) -> GateStatus {
         let publications = self.publications();
         let mut status = GateStatus {
@@ -336,10 +341,10 @@ impl Gate {
         status
     }
 
-    /// Publishes one file with what it needs, if it may be.
+    /// Publishes one file with everything that it needs, if this is allowed.
     fn publish(&self, path: &Arc<Path>) -> io::Result<()> {
         loop {
-            // A name for it, because a lock in the scrutinee would be held in the arms.
+            // A lock guard in the scrutinee would live through the arms, so the value gets a name.
             let state_of_publication = self.publications().state_of_publication(path);
             let plan = match state_of_publication {
                 PublicationState::Settled => return Ok(()),
@@ -352,40 +357,40 @@ impl Gate {
                 }
             };
             self.hold()?;
-            // Outside of the lock, because it takes its time.
+            // The lock is not held here, because copying takes time.
             let Some(copies) = self.copy(&plan)? else {
                 return Ok(());
             };
             step("copied", path);
-            // Otherwise the claims have changed meanwhile, and it is looked at anew.
+            // Otherwise the publications have changed meanwhile, and the loop starts again.
             if self.publications().publish(&plan, copies)? {
                 return Ok(());
             }
         }
     }
 
-    /// The bytes of a file, if they are those that were accepted.
+    /// Returns the bytes of a file if they are the accepted ones.
     fn accepted(&self, path: &Arc<Path>, digest: Digest) -> io::Result<Option<Vec<u8>>> {
         let (path, most) = (path.clone(), self.options.max_file);
         let read = move || foreign::read(&path, most);
         let read = self.options.probes.within(read).and_then(|read| read);
         match read {
             Ok(bytes) => Ok((digest_of(&bytes) == digest).then_some(bytes)),
-            // Something else lies there.
+            // The file at this path is not the accepted one.
             Err(error) if is_of_the_path(&error) => Ok(None),
             Err(error) => Err(error),
         }
     }
 
-    /// The very bytes that were accepted; `None` when others are there by now. They get a verdict
-    /// of their own.
+    /// Copies the accepted bytes. Returns `None` if a file has other bytes by now and gets its own
+    /// verdict.
     fn copy(&self, plan: &Plan) -> io::Result<Option<Copies>> {
         let mut copies = Copies::new();
         for (path, digest) in &plan.lacking {
             let Some(bytes) = self.accepted(path, *digest)? else {
                 return Ok(None);
             };
-            // A copy, not a link: a hard link would follow a writer who changes the file in place.
+            // A hard link would show in-place changes of the file, so the bytes are copied.
             let place = self.publications().place(path);
             let copy = write_ahead(&place, &bytes, self.options.durable)?;
             copies.insert(path.clone(), (*digest, copy));
@@ -405,7 +410,7 @@ impl Gate {
         (self.options.say)(held(path, why));
     }
 
-    /// What an acceptance claims.
+    /// Returns the publication of an acceptance.
     fn publication(&self, judged: &Judged) -> Publication {
         let needs = judged.inputs.iter().skip(1);
         let inside = |input: &&Input| self.options.paths.contains(&input.path);
@@ -418,7 +423,7 @@ impl Gate {
                 judged: (self.options.is_judged)(&input.path),
             })
         };
-        // A file that was only looked at, such as a scenario in a catalog directory, is needed by nobody.
+        // A file that was only searched, such as a scenario in a catalog directory, is not needed.
         let rests_on = judged.rests_on.as_ref();
         let is_needed = |need: &Need| {
             let named = |all: &Vec<RestsOn>| all.iter().any(|it| it.path == need.path);
@@ -440,7 +445,7 @@ impl Gate {
         }
     }
 
-    /// Why an acceptance does not lead behind the gate, whatever else comes.
+    /// Returns the reason why an accepted file can never be published in this version, or `None`.
     fn refusal(&self, judged: &Judged) -> Option<String> {
         let inputs = judged.inputs.iter();
         let mut unread = inputs.filter(|it| matches!(it.content, Reading::Unread(_)));
@@ -472,7 +477,7 @@ impl Gate {
     }
 }
 
-/// Files that are named where there may be thousands.
+/// Maximum number of files in a list of examples; there may be thousands.
 const SHOWN: usize = 10;
 
 fn is_of_the_path(error: &io::Error) -> bool {
@@ -486,7 +491,7 @@ fn size_of_root(judged: &Judged) -> u64 {
     stamp.map_or(0, |stamp| stamp.size)
 }
 
-/// Whether bytes of a file were read: directories are looked through, not read.
+/// Checks whether the input is a file that was read. Directories are listed, not read.
 fn is_file(input: &Input) -> bool {
     matches!(input.content, Reading::Read(stamp, _) if !is_listing(&stamp))
 }
@@ -495,7 +500,7 @@ fn held(path: &Path, why: &str) -> String {
     format!("{} is accepted and not published: {why}", to_text(path))
 }
 
-/// One line for all that a verdict keeps from being published.
+/// Returns one line for all files that a verdict holds back.
 fn held_by(path: &Path, held: &[Arc<Path>]) -> Option<String> {
     let (first, others) = held.split_first()?;
     let others = match others.len() {

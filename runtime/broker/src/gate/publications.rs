@@ -1,5 +1,5 @@
-//! The claims, and what lies behind the gate because of them. No bytes are read or written here:
-//! files that have been written aside get their names, or lose them.
+//! Publications, and the files that lie behind the gate because of them. This module reads and
+//! writes no bytes: it only gives names to files that are already written, or removes them.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::io;
@@ -13,36 +13,37 @@ use crate::outputs::Outputs;
 use crate::result_paths::ResultPaths;
 use qcbus_disk::{FileFingerprint, Temporary, remove, remove_empty_above};
 
-/// A file that an acceptance rests on, besides the accepted one.
+/// A file that an accepted file depends on.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Need {
     pub(super) path: Arc<Path>,
     pub(super) digest: Digest,
-    /// In bytes.
+    /// Size in bytes.
     pub(super) size: u64,
-    /// It gets a verdict of its own; otherwise it lies behind the gate for those who need it.
+    /// Whether the file gets a verdict of its own. Otherwise it lies behind the gate for the files
+    /// that need it.
     pub(super) judged: bool,
 }
 
-/// An acceptance.
+/// Publication of an accepted file.
 #[derive(Debug, Clone)]
 pub(super) struct Publication {
     pub(super) digest: Digest,
-    /// In bytes.
+    /// Size in bytes.
     pub(super) size: u64,
     pub(super) needs: Vec<Need>,
-    /// Why it is never published as it is, if so: for a person.
+    /// Reason, shown to the user, why the file is never published in this version, or `None`.
     pub(super) refused: Option<String>,
-    /// It lies behind the gate with everything that it rests on.
+    /// Whether the file lies behind the gate with everything that it depends on.
     pub(super) published: bool,
-    /// It was said that it is held back.
+    /// Whether the user was informed that the file is held back.
     pub(super) told: bool,
-    /// Tells this claim from others on the same file.
+    /// Distinguishes this publication from others of the same file.
     pub(super) serial: u64,
 }
 
 impl Publication {
-    /// Whether both say the same of the same bytes.
+    /// Checks whether both publications have the same digest, the same needs and the same refusal.
     pub(super) fn agrees(&self, other: &Publication) -> bool {
         (self.digest, &self.needs, &self.refused) == (other.digest, &other.needs, &other.refused)
     }
@@ -52,51 +53,52 @@ impl Publication {
 #[derive(Debug)]
 struct Lying {
     digest: Digest,
-    /// The published files that it is there for, itself among them if it is one.
+    /// Published files that need this file. A file that is published itself is in its own set.
     users: BTreeSet<Arc<Path>>,
 }
 
-/// What is to be published in one step.
+/// Files that are published in one step.
 #[derive(Debug)]
 pub(super) struct Plan {
-    /// The accepted files with the numbers of their claims, each after those that it rests on.
+    /// Accepted files with the serial numbers of their publications. Each comes after those that it
+    /// depends on.
     roots: Vec<(Arc<Path>, u64)>,
-    /// The files that do not lie behind the gate yet.
+    /// Files that do not lie behind the gate yet.
     pub(super) lacking: Vec<(Arc<Path>, Digest)>,
 }
 
-/// What is to be done about a claim.
+/// State of a publication: which step comes next.
 #[derive(Debug)]
 pub(super) enum PublicationState {
-    /// Nothing: there is none, or it is published.
+    /// No step: there is no publication, or the file is already published.
     Settled,
-    /// It can be published.
+    /// The file can be published.
     Ready(Plan),
-    /// It is held back.
+    /// The file is held back.
     HeldBack {
-        /// Why: for a person.
+        /// Reason, shown to the user.
         why: String,
-        /// It will stay so until another verdict comes.
+        /// Whether the file stays held back until another verdict comes.
         lasting: bool,
     },
 }
 
-/// Copies that have been written and have no names yet.
+/// Copies that are written but have no final names yet.
 pub(super) type Copies = HashMap<Arc<Path>, (Digest, Temporary)>;
 
-/// All claims.
+/// All publications.
 #[derive(Debug)]
 pub(super) struct Publications {
     directory: PathBuf,
     paths: ResultPaths,
     outputs: Outputs,
     publications: HashMap<Arc<Path>, Publication>,
-    /// By file: the claims that rest on it.
+    /// For each file: the publications that depend on it.
     resting: HashMap<Arc<Path>, BTreeSet<Arc<Path>>>,
     lying: HashMap<Arc<Path>, Lying>,
-    /// Files whose verdict is no acceptance.
+    /// Files with a verdict other than an acceptance.
     refused: HashSet<Arc<Path>>,
-    /// Copies that nobody needs and that could not be removed.
+    /// Copies that are no longer needed and still have to be removed.
     litter: BTreeSet<PathBuf>,
     next_serial: u64,
 }
@@ -116,7 +118,7 @@ impl Publications {
         }
     }
 
-    /// Where a file lies behind the gate.
+    /// Returns the place of a file behind the gate.
     pub(super) fn place(&self, path: &Path) -> PathBuf {
         self.directory.join(self.paths.relative(path))
     }
@@ -138,7 +140,7 @@ impl Publications {
             .is_some_and(|publication| publication.published)
     }
 
-    /// Whether nobody has removed or changed what lies behind the gate for a claim.
+    /// Checks whether the files behind the gate for a publication are still there and unchanged.
     pub(super) fn is_whole(&self, path: &Arc<Path>) -> bool {
         let Some(publication) = self.get(path) else {
             return true;
@@ -148,7 +150,7 @@ impl Publications {
         !places.any(|place| self.outputs.is_lost(&place))
     }
 
-    /// Puts a claim in; there must be none of this file.
+    /// Inserts a publication. There must be no other publication of this file.
     pub(super) fn insert(&mut self, path: &Arc<Path>, publication: Publication) {
         self.next_serial += 1;
         for need in &publication.needs {
@@ -163,24 +165,23 @@ impl Publications {
         self.publications.insert(path.clone(), publication);
     }
 
-    /// The claims that rest on a file.
+    /// Returns the publications that depend on a file.
     pub(super) fn resting_on(&self, path: &Path) -> Vec<Arc<Path>> {
         let resting = self.resting.get(path).into_iter().flatten();
         resting.cloned().collect()
     }
 
-    /// A file has another verdict than an acceptance.
+    /// Records that a file has a verdict other than an acceptance.
     pub(super) fn refuse(&mut self, path: &Arc<Path>) {
         self.refused.insert(path.clone());
     }
 
-    /// Nothing is known of a file any more.
+    /// Removes the record that a file was refused.
     pub(super) fn forget(&mut self, path: &Path) {
         self.refused.remove(path);
     }
 
-    /// What is to be done about a claim: it is published with those that it rests on and that are
-    /// not published yet.
+    /// Returns the next step for a publication. Unpublished ones that it depends on are included.
     pub(super) fn state_of_publication(&self, root: &Arc<Path>) -> PublicationState {
         if self
             .get(root)
@@ -214,8 +215,8 @@ impl Publications {
                     continue;
                 }
                 match plan.lacking.iter().find(|(other, _)| *other == file) {
-                    // One of the two is out of date and is judged anew. Until then nothing can satisfy
-                    // both, however often it is tried.
+                    // One of the two verdicts is out of date, and the file is judged again. Until
+                    // then a retry cannot satisfy both.
                     Some((_, other)) if *other != digest => {
                         let file = to_text(&file);
                         let why = format!(
@@ -233,7 +234,8 @@ impl Publications {
         PublicationState::Ready(plan)
     }
 
-    /// Why a claim cannot be published for its own sake, or for a claim that is not what it needs.
+    /// Returns the reason why a file is not published: it is refused, or a need was not accepted
+    /// with these bytes.
     fn held(&self, publication: &Publication) -> Option<PublicationState> {
         if let Some(why) = &publication.refused {
             return Some(PublicationState::HeldBack {
@@ -259,14 +261,15 @@ impl Publications {
         PublicationState::HeldBack { why, lasting }
     }
 
-    /// Whether a need must have a claim of its own.
+    /// Checks whether a needed file must have a publication of its own.
     fn is_judged(&self, need: &Need) -> bool {
         need.judged
             || self.publications.contains_key(&need.path)
             || self.refused.contains(&need.path)
     }
 
-    /// The files that lie behind the gate for the sake of one claim, the accepted one last.
+    /// Returns the files that lie behind the gate for one publication. The accepted file is the
+    /// last.
     fn files_of(&self, path: &Arc<Path>, publication: &Publication) -> Vec<(Arc<Path>, Digest)> {
         let fragments = publication
             .needs
@@ -277,13 +280,14 @@ impl Publications {
         fragments.chain([own]).collect()
     }
 
-    /// Publishes what was planned, unless the claims have changed meanwhile: then `false`, and
-    /// nothing of it lies behind the gate.
+    /// Publishes the files of a plan. Returns `false` if the publications have changed since then.
+    /// In that case the files of the plan are not published.
     ///
     /// # Errors
-    /// When a file cannot get or lose its name; what is published then is complete.
+    /// When a file cannot get or lose its name. The files that are still published are complete
+    /// then.
     pub(super) fn publish(&mut self, plan: &Plan, mut copies: Copies) -> io::Result<bool> {
-        // Other bytes in these places are older: whatever is published with them goes first.
+        // Other bytes in these places are older. Everything published with them is removed first.
         for (path, digest) in &plan.lacking {
             let other = self.lying.get(path).filter(|it| it.digest != *digest);
             let users: Vec<Arc<Path>> = other
@@ -299,8 +303,8 @@ impl Publications {
         }
         for (root, _) in &plan.roots {
             if let Err(error) = self.put(root, &mut copies) {
-                // What was put there for it is needed by nobody; what rests on it, if files refer to
-                // each other, is not complete.
+                // The files put there for this root are no longer needed. Files that depend on it,
+                // in a cycle of references, are not complete.
                 self.drop_user(root);
                 self.close(root)?;
                 return Err(error);
@@ -330,7 +334,8 @@ impl Publications {
         })
     }
 
-    /// Gives the files of one claim their names, the accepted one last: with that it is published.
+    /// Gives the files of one publication their names. The accepted file is the last, which
+    /// publishes it.
     fn put(&mut self, root: &Arc<Path>, copies: &mut Copies) -> io::Result<()> {
         let Some(publication) = self.get(root) else {
             return Ok(());
@@ -352,7 +357,7 @@ impl Publications {
         Ok(())
     }
 
-    /// Gives a copy its name; without one, the file lies there already.
+    /// Gives a copy its final name. Without a copy, the file already lies there.
     fn lay(&mut self, path: &Arc<Path>, copy: Option<Temporary>) -> io::Result<()> {
         let place = self.place(path);
         let fingerprint = FileFingerprint::at(copy.as_ref().map_or(&place, Temporary::path));
@@ -367,11 +372,11 @@ impl Publications {
         Ok(())
     }
 
-    /// Takes a file from behind the gate: everything that rests on it goes first, then it goes
-    /// itself, then what nobody needs any more. The claims stay.
+    /// Removes a file from behind the gate. Everything that depends on it is removed first, then
+    /// the file, then the files that are no longer needed. The publications stay recorded.
     ///
     /// # Errors
-    /// When something cannot be removed; what is still published then is complete.
+    /// When a file cannot be removed. The files that are still published are complete then.
     pub(super) fn close(&mut self, path: &Arc<Path>) -> io::Result<()> {
         let published = |path: &Path| -> Vec<Arc<Path>> {
             let mut resting = self.resting_on(path);
@@ -396,10 +401,10 @@ impl Publications {
         self.tidy()
     }
 
-    /// Closes, and drops the claim.
+    /// Removes a file from behind the gate and drops its publication.
     ///
     /// # Errors
-    /// As [`Publications::close`]; the claim stays then.
+    /// As [`Publications::close`]. The publication stays then.
     pub(super) fn revoke(&mut self, path: &Arc<Path>) -> io::Result<()> {
         self.close(path)?;
         let Some(publication) = self.publications.remove(path) else {
@@ -416,7 +421,7 @@ impl Publications {
         Ok(())
     }
 
-    /// A claim is not published any more: what lay there for it alone is litter.
+    /// Removes a root as a user of its files. Files without another user are scheduled for removal.
     fn drop_user(&mut self, root: &Arc<Path>) {
         let needs = self
             .get(root)
@@ -445,8 +450,9 @@ impl Publications {
         Ok(())
     }
 
-    /// Takes for published whatever lies behind the gate completely. `lies` says whether a file with these
-    /// bytes is in its place. Drops the other claims, and returns whose they were.
+    /// Marks every publication as published if its files are completely behind the gate. `lies`
+    /// checks whether a file with these bytes is in its place. Drops the other publications and
+    /// returns their files.
     pub(super) fn take_over(
         &mut self,
         mut lies: impl FnMut(&Path, u64, Digest) -> bool,
@@ -464,7 +470,7 @@ impl Publications {
         };
         let mut complete: HashSet<Arc<Path>> =
             self.publications.iter().filter_map(by_themselves).collect();
-        // Whatever rests on what is not complete is not complete either.
+        // A publication that depends on an incomplete one is incomplete, too.
         let mut open: Vec<Arc<Path>> = self.publications.keys().cloned().collect();
         open.retain(|path| !complete.contains(path));
         let mut left = open.clone();
@@ -478,7 +484,7 @@ impl Publications {
         }
         let complete: BTreeSet<Arc<Path>> = complete.into_iter().collect();
         for root in complete {
-            // All of it lies there, so that nothing is named.
+            // All files already lie there, so no file is renamed and no error can occur.
             let _ = self.put(&root, &mut Copies::new());
         }
         for path in &left {
@@ -487,13 +493,13 @@ impl Publications {
         Ok(left)
     }
 
-    /// Where everything lies that belongs behind the gate.
+    /// Returns the places of all files that belong behind the gate.
     pub(super) fn places(&self) -> HashSet<PathBuf> {
         self.lying.keys().map(|path| self.place(path)).collect()
     }
 }
 
-/// Gives a copy its name. A directory that was left empty is no hindrance.
+/// Gives a copy its final name. An empty directory at that place is removed.
 fn name(copy: Temporary, place: &Path) -> io::Result<()> {
     match copy.persist(place) {
         Ok(()) => Ok(()),
@@ -504,7 +510,8 @@ fn name(copy: Temporary, place: &Path) -> io::Result<()> {
     }
 }
 
-/// All paths that can be reached by `before`, each after those that `before` gives for it.
+/// Returns all paths reachable through `before`. Each comes after the paths that `before` returns
+/// for it.
 fn each_after(start: Vec<Arc<Path>>, before: impl Fn(&Path) -> Vec<Arc<Path>>) -> Vec<Arc<Path>> {
     let mut order = Vec::new();
     let mut seen: HashSet<Arc<Path>> = HashSet::new();

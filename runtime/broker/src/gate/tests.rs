@@ -1,4 +1,5 @@
-//! A farm of a few files in a temporary directory, a gate beside it, and orders in any order.
+//! Tests of the gate: a few files in a temporary directory with a gate beside it, and calls in any
+//! order.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,8 +11,8 @@ use super::*;
 use crate::core::{Epoch, Reading, RequiredSet};
 use crate::stamp::stamp_through_links;
 
-/// What a file is built from, by name. Maps include fragments, scenarios have maps and scenarios;
-/// two refer to each other.
+/// Files with the inputs of each. Maps include fragments, scenarios have maps and scenarios; two
+/// refer to each other.
 const FARM: [(&str, &[&str]); 7] = [
     ("part.xml", &[]),
     ("a.xodr", &["part.xml"]),
@@ -59,7 +60,7 @@ impl Bench {
         }
     }
 
-    /// The acceptance of what lies there now.
+    /// Returns an acceptance of the current bytes.
     fn judged(&self, name: &str) -> Judged {
         let parts = FARM
             .iter()
@@ -83,7 +84,7 @@ impl Bench {
         self.gate.refuse(&self.path(name)).unwrap();
     }
 
-    /// Names behind the gate.
+    /// Returns the names behind the gate.
     fn behind(&self) -> BTreeSet<String> {
         let gate = self.dir.path().join("gate");
         let files = contents::files(&gate).unwrap();
@@ -184,7 +185,7 @@ fn a_part_that_changes_takes_all_that_rests_on_it_with_it() {
     bench.gate.make_way(&bench.path("a.xodr"), &judged).unwrap();
     assert_eq!(bench.behind(), names(&["b.xodr", "part.xml"]));
     bench.accept("a.xodr");
-    // The other map was accepted with the old part, the scenario with the old map.
+    // The other map was accepted with the old part, and the scenario with the old map.
     assert_eq!(bench.behind(), names(&["a.xodr", "part.xml"]));
     assert_eq!(bench.content("part.xml"), "part.xml 2");
     bench.accept("b.xodr");
@@ -246,7 +247,7 @@ fn what_lies_outside_is_named_or_refused() {
     }
 }
 
-/// Behind the gate there are no links: the same words lead to another file there, or to none.
+/// There are no links behind the gate. The same path leads to another file there, or to none.
 #[test]
 fn what_is_found_by_the_parent_of_a_link_is_not_published() {
     let bench = Bench::new(Outside::Name);
@@ -342,16 +343,16 @@ fn gate_whose_file_is_removed_gets_it_back_and_another_directory_does_not() {
     assert!(!file.exists(), "a directory of others is not ours to have");
 }
 
-/// What happens to a file.
+/// An operation on a file.
 #[derive(Debug, Clone, Copy)]
 enum Step {
     Accept(usize),
     Refuse(usize),
     Revoke(usize),
     Forget(usize),
-    /// Its bytes become others; whoever rests on it is told, as the core does.
+    /// The bytes change. The publications that depend on the file are revoked, as the core does.
     Change(usize, u8),
-    /// Its bytes become others and nobody has noticed yet.
+    /// The bytes change, and the change is not noticed yet.
     ChangeUnseen(usize, u8),
 }
 
@@ -367,7 +368,7 @@ fn step() -> impl Strategy<Value = Step> {
     ]
 }
 
-/// Claims by hand: by name, the bytes of everything that it rests on, itself among them.
+/// Expected publications: for each name the bytes of all its inputs, including the file itself.
 type Model = BTreeMap<String, BTreeMap<String, String>>;
 
 fn take(bench: &Bench, model: &mut Model, step: Step) {
@@ -409,7 +410,7 @@ fn take(bench: &Bench, model: &mut Model, step: Step) {
     }
 }
 
-/// What is wrong with what lies behind the gate.
+/// Returns the faults in the contents of the gate.
 fn faults(bench: &Bench, model: &Model) -> Vec<String> {
     let behind = bench.behind();
     let mut faults = Vec::new();
@@ -433,7 +434,7 @@ fn faults(bench: &Bench, model: &Model) -> Vec<String> {
     faults
 }
 
-/// Which files must lie there when the bytes on the disk are those of every claim.
+/// Returns the files that must be published if the bytes on the disk match every publication.
 fn complete(model: &Model) -> BTreeSet<String> {
     let mut complete: BTreeSet<String> = model.keys().cloned().collect();
     loop {
@@ -465,7 +466,7 @@ proptest! {
             let faults = faults(&bench, &model);
             prop_assert!(faults.is_empty(), "{step:?} in {steps:?}: {faults:?}");
         }
-        // Once everything was judged as it is, all of it lies there.
+        // After every file was judged in its current state, all of them must be published.
         for _ in 0..2 {
             for file in 0..FARM.len() {
                 take(&bench, &mut model, Step::Accept(file));
@@ -485,7 +486,8 @@ fn claims_on_different_bytes_of_one_file_wait_for_a_verdict() {
     let stale = bench.judged("s.xosc");
     let path = bench.path("s.xosc");
     bench.gate.accept(&path, &stale).unwrap();
-    // What the map was accepted with lies there again, and what the scenario was accepted with does not.
+    // The bytes that the map was accepted with are back. Those that the scenario was accepted with
+    // are not.
     bench.write("part.xml", "1");
     bench.gate.accept(&path, &stale).unwrap();
     assert!(!bench.behind().contains("s.xosc"));

@@ -1,4 +1,4 @@
-//! What went wrong on the way to a published image, and what that means for the root.
+//! Errors on the way to a published image, and their effect on the root.
 
 use std::path::Path;
 
@@ -10,22 +10,22 @@ use qcbus_messages::path_text::to_text;
 use crate::core::PrepareFailure;
 use crate::stamp::stamp_of;
 
-/// Why a file is not on the bus.
+/// Reason why a file is not on the bus.
 #[derive(Debug)]
 pub(super) enum Failure {
-    /// It could not be read.
+    /// The file could not be read.
     Ingest(IngestError),
-    /// No image could be built of it.
+    /// No image could be built from the file.
     Build(String),
-    /// The image is there, and the bus did not take it.
+    /// The image exists, but the bus did not accept it.
     Publish(String),
     /// The bus has no room for the image.
     Loan(LoanError),
 }
 
 impl Failure {
-    /// What the failure means for a file that a root refers to: that it cannot be had, or that the
-    /// whole is to be tried again.
+    /// Returns the effect of the failure on a file that a root refers to. Either the file is
+    /// absent, or the whole job must be tried again.
     pub fn of_linked(self, path: &Path) -> Result<Absence, PrepareFailure> {
         match self {
             Failure::Loan(LoanError::TooLarge(_)) => Ok(Absence::TooLarge {
@@ -39,7 +39,7 @@ impl Failure {
             }),
             Failure::Loan(error) => Err(unpublished(path, &error)),
             Failure::Publish(error) => Err(unpublished(path, &error)),
-            // It is written to this very moment: the whole is read again shortly.
+            // The file is being written right now. The whole job is read again shortly.
             Failure::Ingest(error @ IngestError::Unsettled { .. }) => {
                 Err(PrepareFailure::NoRoom(error.to_string()))
             }
@@ -61,13 +61,13 @@ impl From<LoanError> for Failure {
     }
 }
 
-/// What the failure means for the root.
+/// Returns the effect of the failure on the root.
 pub(super) fn explained(failure: Failure, path: &Path) -> PrepareFailure {
     match failure {
         Failure::Ingest(IngestError::Missing { .. } | IngestError::Unsettled { .. }) => {
             match stamp_of(path) {
                 Ok(None) => PrepareFailure::Vanished,
-                // It is written to this very moment: it is read again shortly.
+                // The file is being written right now. It is read again shortly.
                 _ => PrepareFailure::NoRoom(format!("{} changes while it is read", to_text(path))),
             }
         }
@@ -77,8 +77,8 @@ pub(super) fn explained(failure: Failure, path: &Path) -> PrepareFailure {
             unreadable(path, format!("{} is too large for the bus", to_text(path)))
         }
         Failure::Loan(LoanError::Busy) => PrepareFailure::Busy,
-        // No waiting helps, unless somebody makes the memory larger: it is tried again as what cannot
-        // be read is.
+        // Waiting does not help until the shared memory is enlarged. The file is tried again like
+        // an unreadable file.
         Failure::Loan(error @ (LoanError::NeverFits { .. } | LoanError::AddressSpace { .. })) => {
             unreadable(path, format!("cannot publish {}: {error}", to_text(path)))
         }
@@ -87,7 +87,8 @@ pub(super) fn explained(failure: Failure, path: &Path) -> PrepareFailure {
     }
 }
 
-/// The bus has no room, or could not take it: nothing that is the file's fault, or that stays.
+/// Returns a temporary failure: the bus has no room or could not accept the image. The file is not
+/// the cause.
 fn unpublished(path: &Path, error: &dyn std::fmt::Display) -> PrepareFailure {
     PrepareFailure::NoRoom(format!("cannot publish {}: {error}", to_text(path)))
 }
@@ -95,7 +96,7 @@ fn unpublished(path: &Path, error: &dyn std::fmt::Display) -> PrepareFailure {
 fn unreadable(path: &Path, reason: String) -> PrepareFailure {
     match stamp_of(path) {
         Ok(None) => PrepareFailure::Vanished,
-        // What cannot even be looked at may be there.
+        // A file without a readable stamp may exist.
         _ => PrepareFailure::Unreadable(reason),
     }
 }

@@ -1,4 +1,5 @@
-//! What one job depends on: the documents it brings to the bus, and every file that was looked at.
+//! Dependencies of one job: the documents that it publishes on the bus, and every file that was
+//! looked up.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,16 +17,16 @@ use super::{Intake, JudgedAs, Manner, Published, judged_in_a_run};
 use crate::core::{Input, PrepareFailure, PreparedJob, Reading, Referenced, Stamp};
 use crate::stamp::{from_content, is_racy, stamp_through_links};
 
-/// What has been found for one job so far.
+/// Documents and inputs found for one job so far.
 pub(super) struct Gathered {
     documents: Vec<JobDocument>,
     missing: Vec<MissingDocument>,
-    /// Of each document: whether the root rests on it.
+    /// For each document: whether the root depends on it.
     rests_on: Vec<bool>,
     inputs: BTreeMap<PathBuf, Input>,
     root: Vec<Input>,
     pub held: Vec<(DocId, MappedImage)>,
-    /// Something was so young when it was read that its stamp proves nothing.
+    /// Whether an input was so young when it was read that its stamp proves nothing.
     racy: bool,
     bytes: u64,
 }
@@ -63,7 +64,7 @@ impl Gathered {
         self.bytes += published.bytes;
     }
 
-    /// What the walk came to.
+    /// Takes over the result of the walk.
     pub fn found(&mut self, found: Found) {
         self.missing = found.missing;
         self.rests_on = found.rests_on;
@@ -72,7 +73,8 @@ impl Gathered {
         }
     }
 
-    /// Something that is there and could not be had: when it changes, the verdict is void.
+    /// Records an input that exists but could not be read. When it changes, the verdict becomes
+    /// invalid.
     fn unread(&mut self, path: &Path, stamp: Option<Stamp>) {
         if let Some(stamp) = stamp {
             self.inputs
@@ -84,7 +86,7 @@ impl Gathered {
         }
     }
 
-    /// A file that was looked for and not found: when it appears, the verdict is void.
+    /// Records a file that was not found. When it appears, the verdict becomes invalid.
     fn absent(&mut self, path: &Path) {
         self.inputs
             .entry(path.to_path_buf())
@@ -94,7 +96,8 @@ impl Gathered {
             });
     }
 
-    /// A directory whose files count: when one comes or goes, the verdict is void.
+    /// Records a directory listing. When a file appears or disappears in it, the verdict becomes
+    /// invalid.
     fn listing(&mut self, directory: &Path) {
         let stamp = stamp_through_links(directory);
         let content = stamp.map_or(Reading::Absent, |stamp| {
@@ -111,8 +114,9 @@ impl Gathered {
         );
     }
 
-    /// The documents that the root rests on: those that are judged by themselves, and those that could be and are
-    /// not. `judged_as` gives the path under which a file is. A member of an archive is judged with its archive.
+    /// Returns the documents that the root depends on: those with a verdict of their own, and those
+    /// that could have one. `judged_as` returns the path for a verdict. A member of an archive is
+    /// judged with its archive.
     fn rests_on(&self, judged_as: &JudgedAs) -> (Vec<Referenced>, Vec<Referenced>) {
         let root = self.root.first().map(|input| &*input.path);
         let documents = self.documents.iter().zip(&self.rests_on);
@@ -163,7 +167,7 @@ impl Gathered {
     }
 }
 
-/// Digest over the paths and contents of all inputs.
+/// Returns the digest over the paths and contents of all inputs.
 fn basis(inputs: &[Input]) -> Digest {
     let mut hash = Sha256::new();
     for input in inputs {
@@ -183,12 +187,12 @@ fn basis(inputs: &[Input]) -> Digest {
     Digest(hash.finalize().into())
 }
 
-/// The documents that a root refers to, on their way to the bus. Whatever becomes of them, it is the
-/// root's verdict that is at stake: none of them can make the root vanish or unreadable.
+/// Publishes the documents that a root refers to. Only the root's verdict depends on the outcome: a
+/// failure of a document cannot make the root vanished or unreadable.
 pub(super) struct Links<'i> {
     pub intake: &'i Intake,
     pub manner: Manner,
-    /// Nothing may be older.
+    /// Documents must not be older than this time.
     pub asked: Instant,
     pub gathered: &'i mut Gathered,
 }
@@ -198,10 +202,12 @@ impl Source for Links<'_> {
     type Halt = PrepareFailure;
 
     fn fetch(&mut self, path: &Path) -> Result<Result<Published, Absence>, PrepareFailure> {
-        // Looked at before: when it changes while it is tried, this stamp fits no more.
+        // The stamp is taken first: if the file changes during the attempt, the stamp no longer
+        // matches.
         let before = stamp_through_links(path);
         let published = match is_member(path) {
-            // Read from an archive that belongs to this job alone, or was just read for it.
+            // A member comes from an archive that belongs to this job alone, or that was just read
+            // for it.
             true => self.intake.publish_fresh(&self.manner, path),
             false => self.intake.publish_shared(&self.manner, path, self.asked),
         };
@@ -222,7 +228,7 @@ impl Source for Links<'_> {
     fn listing(&mut self, archive: &Path) -> Result<Option<Published>, PrepareFailure> {
         match self.intake.publish_listing(&self.manner, archive) {
             Ok(published) => Ok(published),
-            // Without it the set is checked as far as it is known.
+            // Without the listing, the known part of the set is checked.
             Err(failure) => failure.of_linked(archive).map(|_| None),
         }
     }
@@ -261,7 +267,7 @@ impl Source for Links<'_> {
     }
 }
 
-/// Whether a path leads into an archive.
+/// Checks whether a path leads into an archive.
 fn is_member(path: &Path) -> bool {
     let mut around = path
         .as_os_str()
@@ -270,7 +276,7 @@ fn is_member(path: &Path) -> bool {
     around.next().is_some_and(|file| file.ends_with(b".mosc")) && around.next().is_some()
 }
 
-/// The files that one image was built of.
+/// Returns the input files of one image.
 pub(super) fn inputs_of(prepared: &Prepared, limits: &Limits) -> Vec<Input> {
     prepared
         .files()
@@ -285,31 +291,32 @@ pub(super) fn inputs_of(prepared: &Prepared, limits: &Limits) -> Vec<Input> {
         .collect()
 }
 
-/// The stamp of something that could not be read and still cannot. What can be read by now is
-/// taken for missing, as it was; that it has come is noticed before the result is stored.
+/// Returns the stamp of an input that is still unreadable. If it has become readable, it stays
+/// recorded as missing. The change is noticed before the result is stored.
 fn unreadable_now(path: &Path, limits: &Limits) -> Option<Stamp> {
     let stamp = stamp_through_links(path)?;
     let is_readable = stamp.size <= limits.max_file && foreign::open(path).is_ok();
     (!is_readable).then_some(stamp)
 }
 
-/// Whether it had changed so recently that its stamp proves nothing: to be asked when it is read.
+/// Checks whether a file changed so recently that its stamp proves nothing. Call this when the file
+/// is read.
 pub(super) fn was_racy(input: &Input) -> bool {
     input.content.stamp().is_some_and(is_racy)
 }
 
-/// Whether a file certainly is what it was when it was read.
+/// Checks whether a file is certainly unchanged since it was read.
 pub(super) fn is_unchanged(input: &Input) -> bool {
     !was_racy(input) && has_its_stamps(input)
 }
 
-/// Whether nothing tells that a file has changed since it was read; of a young one that is no proof.
+/// Checks whether the stamp of a file still matches. For a young file this proves nothing.
 pub(super) fn has_its_stamps(input: &Input) -> bool {
     stamp_through_links(&input.path) == input.content.stamp()
 }
 
-/// Whether an image of the one reading is an image of the other: the same bytes of the same files,
-/// all of which could be read.
+/// Checks whether two readings give the same image: the same files with the same bytes, and all
+/// files could be read.
 pub(super) fn same_bytes(one: &[Input], other: &[Input]) -> bool {
     let same = |(one, other): (&Input, &Input)| {
         one.path == other.path && one.digest().is_some() && one.digest() == other.digest()

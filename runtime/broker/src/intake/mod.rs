@@ -1,4 +1,5 @@
-//! From a path to published document images: the only place where the broker reads what it checks.
+//! Turns a path into published document images. Only this module reads the files that the broker
+//! checks.
 
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet, VecDeque};
@@ -26,7 +27,7 @@ use failure::{Failure, explained};
 use gathered::{Gathered, Links, inputs_of, same_bytes, was_racy};
 use shared::Shared;
 
-/// Reads files and publishes their images. Shared by the threads that do so.
+/// Reads files and publishes their images. The reading threads share it.
 pub struct Intake {
     documents: Documents,
     limits: Limits,
@@ -48,10 +49,11 @@ impl std::fmt::Debug for Intake {
     }
 }
 
-/// The path under which a file gets a verdict of its own, if it does.
+/// Function that returns the path under which a file gets a verdict of its own, or `None`.
 pub type JudgedAs = dyn Fn(&Path) -> Option<Arc<Path>> + Send + Sync;
 
-/// The same in a run, which judges all that its files rest on, unless it is excluded.
+/// Returns the same in a run. A run judges all files that its files depend on, except excluded
+/// ones.
 pub fn judged_in_a_run(path: &Path) -> Option<Arc<Path>> {
     let is_judged = |path: &Path| FileKind::of_path(path).is_some() && !is_excluded(path);
     if is_judged(path) {
@@ -61,16 +63,17 @@ pub fn judged_in_a_run(path: &Path) -> Option<Arc<Path>> {
     real.filter(|it| is_judged(it)).map(Into::into)
 }
 
-/// What the files of a job may include.
+/// Boundary for the includes of a job's files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Within {
-    /// What lies in the watched directory in which they lie; outside of all, what lies beside them.
+    /// Files in the watched directory of the including file. Outside of all watched directories:
+    /// files next to it.
     Watched,
-    /// What lies beside them, as if nothing were watched.
+    /// Files next to the including file, as if no directory were watched.
     Beside,
 }
 
-/// How the files of a job are read.
+/// Reader and include boundary for the files of a job.
 struct Manner {
     reader: RefCell<Reader>,
     within: Within,
@@ -83,17 +86,17 @@ struct Published {
     held: MappedImage,
     digest: Digest,
     inputs: Vec<Input>,
-    /// Some of them were so young when they were read that their stamps prove nothing.
+    /// Whether an input was so young when it was read that its stamp proves nothing.
     racy: bool,
     bytes: u64,
 }
 
-/// Ended jobs whose root document reporters may still find on the bus.
+/// Number of ended jobs with a root document that reporters may still find on the bus.
 const RECENT: usize = 256;
 
 impl Intake {
-    /// An intake that publishes through `documents`. `roots` are the watched or given directories:
-    /// includes and archives stay inside them.
+    /// Creates an intake that publishes through `documents`. `roots` are the watched or given
+    /// directories: includes and archives stay inside them.
     pub fn new(
         documents: Documents,
         limits: Limits,
@@ -115,13 +118,13 @@ impl Intake {
         }
     }
 
-    /// From now on scenarios that others refer to are looked for here, too.
+    /// Sets an additional search path for scenarios that other scenarios refer to.
     pub fn search_in(&self, search: Arc<SearchPath>) {
         *lock(&self.search) = search;
     }
 
-    /// Reads a file with everything it refers to and publishes the images. Nothing in them is older
-    /// than `asked`, which is when the file came or somebody last asked for it.
+    /// Reads a file with everything it refers to and publishes the images. No image is older than
+    /// `asked`, the time at which the file appeared or was last requested.
     ///
     /// # Errors
     /// See [`PrepareFailure`].
@@ -149,7 +152,7 @@ impl Intake {
         Ok(Box::new(prepared))
     }
 
-    /// Publishes a document of a job once more.
+    /// Publishes a document of a job again.
     pub fn publish_again(&self, job: JobId, doc: DocId) {
         let held = lock(&self.held).get(&job).and_then(|all| {
             all.iter()
@@ -159,25 +162,26 @@ impl Intake {
         if let Some(held) = held
             && let Err(error) = self.documents.publish_again(&held)
         {
-            // The peer asks again while it lacks the document.
+            // The peer repeats its request while the document is missing.
             tracing::warn!("document {} cannot be published again: {error}", doc.0);
         }
     }
 
-    /// The root image of a job, while it is held.
+    /// Returns the root image of a job while it is held.
     pub fn root(&self, job: JobId) -> Option<MappedImage> {
         lock(&self.held)
             .get(&job)
             .and_then(|all| all.first().map(|(_, held)| held.clone()))
     }
 
-    /// All images of a job, while they are held.
+    /// Returns all images of a job while they are held.
     #[cfg(test)]
     pub(crate) fn images(&self, job: JobId) -> Vec<(DocId, MappedImage)> {
         lock(&self.held).get(&job).cloned().unwrap_or_default()
     }
 
-    /// The root document of a job that is stored or has ended lately; it may still be on the bus.
+    /// Returns the root document of a job that is being stored or ended recently. It may still be
+    /// on the bus.
     pub fn recent_root(&self, job: JobId) -> Option<DocId> {
         let held = lock(&self.held)
             .get(&job)
@@ -191,14 +195,14 @@ impl Intake {
             .map(|(_, doc)| *doc)
     }
 
-    /// Lets go of a job's documents apart from the root.
+    /// Releases the documents of a job except the root.
     pub fn release_parts(&self, job: JobId) {
         if let Some(held) = lock(&self.held).get_mut(&job) {
             held.truncate(1);
         }
     }
 
-    /// Lets go of a job's documents.
+    /// Releases the documents of a job.
     pub fn release(&self, job: JobId) {
         let held = lock(&self.held).remove(&job);
         if let Some((doc, _)) = held.as_ref().and_then(|all| all.first()) {
@@ -214,7 +218,7 @@ impl Intake {
         lock(&self.held).insert(job, held);
     }
 
-    /// Follows the root's references.
+    /// Follows the references of the root.
     fn gather(
         &self,
         root: &MappedImage,
@@ -243,7 +247,7 @@ impl Intake {
         Ok(())
     }
 
-    /// A map or catalog: as it is on the bus, as long as its bytes are what they were.
+    /// Publishes a map or catalog. The image on the bus is reused while the bytes are unchanged.
     fn publish_shared(
         &self,
         manner: &Manner,
@@ -253,7 +257,7 @@ impl Intake {
         let boundary = self.boundary(path, manner.within);
         self.shared.get(path, boundary, asked, |before| {
             let prepared = self.read(manner, path)?;
-            // The digest of a new one is taken while its image is built.
+            // The digest of a new document is computed while its image is built.
             let Some(before) = before else {
                 return self.publish(path, &prepared);
             };
@@ -274,7 +278,7 @@ impl Intake {
         self.publish(path, &prepared)
     }
 
-    /// What lies in an archive of a job.
+    /// Publishes the listing of an archive.
     fn publish_listing(
         &self,
         manner: &Manner,
@@ -288,7 +292,8 @@ impl Intake {
         self.publish(archive, &prepared).map(Some)
     }
 
-    /// What a modular scenario was expanded to. It depends on nothing that its documents do not.
+    /// Publishes the expansion of a modular scenario. It has the same dependencies as its
+    /// documents.
     fn publish_expanded(&self, expanded: &ExpandedImage<'_, '_>) -> Result<Published, Failure> {
         let mut loan = self.loan(expanded.upper_bound())?;
         let used = expanded
@@ -343,9 +348,9 @@ impl Intake {
         })
     }
 
-    /// Parses straight into shared memory. The bound is an estimate: it is often too large, which
-    /// counts only where there is little room, and many resolved entities can exceed it. Then the
-    /// builder says how much it takes.
+    /// Parses directly into shared memory. The upper bound is an estimate. It is often too large,
+    /// which matters only when there is little room. Many resolved entities can exceed it; then the
+    /// builder returns the exact size.
     fn build(&self, prepared: &Prepared) -> Result<(Loan, usize), Failure> {
         let mut room = prepared.upper_bound();
         loop {
@@ -367,7 +372,8 @@ impl Intake {
         }
     }
 
-    /// Room for an image. What is only kept because somebody may need it again goes for it.
+    /// Reserves room for an image. Cached images that no job uses are released if the room is
+    /// needed.
     fn loan(&self, room: usize) -> Result<Loan, LoanError> {
         loop {
             match self.documents.loan(room) {
@@ -384,7 +390,7 @@ impl Intake {
         self.shared.make_room(|doc| used.contains(&doc))
     }
 
-    /// The directory that includes may not leave.
+    /// Returns the directory that includes must not leave.
     fn boundary<'a>(&'a self, path: &'a Path, within: Within) -> &'a Path {
         let counts = |root: &&PathBuf| within == Within::Watched && path.starts_with(root);
         let root = self.roots.iter().filter(counts);
@@ -393,7 +399,7 @@ impl Intake {
     }
 }
 
-/// How long an image is, where that may make a difference.
+/// Returns the exact size of an image if it may make a difference for this error.
 fn exact(prepared: &Prepared, error: &LoanError) -> Option<usize> {
     if !matches!(
         error,

@@ -1,5 +1,5 @@
-//! Documents that several files refer to: maps, catalogs. Each is read and published once, however
-//! many files need it at once, and kept as long as it has not changed.
+//! Documents that several files refer to: maps and catalogs. Each is read and published once, even
+//! if many files need it at the same time. It stays cached while it is unchanged.
 
 use std::collections::{HashMap, VecDeque};
 use std::path::{Path, PathBuf};
@@ -14,45 +14,46 @@ use crate::environment::now;
 use super::gathered::{has_its_stamps, is_unchanged};
 use super::{Published, lock};
 
-/// Documents that are kept beyond the jobs that needed them, the small ones apart from the large:
-/// a scenario may have a dozen catalogs, and they must not push out its map.
+/// Numbers of small and large documents that stay cached after their jobs. They are separate
+/// because a scenario may have a dozen catalogs, which must not evict its map.
 const KEPT: [usize; 2] = [24, 8];
 
-/// An image of more bytes counts as large: it takes a slot of the bus's large class.
+/// Size in bytes above which an image counts as large. A large image takes a slot of the bus's
+/// large class.
 const LARGE: usize = 512 << 10;
 
-/// The shared documents.
+/// Cache of shared documents.
 #[derive(Debug, Default)]
 pub(super) struct Shared(Mutex<Slots>);
 
-/// A document as somebody may see it: what it includes may be open to the one and not to the other, and may lie beyond
-/// the directory that includes may not leave.
+/// Key of a document: the reader, the path and the include boundary. Readers may have different
+/// access to the included files, and an included file may lie outside of the boundary.
 type Key = (Option<foreign::Reader>, PathBuf, PathBuf);
 
 #[derive(Debug, Default)]
 struct Slots {
     by_path: HashMap<Key, Arc<Slot>>,
-    /// Those that are kept, by size; the one that was asked for last is at the end.
+    /// Cached documents by size class. The most recently used one is the last.
     order: [VecDeque<Key>; 2],
 }
 
-/// A document's place. It is locked while the document is read, so that whoever wants the same one
-/// waits for it instead of reading it as well.
+/// Slot of a document. It is locked while the document is read. Other threads wait for the document
+/// and do not read it again.
 type Slot = Mutex<Option<Kept>>;
 
 #[derive(Debug)]
 struct Kept {
     published: Published,
-    /// When its bytes were last begun to be read.
+    /// Time at which the last reading of the bytes began.
     begun: Instant,
 }
 
 impl Kept {
-    /// Whether these certainly are the bytes that lay there at some time after somebody asked.
+    /// Checks whether the file certainly had these bytes at some time after the request.
     ///
-    /// The stamps tell, unless they were too young to do so. Then only a reading counts that began
-    /// after the question: what was written before that is in it. Many files that have come at once
-    /// and refer to a map that was just written need one reading of it, not one each.
+    /// The stamps prove this unless they were too young. In that case only a reading counts that
+    /// began after the request, because it includes all earlier writes. One reading of a new map is
+    /// enough for many files that arrive at once and refer to it.
     fn counts(&self, asked: Instant) -> bool {
         let inputs = &self.published.inputs;
         let settled = !self.published.racy && inputs.iter().all(is_unchanged);
@@ -61,8 +62,8 @@ impl Kept {
 }
 
 impl Shared {
-    /// The document at a path. It is read unless what is known of it counts; `read` gets what was
-    /// published before, because the bytes may turn out to be the same.
+    /// Returns the document at a path. Reads it unless the cached one is still valid. `read`
+    /// receives the previously published document, because the bytes may be the same.
     pub(super) fn get<E>(
         &self,
         path: &Path,
@@ -82,7 +83,7 @@ impl Shared {
             return Ok(kept.published.clone());
         }
         let begun = now();
-        // Whatever comes of it: what was known before counts for nobody any more.
+        // The cached document is no longer valid, even if the reading fails.
         let before = kept.take();
         let published = read(before.as_ref().map(|before| &before.published));
         match &published {
@@ -98,14 +99,14 @@ impl Shared {
         published
     }
 
-    /// Lets go of the document that was not asked for for longest, of those that nobody uses.
-    /// `false`: there is none.
+    /// Releases the least recently used document among the unused ones. Returns `false` if there is
+    /// none.
     pub(super) fn make_room(&self, is_used: impl Fn(DocId) -> bool) -> bool {
         let mut slots = lock(&self.0);
         let unused = slots.order.iter().flatten().find(|key| {
-            // One that is locked is being read, perhaps by who asks for room. Nobody may be waited for
-            // here: whoever has the lock may be waiting for the slots. Who asks for it after this reads
-            // it anew.
+            // A locked slot is being read, possibly by the caller. Waiting here could deadlock,
+            // because the owner of the lock may wait for `slots`. The next request after this reads
+            // the document again.
             let slot = slots.by_path.get(*key);
             let Some(mut kept) = slot.and_then(|slot| slot.try_lock().ok()) else {
                 return false;
@@ -119,7 +120,7 @@ impl Shared {
         true
     }
 
-    /// When the bytes of a document that is kept were last begun to be read.
+    /// Returns the time at which the last reading of a cached document began.
     #[cfg(test)]
     pub(super) fn begun(&self, path: &Path) -> Option<Instant> {
         let is_it = |(key, _): &(&Key, _)| key.1 == path;
@@ -139,10 +140,10 @@ impl Slots {
         slot
     }
 
-    /// Remembers that a document was asked for, and lets go of those that were not for longest.
+    /// Marks a document as most recently used, and evicts the least recently used ones.
     fn keep(&mut self, key: &Key, slot: &Arc<Slot>, published: &Published) {
         self.forget_order(key);
-        // It may have been pushed out while it was read.
+        // The slot may have been evicted while the document was read.
         self.by_path.insert(key.clone(), slot.clone());
         let class = usize::from(published.held.len() > LARGE);
         self.order[class].push_back(key.clone());

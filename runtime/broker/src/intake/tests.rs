@@ -8,15 +8,15 @@ use tempfile::TempDir;
 use super::*;
 
 const MAP: &[u8] = b"<OpenDRIVE><header revMajor=\"1\" revMinor=\"7\"/></OpenDRIVE>";
-/// As many bytes.
+/// Another map of the same length.
 const OTHER: &[u8] = b"<OpenDRIVE><header revMajor=\"1\" revMinor=\"8\"/></OpenDRIVE>";
 
-/// A directory with scenarios and maps, and who reads them.
+/// Directory with scenarios and maps, and the intake that reads them.
 struct Farm {
     dir: TempDir,
     intake: Intake,
     jobs: AtomicU64,
-    /// Serves the bus as long as it is there.
+    /// Serves the bus as long as it exists.
     _host: Mutex<Host>,
 }
 
@@ -67,7 +67,7 @@ impl Farm {
         *prepared
     }
 
-    /// The map of a scenario that somebody asks for now.
+    /// Returns the map of a scenario that is requested now.
     fn map_of(&self, scenario: &str) -> JobDocument {
         let prepared = self.prepare(scenario, Instant::now());
         assert_eq!(prepared.missing, []);
@@ -167,7 +167,7 @@ async fn a_map_whose_include_changes_is_another_document() {
     assert_ne!(after.doc, before.doc);
 }
 
-/// Its stamp proves nothing yet: a second write may leave it as it is.
+/// The stamp of a young map proves nothing yet: a second write may leave it unchanged.
 #[tokio::test]
 async fn a_young_map_is_read_again_for_whoever_asks_after_it_was_read() {
     let farm = Farm::new();
@@ -223,7 +223,7 @@ async fn what_is_only_kept_makes_room_for_what_is_needed() {
         active_documents: 4,
         ..HostOptions::default()
     });
-    // More than the bus carries at once.
+    // There are more maps than the bus carries at once.
     for number in 0..40 {
         let (map, scenario) = (format!("{number}.xodr"), format!("{number}.xosc"));
         farm.put(&map, MAP);

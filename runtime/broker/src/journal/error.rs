@@ -1,4 +1,4 @@
-//! Why the journal cannot be used.
+//! Errors of the journal.
 
 use std::path::{Path, PathBuf};
 
@@ -7,59 +7,59 @@ use qcbus_disk::trust::TrustError;
 use super::SCHEMA_VERSION;
 use crate::directory_lock::LockError;
 
-/// Why the journal cannot be used, with the way out.
+/// Reason why the journal cannot be used, with a way to fix it.
 #[derive(Debug, thiserror::Error)]
 pub enum JournalError {
-    /// Another process holds it.
+    /// Another process has locked the journal.
     #[error(
         "the journal {path} is locked by another process ({source}); stop the other broker on this state directory, or give this one another with --state"
     )]
     Locked {
-        /// The journal.
+        /// Path of the journal.
         path: PathBuf,
-        /// What SQLite says.
+        /// Error of SQLite.
         source: rusqlite::Error,
     },
-    /// Another broker works with this state directory, or it cannot be taken.
+    /// Another broker uses this state directory, or the lock cannot be taken.
     #[error("{0}")]
     State(#[from] LockError),
-    /// Its disk is full.
+    /// The disk of the journal is full.
     #[error("the journal {path} cannot be written: its disk is full; make room")]
     Full {
-        /// The journal.
+        /// Path of the journal.
         path: PathBuf,
     },
-    /// It is no journal, or a broken one.
+    /// The file is no journal, or is corrupt.
     #[error(
         "the journal {path} cannot be used: {source}. It remembers which files are finished, and which bundles joined that were started by hand: move it away (`mv {path} {path}.broken`) and start again, everything is then judged anew, and bundles that were started by hand must judge once they have joined again; `qcbus doctor` looks into it"
     )]
     Broken {
-        /// The journal.
+        /// Path of the journal.
         path: PathBuf,
-        /// What SQLite says.
+        /// Error of SQLite.
         source: rusqlite::Error,
     },
-    /// It was written by a newer version of qcbus.
+    /// A newer version of qcbus wrote the journal.
     #[error(
         "the journal {path} has schema {found}, this version of qcbus knows {SCHEMA_VERSION}: use the newer qcbus, or give this one another directory with --state"
     )]
     Newer {
-        /// The journal.
+        /// Path of the journal.
         path: PathBuf,
-        /// Its schema.
+        /// Schema version of the journal.
         found: i64,
     },
-    /// Somebody else decides what is in it.
+    /// Another user can change the contents of the state directory.
     #[error(
         "the state is not in this broker's hands alone: {0}; or choose another directory with --out or --state"
     )]
     Foreign(TrustError),
-    /// Its directory cannot be made.
+    /// The state directory cannot be created.
     #[error("cannot make the state directory {path}: {source}; choose another with --state")]
     Directory {
-        /// The directory.
+        /// Path of the directory.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the system.
         source: std::io::Error,
     },
 }
@@ -73,7 +73,7 @@ impl From<TrustError> for JournalError {
     }
 }
 
-/// What SQLite says, as what it means for the journal.
+/// Converts an SQLite error to an error of the journal.
 pub(super) fn classify(path: &Path, source: rusqlite::Error) -> JournalError {
     use rusqlite::ErrorCode::{DatabaseBusy, DatabaseLocked};
     let path = path.to_path_buf();

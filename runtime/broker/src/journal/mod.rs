@@ -1,4 +1,4 @@
-//! The journal: what must survive the broker, in SQLite. The schema is in `journal.sql`.
+//! The journal: the data that must survive the broker, in SQLite. The schema is in `journal.sql`.
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -30,49 +30,49 @@ use rows::{judged_of, millis, number};
 use schema::prepare;
 use write::{Change, changes};
 
-/// Version of the schema, kept in SQLite's `user_version`.
+/// Version of the schema, stored in SQLite's `user_version`.
 pub const SCHEMA_VERSION: i64 = 6;
 
-/// A file with its verdict, as the journal remembers it.
+/// A file with its verdict, as stored in the journal.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Remembered {
     /// Absolute path.
     pub path: Arc<Path>,
-    /// The verdict and what it depends on.
+    /// The verdict and the inputs that it depends on.
     pub judged: Judged,
-    /// The mark of the verdict file as it was written, where that was remembered.
+    /// Fingerprint of the verdict file when it was written, if known.
     pub written: Option<FileFingerprint>,
-    /// The reporters that have said something of it.
+    /// Reporters that have sent a report about the file.
     pub delivered: Vec<(String, Reported)>,
 }
 
-/// A file that has gone, and a reporter that has not yet taken back what it said of it.
+/// A removed file, with a reporter that must still withdraw its report about it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Void {
     /// Absolute path of the file.
     pub path: Arc<Path>,
     /// The reporter.
     pub reporter: String,
-    /// Where the result lay, if that is known.
+    /// Path of the result, if known.
     pub xqar: Option<PathBuf>,
 }
 
-/// What one job did, for the history.
+/// Statistics of one job for the history.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct History {
-    /// Source bytes.
+    /// Size of the sources in bytes.
     pub bytes: u64,
-    /// Microseconds from the queue to the stored result.
+    /// Microseconds from queueing to the stored result.
     pub micros: u64,
-    /// By bundle: name, version, microseconds, failure.
+    /// For each bundle: name, version, microseconds, failure.
     pub bundles: Vec<(String, String, u64, String)>,
-    /// Bundle, checker, status, number of issues, of those that failed or have findings.
+    /// For each checker that failed or has findings: bundle, checker, status, number of issues.
     pub checkers: Vec<(String, String, String, u64)>,
-    /// By bundle the checkers that were skipped.
+    /// For each bundle: the skipped checkers.
     pub skipped: Vec<(String, Vec<Text>)>,
 }
 
-/// Something to remember.
+/// An entry of the journal.
 #[derive(Debug)]
 pub enum Entry {
     /// A verdict.
@@ -81,42 +81,42 @@ pub enum Entry {
         path: Arc<Path>,
         /// Its verdict.
         judged: Arc<Judged>,
-        /// How it came about; absent when the verdict only got fresh stamps.
+        /// Statistics of the job. `None` if the verdict only got new stamps.
         history: Option<Box<History>>,
-        /// The mark of the verdict file; absent when none was written now.
+        /// Fingerprint of the verdict file. `None` if no verdict file was written now.
         written: Option<FileFingerprint>,
     },
-    /// A file has gone.
+    /// A file was removed.
     Withdrawn {
         /// The file.
         path: Arc<Path>,
-        /// Who is to take back a report about it.
+        /// Reporters that must withdraw a report about it.
         reporters: Vec<String>,
     },
-    /// A result was withdrawn that nothing was remembered of.
+    /// A result without an entry in the journal was withdrawn.
     Left {
         /// The file.
         path: Arc<Path>,
-        /// Where the result lay.
+        /// Path of the result.
         xqar: PathBuf,
-        /// Who is to take back a report about it.
+        /// Reporters that must withdraw a report about it.
         reporters: Vec<String>,
     },
-    /// A reporter has taken back its report about a file that has gone.
+    /// A reporter has withdrawn its report about a removed file.
     Voided {
         /// The file.
         path: Arc<Path>,
         /// The reporter.
         reporter: String,
     },
-    /// A bundle must judge from now on.
+    /// A bundle is required from now on.
     Enrolled(Member),
-    /// A bundle need not judge any more.
+    /// A bundle is no longer required.
     Struck {
-        /// Its name.
+        /// Name of the bundle.
         name: String,
     },
-    /// A reporter has a result.
+    /// A reporter has received a result.
     Delivered {
         /// The file.
         path: Arc<Path>,
@@ -132,22 +132,23 @@ pub enum Entry {
 pub struct Journal {
     connection: Connection,
     path: PathBuf,
-    /// Lists of checkers that are in it for certain.
+    /// Lists of checkers that are certainly stored.
     lists: HashSet<i64>,
-    /// Of the state directory; kept as long as the journal is.
+    /// Lock of the state directory, held while the journal is open.
     lock: Option<Arc<DirectoryLock>>,
 }
 
 impl Journal {
-    /// Opens or makes the journal in a state directory, which is this instance's alone as long as
-    /// the journal is open.
+    /// Opens or creates the journal in a state directory. The directory belongs to this instance
+    /// alone while the journal is open.
     ///
     /// # Errors
-    /// See [`JournalError`]; each says what to do.
+    /// See [`JournalError`]. Each error names a fix.
     pub fn open(state: &Path, instance: &str) -> Result<Journal, JournalError> {
         trust::make_directory(state)?;
         let path = state.join("journal.sqlite");
-        // What was put there while others still could.
+        // Another user may have created these files while the directory was still writable for
+        // others.
         for name in [
             "lock",
             "journal.sqlite",
@@ -174,15 +175,15 @@ impl Journal {
         })
     }
 
-    /// The lock of the state directory.
+    /// Returns the lock of the state directory.
     pub fn lock(&self) -> Option<Arc<DirectoryLock>> {
         self.lock.clone()
     }
 
-    /// A journal that is forgotten with the process, for a test.
+    /// Opens a journal in memory, for a test.
     ///
     /// # Errors
-    /// When SQLite cannot even do that.
+    /// When SQLite cannot open a database in memory.
     #[cfg(test)]
     pub fn in_memory() -> Result<Journal, JournalError> {
         let path = PathBuf::from(":memory:");
@@ -196,7 +197,7 @@ impl Journal {
         })
     }
 
-    /// Looks a journal through without changing it: `None` when it is sound, else what is wrong.
+    /// Checks a journal without changing it. Returns `None` if it is sound, otherwise the problem.
     pub fn examine(state: &Path) -> Option<String> {
         let path = state.join("journal.sqlite");
         if !path.exists() {
@@ -213,8 +214,8 @@ impl Journal {
         }
     }
 
-    /// From where on the upper halves of the numbers of jobs and epochs are new: none that is
-    /// written here comes back.
+    /// Returns the first unused value of the upper halves of job and epoch numbers. A number in the
+    /// journal is never used again.
     ///
     /// # Errors
     /// When the journal cannot be read.
@@ -227,11 +228,10 @@ impl Journal {
         Ok(highest.map_or(0, |it| (number(it) >> 32) + 1))
     }
 
-    /// Everything that is remembered of files.
+    /// Returns all files in the journal.
     ///
     /// # Errors
-    /// When the journal cannot be read. Rows that make no sense are left out: their files are
-    /// judged anew.
+    /// When the journal cannot be read. Invalid rows are left out: their files are judged again.
     pub fn remembered(&self) -> Result<Vec<Remembered>, JournalError> {
         self.read_all()
             .map_err(|source| classify(&self.path, source))
@@ -264,7 +264,7 @@ impl Journal {
                     judged,
                     written: Some(row.get(15)?)
                         .filter(|it: &String| !it.is_empty())
-                        // What cannot be read is the mark of no file.
+                        // An unreadable fingerprint is stored as one that matches no file.
                         .map(|it| FileFingerprint::parse(&it).unwrap_or(FileFingerprint::NONE)),
                     delivered,
                 });
@@ -273,7 +273,7 @@ impl Journal {
         Ok(all)
     }
 
-    /// Files that have gone and the reporters that have not yet taken back what they said of them.
+    /// Returns removed files, with the reporters that must still withdraw their reports about them.
     ///
     /// # Errors
     /// When the journal cannot be read.
@@ -300,8 +300,8 @@ impl Journal {
         read().map_err(|source| classify(&self.path, source))
     }
 
-    /// The bundles that must judge. One whose catalogue cannot be read any more is among them: it
-    /// must judge nevertheless.
+    /// Returns the required bundles. This includes a bundle with a catalogue that is no longer
+    /// readable, because it is still required.
     ///
     /// # Errors
     /// When the journal cannot be read.
@@ -329,7 +329,8 @@ impl Journal {
     /// Writes entries in one transaction: all of them or none.
     ///
     /// # Errors
-    /// When SQLite cannot write, a full disk for instance; the entries are the caller's to keep.
+    /// When SQLite cannot write, for example because the disk is full. The caller must keep the
+    /// entries then.
     pub fn write(&mut self, entries: &[Entry]) -> Result<(), JournalError> {
         let all: Vec<Change> = entries.iter().flat_map(changes).collect();
         self.make(&[&all])
@@ -338,7 +339,8 @@ impl Journal {
     /// Makes changes in one transaction: all of them or none.
     fn make(&mut self, changes: &[&[Change]]) -> Result<(), JournalError> {
         let made = self.try_to_make(changes);
-        // What was written before may take twice its room until it is put where it belongs.
+        // Earlier changes take up to twice their room until a checkpoint moves them from the WAL
+        // into the database.
         let full = |error: &rusqlite::Error| {
             error.sqlite_error_code() == Some(rusqlite::ErrorCode::DiskFull)
         };
@@ -370,13 +372,13 @@ impl Journal {
         Ok(())
     }
 
-    /// Forgets the history of jobs older than `keep`.
+    /// Deletes the history of jobs older than `keep`.
     ///
     /// # Errors
     /// When SQLite cannot write.
     pub fn prune(&mut self, keep: Duration) -> Result<usize, JournalError> {
         let before = millis().saturating_sub(i64::try_from(keep.as_millis()).unwrap_or(i64::MAX));
-        // Lists that no job has any more go, too, so that none is known for certain.
+        // This also deletes lists that no job uses any more, so no list is certainly stored now.
         self.lists.clear();
         let mut prune = || -> rusqlite::Result<usize> {
             let transaction = self.connection.transaction()?;
@@ -393,5 +395,5 @@ impl Journal {
     }
 }
 
-/// Lists of checkers that are remembered as being in the journal.
+/// Maximum number of lists of checkers in `Journal::lists`.
 const MOST_LISTS: usize = 10_000;

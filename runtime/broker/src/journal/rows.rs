@@ -1,4 +1,4 @@
-//! What rows hold, as text and numbers that SQLite knows.
+//! Conversion between journal data and the text and numbers in SQLite rows.
 
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -43,14 +43,14 @@ fn required_set_from_text(text: &str) -> RequiredSet {
     read().map_or_else(RequiredSet::unknown, RequiredSet)
 }
 
-/// A path, and of what is there size, time of modification, inode, digest if it was read, time of
+/// Path and, if the file exists: size, time of modification, inode, digest if it was read, time of
 /// change.
 type InputRow = (String, Option<(u64, i128, u64, Option<String>, i128)>);
 
-/// The same in schema 1, which knew no time of change.
+/// The same row in schema 1, which had no time of change.
 type InputRowOfSchema1 = (String, Option<(u64, i128, u64, Option<String>)>);
 
-/// The digest of what could not be read, in the schemas before 3.
+/// Digest of an unreadable file in the schemas before 3.
 const UNREAD: Digest = Digest([0; 32]);
 
 pub(super) fn inputs_to_text(inputs: &[Input]) -> String {
@@ -100,8 +100,8 @@ fn inputs_from_text(text: &str) -> Option<Vec<Input>> {
     rows.into_iter().map(input).collect()
 }
 
-/// Without a time of change a stamp fits no file, which is then read once more and found to be the
-/// same, or not.
+/// Reads rows of schema 1. A stamp without a time of change matches no file, so each file is read
+/// again and compared.
 fn rows_of_schema_1(text: &str) -> Option<Vec<InputRow>> {
     let rows: Vec<InputRowOfSchema1> = serde_json::from_str(text).ok()?;
     let row = |(path, content): InputRowOfSchema1| {
@@ -116,7 +116,7 @@ fn verdict_of(text: &str) -> Option<Verdict> {
     all.into_iter().find(|it| it.as_str() == text)
 }
 
-/// Path, digest, verdict if there was one, errors.
+/// Path, digest, verdict if there was one, number of errors.
 type RestsOnRow = (String, String, Option<String>, u64);
 
 pub(super) fn rests_on_to_text(rests_on: Option<&[RestsOn]>) -> String {
@@ -131,7 +131,7 @@ pub(super) fn rests_on_to_text(rests_on: Option<&[RestsOn]>) -> String {
     serde_json::to_string(&rows).unwrap_or_default()
 }
 
-/// Nothing where it is not known, or makes no sense: the verdict is given anew then.
+/// Returns `None` if the dependencies are unknown or invalid. The file is then judged again.
 fn rests_on_from_text(text: &str) -> Option<Vec<RestsOn>> {
     let rows: Vec<RestsOnRow> = serde_json::from_str(text).ok()?;
     let read = |(path, digest, verdict, errors): RestsOnRow| {
@@ -195,8 +195,8 @@ pub(super) fn number(signed: i64) -> u64 {
     u64::try_from(signed).unwrap_or(0)
 }
 
-/// Milliseconds since 1970. Only ever shown or compared with the retention time, so a clock that
-/// jumps does no harm.
+/// Returns milliseconds since 1970. The value is only shown, or compared with the retention time,
+/// so a clock that jumps does no harm.
 pub(super) fn millis() -> i64 {
     let since = SystemTime::now()
         .duration_since(UNIX_EPOCH)

@@ -1,4 +1,4 @@
-//! How a database becomes a journal of this schema.
+//! Creation of the journal's database, and migration from earlier schemas.
 
 use std::path::Path;
 
@@ -9,10 +9,11 @@ use super::{JournalError, SCHEMA_VERSION};
 
 const SCHEMA: &str = include_str!("journal.sql");
 
-/// Statements that are kept ready: as many as there are for entries.
+/// Capacity of the cache for prepared statements. It is as large as the number of statements for
+/// entries.
 const STATEMENTS: usize = 24;
 
-/// Makes a database a journal, or one of an earlier schema one of ours.
+/// Creates the schema in a database, or migrates an earlier schema to the current one.
 pub(super) fn prepare(connection: &Connection, path: &Path) -> Result<(), JournalError> {
     let fail = |source| classify(path, source);
     let found: i64 = connection
@@ -25,7 +26,7 @@ pub(super) fn prepare(connection: &Connection, path: &Path) -> Result<(), Journa
         });
     }
     if found == 1 || found == 2 {
-        // What is in the old column is no jury, so that every verdict is looked at again.
+        // The old column contains no required set, so every verdict is examined again.
         let newer = "BEGIN; ALTER TABLE files RENAME COLUMN bundles TO jury; \
                      ALTER TABLE files ADD COLUMN epoch INTEGER NOT NULL DEFAULT 0; \
                      ALTER TABLE files ADD COLUMN written TEXT NOT NULL DEFAULT ''; \
@@ -38,13 +39,13 @@ pub(super) fn prepare(connection: &Connection, path: &Path) -> Result<(), Journa
         connection.execute_batch(newer).map_err(fail)?;
     }
     if (1..=3).contains(&found) {
-        // What was skipped stays in it as it is, row by row.
+        // The skipped checkers stay in this table as they are, row by row.
         connection
             .execute_batch("BEGIN; ALTER TABLE job_checkers RENAME TO job_findings; PRAGMA user_version = 4; COMMIT;")
             .map_err(fail)?;
     }
     if (1..=4).contains(&found) {
-        // What verdicts rest on is not known of older ones: they are given anew.
+        // The dependencies of older verdicts are unknown, so the files are judged again.
         let newer = "BEGIN; ALTER TABLE files ADD COLUMN own TEXT NOT NULL DEFAULT ''; \
                      ALTER TABLE files ADD COLUMN own_errors INTEGER NOT NULL DEFAULT 0; \
                      ALTER TABLE files ADD COLUMN rests_on TEXT NOT NULL DEFAULT ''; \
@@ -59,8 +60,8 @@ pub(super) fn prepare(connection: &Connection, path: &Path) -> Result<(), Journa
             .map_err(fail)?;
     }
     connection.set_prepared_statement_cache_capacity(STATEMENTS);
-    // WAL with synchronous=NORMAL survives a killed process; after a power cut the last verdicts
-    // may be missing, and their files are judged anew.
+    // WAL with synchronous=NORMAL survives a killed process. After a power failure the last
+    // verdicts may be missing, and their files are judged again.
     connection
         .execute_batch(&format!(
             "PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL; PRAGMA foreign_keys = ON; \

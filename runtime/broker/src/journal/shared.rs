@@ -1,5 +1,6 @@
-//! The journal among the threads that write: whoever writes writes what all others have noted meanwhile,
-//! too, in one transaction. So many verdicts cost little more than one, and a single one waits for nobody.
+//! The journal as shared by the writer threads. The writing thread also writes all entries of
+//! others, in one transaction. Many verdicts cost little more than one, and a single verdict does
+//! not wait.
 
 use std::path::Path;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -7,34 +8,35 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use super::write::{Change, changes};
 use super::{Entry, Journal};
 
-/// What came of it; why it could not be written is for a person.
+/// Result of a write. The error text is for the user.
 type Answer = Result<(), String>;
 
 /// A journal that several threads write.
 #[derive(Debug)]
 pub struct SharedJournal {
     queue: Mutex<Queue>,
-    /// Somebody has written.
+    /// Signals that a thread has finished writing.
     written: Condvar,
     journal: Mutex<Journal>,
 }
 
 #[derive(Debug, Default)]
 struct Queue {
-    /// In the order in which they came.
+    /// Waiting entries, in the order of arrival.
     waiting: Vec<Note>,
-    /// Somebody is writing.
+    /// Whether a thread is writing.
     is_led: bool,
 }
 
-/// Entries that are to be written.
+/// Entries that wait to be written.
 #[derive(Debug)]
 struct Note {
     changes: Vec<Change>,
     answer: Arc<OnceLock<Answer>>,
 }
 
-/// Entries that somebody will write: who has noted them, or who writes before him.
+/// Handle of waiting entries. They are written by the thread that added them, or by one that writes
+/// earlier.
 #[derive(Debug)]
 #[must_use = "nothing is written before it is settled"]
 pub struct Noted(Arc<OnceLock<Answer>>);
@@ -50,7 +52,7 @@ impl From<Journal> for SharedJournal {
 }
 
 impl SharedJournal {
-    /// Puts entries down to be written, all of them or none.
+    /// Adds entries to the queue. All of them are written, or none.
     pub fn note(&self, entries: &[Entry]) -> Noted {
         let changes = entries.iter().flat_map(changes).collect();
         let answer = Arc::new(OnceLock::new());
@@ -59,10 +61,11 @@ impl SharedJournal {
         noted
     }
 
-    /// Waits until they are written, or cannot be: then they are not, and the caller's to keep.
+    /// Waits until the entries are written or the write has failed. After a failure the caller must
+    /// keep them.
     ///
     /// # Errors
-    /// For a person.
+    /// A text for the user.
     pub fn settle(&self, noted: &Noted) -> Answer {
         let mut queue = self.queue();
         loop {
@@ -81,12 +84,12 @@ impl SharedJournal {
         let lead = Lead(self);
         write(&mut self.get(), &together);
         drop(lead);
-        // Who panicked while he wrote for others leaves them without an answer.
+        // If the writing thread panics, the entries of other threads get no answer.
         let lost = || Err("the journal was not written: a writer has panicked".to_owned());
         noted.0.get().cloned().unwrap_or_else(lost)
     }
 
-    /// The journal itself.
+    /// Returns the journal itself.
     pub fn get(&self) -> MutexGuard<'_, Journal> {
         self.journal.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -96,7 +99,8 @@ impl SharedJournal {
     }
 }
 
-/// Who writes for others; the next may when this is dropped, also by a panic.
+/// Leadership of the writing thread. When it is dropped, also by a panic, the next thread may
+/// write.
 struct Lead<'a>(&'a SharedJournal);
 
 impl Drop for Lead<'_> {
@@ -106,7 +110,8 @@ impl Drop for Lead<'_> {
     }
 }
 
-/// Writes all notes at once. When that fails each is written by itself, so that none fails for another.
+/// Writes all notes at once. If that fails, writes each note separately, so that failures stay
+/// separate.
 fn write(journal: &mut Journal, notes: &[Note]) {
     let all: Vec<&[Change]> = notes.iter().map(|it| &it.changes[..]).collect();
     let together = journal.make(&all);
@@ -118,13 +123,13 @@ fn write(journal: &mut Journal, notes: &[Note]) {
                 .make(&[&note.changes])
                 .map_err(|error| error.to_string()),
         };
-        // Nobody else answers.
+        // Only this thread sets the answer, so `set` cannot fail.
         let _ = note.answer.set(made);
     }
 }
 
 impl Entry {
-    /// The file that it is about; `None` when it is about a bundle.
+    /// Returns the file of the entry, or `None` if the entry is about a bundle.
     pub fn path(&self) -> Option<&Arc<Path>> {
         match self {
             Entry::Judged { path, .. }

@@ -1,4 +1,4 @@
-//! What was written is remembered, also of earlier schemas.
+//! The journal remembers written entries, including those of earlier schemas.
 
 mod history;
 
@@ -71,7 +71,7 @@ fn what_was_written_is_remembered() {
                     history,
                     written: Some(FileFingerprint::parse("7 8 9").unwrap()),
                 },
-                // Only fresh stamps.
+                // The second entry only brings fresh stamps.
                 Entry::Judged {
                     path: path.clone(),
                     judged: expected.clone(),
@@ -185,7 +185,7 @@ fn what_was_not_read_and_what_has_no_result_are_remembered_so() {
     let mut journal = Journal::in_memory().unwrap();
     journal.write(&[entry(expected.clone())]).unwrap();
     assert_eq!(journal.remembered().unwrap()[0].judged, expected);
-    // It goes, and is there again before the report was taken back.
+    // The file disappears and is back before its report was withdrawn.
     let gone = Entry::Withdrawn {
         path: path.clone(),
         reporters: vec!["text".to_owned()],
@@ -195,7 +195,7 @@ fn what_was_not_read_and_what_has_no_result_are_remembered_so() {
     journal.write(&[entry(expected)]).unwrap();
     let text = ("text".to_owned(), Reported::OfGone);
     assert_eq!(journal.remembered().unwrap()[0].delivered, [text]);
-    // As the schemas before wrote it.
+    // Earlier schemas wrote inputs in this form.
     let zeros = Digest([0; 32]);
     let inputs = format!("[[\"/a.xosc\",[1,7,3,\"{zeros}\",9]]]");
     let update = "UPDATE files SET inputs = ?1";
@@ -224,7 +224,7 @@ fn who_must_judge_is_remembered_until_struck() {
     drop(journal);
     let mut journal = Journal::open(dir.path(), "test").unwrap();
     assert_eq!(journal.members().unwrap(), [member("2")]);
-    // Of another version of qcbus, perhaps: it must judge nevertheless.
+    // Another version of qcbus may have written this catalogue. The bundle stays required anyway.
     let spoilt = "UPDATE members SET catalogue = '{\"kinds\": 7}'";
     journal.connection.execute_batch(spoilt).unwrap();
     assert_eq!(journal.members().unwrap()[0].catalogue, None);

@@ -1,5 +1,5 @@
-//! How entries become rows. All that can be made ready without the journal is: what is done under its
-//! lock, everybody waits for.
+//! Conversion of entries to rows. As much as possible is prepared without the journal, because
+//! every writer waits for its lock.
 
 use std::path::Path;
 
@@ -18,7 +18,7 @@ use qcbus_disk::FileFingerprint;
 pub(super) struct Change {
     sql: &'static str,
     values: Vec<Value>,
-    /// It puts in the list of this number, which is there already more often than not.
+    /// Number of the list that the statement inserts. Usually the list already exists.
     pub list: Option<i64>,
 }
 
@@ -39,7 +39,7 @@ impl Change {
     }
 }
 
-/// What is to be written for an entry, in order.
+/// Returns the statements for an entry, in order.
 pub(super) fn changes(entry: &Entry) -> Vec<Change> {
     let mut changes = Vec::new();
     match entry {
@@ -90,7 +90,8 @@ fn count(number: u64) -> Value {
     Value::Integer(signed(number))
 }
 
-/// The file has gone, and with it all but where its result lay, for those who reported about it.
+/// Removes a file from the journal. The path of its result stays for the reporters that reported
+/// about it.
 fn withdraw(changes: &mut Vec<Change>, path: &str, reporters: &[String]) {
     let mut of_path = |sql| changes.push(Change::new(sql, [word(path)]));
     if !reporters.is_empty() {
@@ -106,7 +107,8 @@ fn withdraw(changes: &mut Vec<Change>, path: &str, reporters: &[String]) {
     }
 }
 
-/// A reporter has taken back what it said. Once all have, nobody asks where the result lay.
+/// Records that a reporter has withdrawn its report. After the last one, the path of the result is
+/// deleted.
 fn voided(changes: &mut Vec<Change>, path: &str, reporter: &str) {
     changes.push(Change::new(
         "DELETE FROM deliveries WHERE path = ?1 AND reporter = ?2 AND job IS NULL",
@@ -131,7 +133,7 @@ fn delivery(path: &str, reporter: &str, reported: Reported) -> Change {
 }
 
 fn file(path: &Path, judged: &Judged, written: Option<&FileFingerprint>) -> Change {
-    // Whoever writes no verdict file leaves the mark of the one that is there.
+    // If no verdict file is written, the fingerprint of the existing one stays.
     let sql = "INSERT OR REPLACE INTO files (path, job, verdict, digest, basis, config, required_set, errors, \
          warnings, information, why, xqar, inputs, racy, at, epoch, own, own_errors, rests_on, written) \
          VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, \
@@ -232,7 +234,7 @@ fn put_history(changes: &mut Vec<Change>, path: &Path, judged: &Judged, history:
     }
 }
 
-/// The number of a list follows from what is in it, so that nobody need look for it.
+/// Returns the number of a list. It is derived from the contents, so no lookup is needed.
 fn number_of(list: &str) -> i64 {
     let digest = digest_of(list.as_bytes());
     let first = digest.0.iter().take(8);

@@ -1,8 +1,8 @@
-//! Files that this broker has written for others: results, verdict files, copies behind the gate.
+//! Files that this broker writes for others: results, verdict files, copies behind the gate.
 //!
-//! Anyone may remove or change such a file while the broker runs. The kernel tells of it; besides, all of them
-//! are looked at in turn, because kernels and file systems lose events. The file that a lost output is about is
-//! judged again, which writes the output again.
+//! Another program may remove or change such a file while the broker runs. The kernel reports this.
+//! All files are also scanned periodically, because kernels and file systems lose events. If an
+//! output is lost, the file that it belongs to is judged again, which writes the output again.
 
 mod scanner;
 
@@ -18,10 +18,11 @@ use self::scanner::Scanner;
 use crate::core::LostOutput;
 use crate::environment::{Bell, thread};
 
-/// Told of outputs that are lost, from the thread that looks at them.
+/// Callback for lost outputs. The scanner thread calls it.
 pub type TellLost = Box<dyn FnMut(Vec<LostOutput>) + Send>;
 
-/// The outputs that are there. Clones share them; the default keeps none, for a run that nobody outlives.
+/// Registry of existing outputs. Clones share it. The default registers no outputs, for a single
+/// run.
 #[derive(Debug, Clone, Default)]
 pub struct Outputs(Option<Arc<Shared>>);
 
@@ -33,13 +34,13 @@ struct Shared {
     is_over: AtomicBool,
 }
 
-/// What is known of the outputs.
+/// Known outputs and their directories.
 #[derive(Debug, Default)]
 struct Book {
     written: BTreeMap<Arc<Path>, Written>,
-    /// Directories that are watched, or about to be.
+    /// Directories that are watched or will be watched.
     directories: HashSet<PathBuf>,
-    /// Those of them that are still to be watched.
+    /// Directories among them that are not watched yet.
     fresh: Vec<PathBuf>,
 }
 
@@ -47,11 +48,11 @@ struct Book {
 struct Written {
     file: Arc<Path>,
     fingerprint: FileFingerprint,
-    /// That it is lost was told.
+    /// Whether the loss was reported.
     is_told: bool,
 }
 
-/// Ends the thread that looks at the outputs when it is dropped.
+/// Ends the scanner thread when it is dropped.
 #[derive(Debug)]
 pub struct OutputWatch(Arc<Shared>);
 
@@ -63,10 +64,10 @@ impl Drop for OutputWatch {
 }
 
 impl Outputs {
-    /// Keeps outputs that [`Outputs::watch`] is to look at.
+    /// Creates a registry of outputs for [`Outputs::watch`].
     ///
     /// # Errors
-    /// When there is no descriptor left.
+    /// When no file descriptor is available.
     pub fn kept() -> io::Result<Outputs> {
         Ok(Outputs(Some(Arc::new(Shared {
             book: Mutex::default(),
@@ -75,7 +76,8 @@ impl Outputs {
         }))))
     }
 
-    /// Starts a thread that looks at the outputs, until what is returned is dropped. `None` when none are kept.
+    /// Starts a thread that scans the outputs until the returned value is dropped. `None`: no
+    /// outputs are registered.
     ///
     /// # Errors
     /// When no thread can be started.
@@ -90,15 +92,15 @@ impl Outputs {
         Ok(Some(OutputWatch(shared)))
     }
 
-    /// Must be called before an output is written or removed: until [`Outputs::written`], it is no loss that another
-    /// file, or none, lies there.
+    /// Must be called before an output is written or removed. Until [`Outputs::written`] is called,
+    /// a missing or different file does not count as a loss.
     pub fn changing(&self, output: &Path) {
         if let Some(shared) = &self.0 {
             shared.book().written.remove(output);
         }
     }
 
-    /// An output is there. `fingerprint` is that of the very file that was written.
+    /// Registers an output. `mark` is the fingerprint of exactly the written file.
     pub fn written(&self, output: &Path, file: &Arc<Path>, fingerprint: FileFingerprint) {
         let Some(shared) = &self.0 else { return };
         let mut book = shared.book();
@@ -119,13 +121,14 @@ impl Outputs {
         }
     }
 
-    /// Whether the loss of an output still is to be made good: it may have been written again since it was told.
+    /// Checks whether the loss of an output was reported and the output was not written again since
+    /// then.
     pub fn is_told(&self, output: &Path) -> bool {
         let shared = self.0.as_ref();
         shared.is_some_and(|it| it.book().written.get(output).is_some_and(|it| it.is_told))
     }
 
-    /// Whether an output was written and another file, or none, lies there.
+    /// Checks whether an output was written and is now missing or replaced by another file.
     pub fn is_lost(&self, output: &Path) -> bool {
         let shared = self.0.as_ref();
         shared.is_some_and(|it| it.look(output, |_| true).is_some())
@@ -137,12 +140,13 @@ impl Shared {
         self.book.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Compares an output with what was written, and returns it if it is lost and `wanted`. It is looked at without
-    /// the lock, so that whoever changes it meanwhile does not wait for a disk; then it is looked at anew.
+    /// Returns an output that is lost and `wanted`. The comparison with the written file runs
+    /// without the lock, so writers do not wait for the disk. If the output is written meanwhile,
+    /// the comparison is repeated.
     fn look(&self, output: &Path, wanted: impl Fn(&mut Written) -> bool) -> Option<LostOutput> {
         loop {
             let known = self.book().written.get(output)?.fingerprint;
-            // What does not answer is what it was.
+            // If the system does not answer, the output counts as unchanged.
             let there = foreign::access(output, || Ok(FileFingerprint::at(output))).ok()?;
             if there.as_ref() == Some(&known) {
                 return None;
@@ -197,7 +201,7 @@ mod tests {
             output
         }
 
-        /// What is told next; the test's watchdog is the runner's.
+        /// Returns the next reported output. The test runner's watchdog limits the wait.
         fn next(&self) -> PathBuf {
             let mut lost = self.told.recv().unwrap();
             assert_eq!(lost.len(), 1, "{lost:?}");

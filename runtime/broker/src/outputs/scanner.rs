@@ -1,4 +1,4 @@
-//! The thread that looks at outputs: when the kernel tells of them, and in turn.
+//! The thread that scans outputs: after kernel events, and periodically.
 
 use std::ops::Bound;
 use std::path::Path;
@@ -13,18 +13,18 @@ use crate::core::LostOutput;
 use crate::environment::now;
 use crate::watch::{Told, Tree, Unwatched, below};
 
-/// How often some of the outputs are looked at.
+/// Interval of the periodic scan of some outputs.
 const INTERVAL: Duration = Duration::from_secs(1);
 
-/// In so many intervals all outputs are looked at once.
+/// Number of intervals in which every output is scanned once.
 const TURNS: usize = 30;
 
-/// The thread that looks at the outputs.
+/// Scanner thread for the outputs.
 pub(super) struct Scanner {
     shared: Arc<Shared>,
     tell: TellLost,
     tree: Tree,
-    /// The last output that was looked at in turn.
+    /// Last output of the periodic scan.
     last: Option<Arc<Path>>,
     lost: Vec<LostOutput>,
 }
@@ -68,13 +68,13 @@ impl Scanner {
         self.shared.bell.wait(self.tree.kernel(), rest);
     }
 
-    /// Watches directories that have got their first output, and then looks at what is in them: it may have been
-    /// lost before.
+    /// Watches directories that received their first output, and then scans their outputs. An
+    /// output may have been lost before.
     fn watch_fresh(&mut self) {
         let fresh = std::mem::take(&mut self.shared.book().fresh);
         for directory in fresh {
             match self.tree.watch(&directory) {
-                // The outputs in it are looked at in turn.
+                // The periodic scan still covers the outputs in it.
                 Ok(()) | Err(Unwatched::NoneLeft | Unwatched::Closed | Unwatched::Refused(_)) => {}
                 Err(Unwatched::Gone) => self.let_go(&directory),
             }
@@ -82,7 +82,7 @@ impl Scanner {
         }
     }
 
-    /// A directory is not watched any more; the next output in it has it watched again.
+    /// Stops watching a directory. The next output in it starts a new watch.
     fn let_go(&mut self, directory: &Path) {
         self.tree.remove_below(directory);
         let mut book = self.shared.book();
@@ -145,7 +145,7 @@ impl Scanner {
         }
     }
 
-    /// Events were lost.
+    /// Scans all outputs after events were lost.
     fn look_at_all(&mut self) {
         let all: Vec<Arc<Path>> = self.shared.book().written.keys().cloned().collect();
         for output in all {
@@ -153,7 +153,7 @@ impl Scanner {
         }
     }
 
-    /// Looks at the few outputs whose turn it is, and removes what could not be removed before.
+    /// Scans the next outputs of the periodic scan, and retries failed removals.
     fn turn(&mut self) {
         qcbus_disk::remove_left();
         let due: Vec<Arc<Path>> = {

@@ -1,10 +1,10 @@
-//! What a reload changes, for a person.
+//! Description of the changes of a reload for the user.
 
 use qcbus_formats::config::{BundleConfig, Config};
 
 use super::Loaded;
 
-/// What changed, line by line.
+/// Returns the changes, one per line.
 pub fn differences(old: &Loaded, new: &Loaded) -> Vec<String> {
     let mut lines = Vec::new();
     for child in &new.children {

@@ -1,4 +1,4 @@
-//! One-shot modules of ASAM's framework, which the adapter has take part as bundles.
+//! ASAM modules that the adapter runs as bundles.
 
 use std::path::{Path, PathBuf};
 
@@ -13,33 +13,34 @@ use rustix::fs::{Access, access};
 use super::{Loaded, programs};
 use crate::core::{ChildSpec, Restart};
 
-/// Who has one-shot modules take part as bundles.
+/// Adapter that runs ASAM modules as bundles.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Adapter {
-    /// The words that start it; none: nobody does.
+    /// Command that starts the adapter. Empty: there is no adapter.
     pub command: Vec<String>,
-    /// Names that are those of bundles which come with the program, whether they run or not.
+    /// Names of the bundles that come with the program, whether they run or not.
     pub reserved: Vec<String>,
-    /// Where modules have their private directories.
+    /// Directory of the private directories of the modules.
     pub scratch: PathBuf,
 }
 
-/// What a name is preceded by that is taken.
+/// Prefix of a module name that is already taken.
 const PREFIX: &str = "asam.";
-/// Before the command of a module, and before the directory of its private ones.
+/// Options before the command of a module and before its private directory.
 const EXEC: &str = "--exec";
 const SCRATCH: &str = "--scratch";
-/// The word behind the name of the program, for a checker bundle and for a report module.
+/// Word after the name of the program, for a checker bundle and for a report module.
 const ADAPTER: &str = "asam-adapter";
 const REPORTER: &str = "asam-reporter";
 
 impl Adapter {
-    /// Whether there is one.
+    /// Checks whether an adapter exists.
     pub(super) fn is_there(&self) -> bool {
         !self.command.is_empty()
     }
 
-    /// Where private directories are made, and why none can be made now. Waits for the disk.
+    /// Returns the parent of the private directories, and why none can be created now. Waits for
+    /// the disk.
     pub(crate) fn scratch_status(&self) -> Option<ScratchStatus> {
         self.is_there().then(|| ScratchStatus {
             directory: self.scratch.clone(),
@@ -47,7 +48,8 @@ impl Adapter {
         })
     }
 
-    /// The name under which a module joins: its own, unless a bundle that comes with the program has it.
+    /// Returns the name of a module: its own, unless a bundle that comes with the program has this
+    /// name.
     pub(super) fn name_of(&self, module: &Module, loaded: &mut Loaded) -> String {
         let name = &module.name;
         let is_taken = self.reserved.iter().any(|it| same_bundle(name, it, ""))
@@ -64,7 +66,7 @@ impl Adapter {
         joined
     }
 
-    /// How the adapter is started for a module.
+    /// Returns the command that starts the adapter for a module.
     pub(super) fn words(&self, name: &str, module: &Module, role: Role) -> Vec<String> {
         let mut words = self.command.clone();
         if role == Role::Reporter
@@ -93,7 +95,7 @@ impl Adapter {
         if once.cold {
             words.push("--cold".to_owned());
         }
-        // A report module judges nothing.
+        // A report module gives no verdict, so its program files do not matter.
         if role == Role::Bundle {
             for file in programs::files_of(&words) {
                 words.extend(["--program".to_owned(), file.to_string_lossy().into_owned()]);
@@ -110,20 +112,22 @@ impl Adapter {
         words
     }
 
-    /// What the adapter may do although it is confined: what its module may, and its private directories.
+    /// Returns the permissions of the adapter in the sandbox: those of its module, and its private
+    /// directories.
     pub(super) fn may(&self, name: &str, module: &May) -> May {
         let mut may = module.clone();
         may.write.push(self.scratch_of(name));
         may
     }
 
-    /// Where the private directories of one module are: those of others are none of its business.
+    /// Returns the parent of the private directories of one module. It has no access to those of
+    /// other modules.
     fn scratch_of(&self, name: &str) -> PathBuf {
         self.scratch.join(format!("of-{name}"))
     }
 
-    /// Adds the modules that a configuration names and nothing else brings, when a program of that name is found:
-    /// so ASAM's framework is configured that has no manifests.
+    /// Adds the modules that only the configuration names, if a program of that name is found.
+    /// ASAM's framework is configured this way, without manifests.
     pub(super) fn add_named(&self, config: &Config, known: &[&str], loaded: &mut Loaded) {
         for bundle in &config.bundles {
             let name = bundle.application.as_str();
@@ -164,7 +168,8 @@ impl Adapter {
     }
 }
 
-/// Why nothing can be written to a directory that is made when it is missing, for a person.
+/// Returns why a directory cannot be written to, for the user. A missing directory is created
+/// later.
 pub fn unwritable(directory: &Path) -> Option<String> {
     let absent = |place: &&Path| {
         let found = foreign::metadata(place);
@@ -179,7 +184,8 @@ pub fn unwritable(directory: &Path) -> Option<String> {
     Some(format!("{}: {why}", to_text(there)))
 }
 
-/// A configuration is no place to name any program whatever: only such names as those of modules are looked for.
+/// Checks whether a name has the form of a module name. Other names are not searched, because a
+/// configuration must not start arbitrary programs.
 fn looks_like_a_module(name: &str) -> bool {
     let good = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
     let is_one = name.starts_with("qc_") || name.starts_with("qc-") || name.ends_with("Bundle");
@@ -200,21 +206,22 @@ fn named_module(name: &str) -> Module {
     }
 }
 
-/// The command of a module that the adapter runs; `None` for other children.
+/// Returns the command of a module that the adapter runs, or `None` for other children.
 pub(super) fn command_of(words: &[String]) -> Option<&str> {
     value_of(words, EXEC)
 }
 
-/// Looks once more at what the adapter is to run, and makes the place for it.
+/// Checks the adapter's command again, and creates the private directory.
 ///
 /// # Errors
-/// What somebody else decides, and when there is no such program.
+/// When another user controls a file, and when the program does not exist.
 pub(super) fn ready(words: &[String]) -> Result<(), String> {
     if let Some(command) = command_of(words) {
         programs::look_at(command)?;
     }
     if let Some(scratch) = value_of(words, SCRATCH) {
-        // There before the process is confined, which may write to it.
+        // The directory must exist before the process enters the sandbox, which allows writes to
+        // it.
         trust::make_private_directory(Path::new(scratch)).map_err(|error| error.to_string())?;
     }
     Ok(())

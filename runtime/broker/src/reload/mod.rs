@@ -1,5 +1,5 @@
 //! The configuration and the bundle manifests: read, validate, compare, apply. The start of a
-//! broker is its first reload; a mistake never takes down what is in force.
+//! broker is its first reload. An error never removes the settings in force.
 
 mod differences;
 mod hosted;
@@ -27,56 +27,57 @@ pub use hosted::{Adapter, unwritable};
 use modules::{add_module, read_manifest};
 pub use programs::{command_of, ready};
 
-/// Largest configuration or manifest, in bytes.
+/// Maximum size of a configuration or manifest in bytes.
 const MAX_FILE: u64 = 16 << 20;
 
-/// Where the configuration and the children come from.
+/// Sources of the configuration and the children.
 #[derive(Debug, Clone)]
 pub struct Sources {
     /// The configuration file.
     pub config: Option<PathBuf>,
-    /// Whether the configuration stays in force while others are about: then it must be ours alone, as
-    /// manifests must.
+    /// Whether the configuration stays in force for a long time. In that case only the broker's
+    /// user may be able to change it, as with manifests.
     pub lasting: bool,
     /// Directory of manifests.
     pub bundles_d: Option<PathBuf>,
-    /// What of all that would be demanded is asked for.
+    /// Selection among the required checkers.
     pub choice: Choice,
-    /// Whether the verdict on a file is its own, whatever the verdicts on the files are that it rests on.
+    /// Whether the verdict on a file is independent of the verdicts on the files that it depends
+    /// on.
     pub own_verdicts: bool,
     /// The children that come with the program.
     pub standard: Vec<ChildSpec>,
-    /// Reporters that run when the configuration names them.
+    /// Reporters that run if the configuration names them.
     pub reporters: Vec<ChildSpec>,
-    /// What can be said beforehand of the bundles that come with the program.
+    /// Known facts about the bundles that come with the program.
     pub known: Known,
-    /// Who has one-shot modules of ASAM's framework take part as bundles.
+    /// Adapter that runs ASAM modules as bundles.
     pub adapter: Adapter,
 }
 
-/// What was read, valid as a whole.
+/// Loaded configuration and manifests, valid as a whole.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Loaded {
     /// The configuration.
     pub config: Option<Config>,
-    /// Everything that is to run.
+    /// All children to run.
     pub children: Vec<ChildSpec>,
-    /// What is odd about the configuration.
+    /// Oddities of the configuration.
     pub oddities: Vec<Oddity>,
-    /// What is odd about anything, that included, for a person.
+    /// All notices for the user, including the oddities of the configuration.
     pub notices: Vec<String>,
-    /// Every file that was read for it, and every program that is to run, with its stamp from before.
+    /// Every file that was read and every program to run, with its stamp from before the reading.
     pub read: Fingerprint,
-    /// Which manifest brought which child.
+    /// For each child: the manifest that added it.
     brought: BTreeMap<String, String>,
-    /// Device and inode of the directory of manifests, and how many there were.
+    /// Device and inode of the directory of manifests, and the number of manifests.
     manifests: Option<(u64, u64, usize)>,
 }
 
-/// Files with their stamps: differs as soon as any of the files does.
+/// Files with their stamps. It changes when any of the files changes.
 pub type Fingerprint = BTreeMap<PathBuf, Option<Stamp>>;
 
-/// Why nothing was applied.
+/// Reason why nothing was applied.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LoadError {
     /// The configuration cannot be used.
@@ -88,7 +89,8 @@ pub enum LoadError {
 }
 
 impl Loaded {
-    /// Whether a child has this name that no manifest has brought: it comes with the program.
+    /// Checks whether a child of this name comes with the program, which means that no manifest
+    /// added it.
     fn comes_with_the_program(&self, name: &str) -> bool {
         let mut children = self.children.iter();
         children.any(|it| it.name == name) && !self.brought.contains_key(name)
@@ -96,10 +98,10 @@ impl Loaded {
 }
 
 impl Sources {
-    /// Reads everything.
+    /// Reads the configuration and all manifests.
     ///
     /// # Errors
-    /// The first thing that cannot be used, with file, row and column where there is one.
+    /// The first problem, with file, row and column if known.
     pub fn load(&self) -> Result<Loaded, LoadError> {
         let mut loaded = Loaded {
             children: self.standard.clone(),
@@ -120,7 +122,7 @@ impl Sources {
             self.add_reporters(&parsed.config, &mut loaded);
         }
         if let Some(directory) = &self.bundles_d {
-            // Who may write to it is no file's stamp.
+            // The write permissions of the directory are not part of any file's stamp.
             note(&mut loaded, directory);
         }
         let with_the_program = loaded.children.len();
@@ -159,7 +161,7 @@ impl Sources {
         Ok(loaded)
     }
 
-    /// Says what is odd about a configuration beside what is there to run.
+    /// Adds notices about a configuration in comparison with the children to run.
     fn compare(&self, path: &Path, parsed: &Parsed, loaded: &mut Loaded) {
         loaded.oddities = parsed.all_oddities(&self.known_with(&loaded.children));
         let lines = loaded.oddities.iter().map(|oddity| oddity.line(path));
@@ -182,7 +184,7 @@ impl Sources {
         parse(path, &bytes.map_err(LoadError::Config)?)
     }
 
-    /// What there is to be named: what comes with the program, and what manifests bring.
+    /// Returns the names that come with the program, and the names from manifests.
     fn known_with(&self, children: &[ChildSpec]) -> Known {
         let mut known = self.known.clone();
         for child in children {
@@ -210,7 +212,8 @@ impl Sources {
         }
     }
 
-    /// The manifests, by name. What lies beside them and looks as if somebody took it for one is said.
+    /// Returns the manifests, sorted by name. Adds a notice for each other file that looks like a
+    /// manifest.
     fn manifests(&self, notices: &mut Vec<String>) -> Result<Vec<PathBuf>, LoadError> {
         let Some(directory) = &self.bundles_d else {
             return Ok(Vec::new());
@@ -227,7 +230,7 @@ impl Sources {
                 )));
             }
         }
-        // Nobody else can put another in its place.
+        // No other user can replace the directory after this check.
         let entries = std::fs::read_dir(directory).map_err(|error| cannot_look(&error))?;
         let all: Result<Vec<PathBuf>, LoadError> = entries
             .map(|entry| {
@@ -252,13 +255,14 @@ impl Sources {
         Ok(paths)
     }
 
-    /// The directory of manifests, if it is there.
+    /// Returns device and inode of the directory of manifests, if it exists.
     fn directory(&self) -> Option<(u64, u64)> {
         let data = std::fs::metadata(self.bundles_d.as_ref()?).ok()?;
         Some((data.dev(), data.ino()))
     }
 
-    /// All files that count, as they are now: `read` has those that manifests list, among others.
+    /// Returns the current stamps of all relevant files. `read` contains the files that manifests
+    /// list.
     pub fn fingerprint(&self, read: &Fingerprint) -> Fingerprint {
         let manifests = self.manifests(&mut Vec::new()).unwrap_or_default();
         let paths = self.config.iter().cloned().chain(manifests);
@@ -268,11 +272,11 @@ impl Sources {
             .collect()
     }
 
-    /// Whether the directory of manifests is away: gone, or an empty one in its place as where nothing
-    /// is mounted. Nobody has removed the bundles that it brought.
+    /// Checks whether the directory of manifests is still available. It may be missing, or replaced
+    /// by an empty one because it is not mounted. That does not mean that its bundles were removed.
     ///
     /// # Errors
-    /// [`LoadError::Manifest`] when it is.
+    /// [`LoadError::Manifest`] when it is not available.
     pub fn still_has(&self, old: &Loaded, new: &Loaded) -> Result<(), LoadError> {
         let (Some(directory), Some((device, inode, 1..))) = (&self.bundles_d, old.manifests) else {
             return Ok(());
@@ -294,7 +298,7 @@ impl Sources {
     }
 }
 
-/// Nothing that a run of `check` prints or writes is of a shadow.
+/// Returns the notice that a run of `check` ignores a shadow: no output of the run is from it.
 fn no_shadow_in_a_run(module: &Module) -> String {
     format!(
         "{}: `{}` is a shadow: it takes no part in a run, only where a broker stays (`qcbus serve`)",
@@ -303,7 +307,8 @@ fn no_shadow_in_a_run(module: &Module) -> String {
     )
 }
 
-/// Bundles that the configuration names, and that have no weight all the same.
+/// Returns notices about bundles that the configuration names although they are shadows without
+/// weight.
 fn named_shadows(path: &Path, config: &Config, loaded: &Loaded) -> Vec<String> {
     let named = |name: &str| {
         let mut bundles = config.bundles.iter();
@@ -322,7 +327,7 @@ fn named_shadows(path: &Path, config: &Config, loaded: &Loaded) -> Vec<String> {
         .collect()
 }
 
-/// Bundles that somebody has brought, and of which the configuration asks nothing.
+/// Returns notices about bundles from manifests that the configuration does not name.
 fn unasked(path: &Path, config: &Config, loaded: &Loaded) -> Vec<String> {
     let named = |name: &str| {
         let mut bundles = config.bundles.iter();

@@ -1,4 +1,4 @@
-//! Manifests: what is to run beside what comes with the program.
+//! Manifests: modules that run in addition to those that come with the program.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use qcbus_messages::path_text::to_text;
 use super::{Adapter, LoadError, Loaded, MAX_FILE, programs};
 use crate::core::{ChildSpec, Restart};
 
-/// The modules of a manifest; every file that is read for it is told to `note` first.
+/// Returns the modules of a manifest. Passes every file to `note` before reading it.
 pub(super) fn read_manifest(path: &Path, note: &dyn Fn(&Path)) -> Result<Vec<Module>, LoadError> {
     let sources = manifest::Sources {
         read: &|path| {
@@ -23,10 +23,11 @@ pub(super) fn read_manifest(path: &Path, note: &dyn Fn(&Path)) -> Result<Vec<Mod
     manifest::load(path, &sources).map_err(|error| LoadError::Manifest(error.to_string()))
 }
 
-/// Adds the module of a manifest to what is to run.
+/// Adds the module of a manifest to the children to run.
 ///
 /// # Errors
-/// [`LoadError::Manifest`] when its name is taken, or it would have to judge and cannot be asked.
+/// [`LoadError::Manifest`] when its name is taken, or when it is a required bundle that cannot be
+/// run.
 pub(super) fn add_module(
     module: &Module,
     adapter: &Adapter,
@@ -78,7 +79,7 @@ pub(super) fn add_module(
     Ok(())
 }
 
-/// Nobody misses a reporter that is not started. A bundle would have to judge.
+/// Skips a reporter that cannot join the bus. A bundle is an error, because it would be required.
 fn not_on_the_bus(module: &Module, role: Role, loaded: &mut Loaded) -> Result<(), LoadError> {
     let (manifest, name) = (to_text(&module.manifest), &module.name);
     if role == Role::Bundle {

@@ -1,4 +1,5 @@
-//! The programs of manifests: what a command runs must be in the broker's hands alone.
+//! Programs of manifests. Only the broker's user may be able to change the files that a command
+//! runs.
 
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -9,27 +10,27 @@ use qcbus_disk::trust::{self, TrustError};
 use super::hosted;
 use crate::own_program::OwnProgram;
 
-/// What a command of a manifest becomes, so that it is the shell's to take apart, as in ASAM's framework.
+/// Text around the command of a manifest, so that the shell parses it, as in ASAM's framework.
 const BEFORE: &str = "exec ";
 const BEHIND: &str = " \"$@\"";
 
-/// The words that start a command of a manifest.
+/// Returns the words that start a command of a manifest.
 pub(super) fn shell_command(command: &str) -> Vec<String> {
     let line = format!("{BEFORE}{command}{BEHIND}");
     ["sh", "-c", &line, "sh"].map(str::to_owned).to_vec()
 }
 
-/// Looks at what the command of a manifest runs: its program, and the first file that it gives it, which
-/// is an interpreter's script. What those read themselves is their own.
+/// Checks the files that the command of a manifest runs: its program, and its first file argument,
+/// which may be the script of an interpreter. Files that these read themselves are not checked.
 ///
 /// # Errors
-/// What somebody else decides, or what the shell would have to work out first. That something is missing is
-/// found out by whoever starts it.
+/// When another user controls a file, or when the shell would have to expand the command. A missing
+/// file is reported later, at the start.
 pub(super) fn look_at(command: &str) -> Result<(), String> {
     resolve(command).map(drop)
 }
 
-/// What a manifest says that is run; `None` for what comes with the program.
+/// Returns the command of a manifest, or `None` for a child that comes with the program.
 pub fn command_of(words: &[String]) -> Option<&str> {
     if let Some(command) = hosted::command_of(words) {
         return Some(command);
@@ -40,7 +41,8 @@ pub fn command_of(words: &[String]) -> Option<&str> {
     line.strip_prefix(BEFORE)?.strip_suffix(BEHIND)
 }
 
-/// The files that a child runs: the program of its manifest, there or not, and the script that it gives it.
+/// Returns the files that a child runs: the program of its manifest, even if missing, and its
+/// script argument.
 pub(super) fn files_of(words: &[String]) -> Vec<PathBuf> {
     let mut words = Words {
         rest: command_of(words).unwrap_or_default(),
@@ -53,14 +55,14 @@ pub(super) fn files_of(words: &[String]) -> Vec<PathBuf> {
     std::iter::once(program).chain(script).collect()
 }
 
-/// The first word that is no option, as a path.
+/// Returns the first word that is not an option, as a path.
 fn first_file(words: &mut Words<'_>) -> Option<PathBuf> {
     let word = std::iter::from_fn(|| words.next_word()).find(|word| !word.starts_with('-'));
     word.map(|it| absolute(Path::new(&it)))
 }
 
-/// Whether a file is run by the program that it is given to. One that it writes to, such as its log, changes all
-/// the time, and must not make an upgrade each time.
+/// Checks whether a file argument is a script for the program. A file that the program writes, such
+/// as its log, changes often and must not cause an upgrade each time.
 fn is_script(file: &Path) -> bool {
     let begins_as_one = || {
         let mut begin = [0; 2];
@@ -71,11 +73,11 @@ fn is_script(file: &Path) -> bool {
     file.is_file() && (is_named_as_one || is_executable(file) || begins_as_one())
 }
 
-/// The words that start a child, after a last look at a manifest's program: it is named by where it was
-/// found, so that nothing is looked for between the look and the start.
+/// Returns the words that start a child, after a last check of a manifest's program. They contain
+/// the path at which the program was found, so no lookup happens between the check and the start.
 ///
 /// # Errors
-/// As [`look_at`], and when there is no such program.
+/// As [`look_at`], and when the program does not exist.
 pub fn ready(words: &[String]) -> Result<Vec<String>, String> {
     hosted::ready(words)?;
     let ([shell, flag, _, name], Some(command)) = (words, command_of(words)) else {
@@ -95,13 +97,13 @@ fn first_word(command: &str) -> &str {
     command.split_whitespace().next().unwrap_or_default()
 }
 
-/// In single quotes, for the shell.
+/// Returns the path in single quotes, for the shell.
 fn quoted(path: &str) -> String {
     format!("'{}'", path.replace('\'', "'\\''"))
 }
 
-/// The program of a command, from the root, and what of the command follows its name. `None`: there is no
-/// such program.
+/// Returns the absolute program of a command and the rest of the command after its name. Returns
+/// `None` if the program does not exist.
 fn resolve(command: &str) -> Result<Option<(String, &str)>, String> {
     let mut words = Words { rest: command };
     let program = words.next_word();
@@ -128,7 +130,7 @@ fn resolve(command: &str) -> Result<Option<(String, &str)>, String> {
 fn accept(file: &Path) -> Result<(), String> {
     match trust::look_at_file(file) {
         Err(error @ TrustError::Foreign { .. }) => Err(error.to_string()),
-        // It is missing, or nobody can get at it: so will whoever starts it find.
+        // The file is missing or inaccessible. The start reports this.
         Ok(()) | Err(TrustError::Io { .. }) => Ok(()),
     }
 }
@@ -141,7 +143,8 @@ fn is_executable(path: &Path) -> bool {
     rustix::fs::access(path, rustix::fs::Access::EXEC_OK).is_ok()
 }
 
-/// Where the shell finds a program, which the broker starts with the same `PATH`.
+/// Returns the path at which the shell finds a program. The broker starts the shell with the same
+/// `PATH`.
 pub(super) fn find(program: &str) -> Option<PathBuf> {
     let is_program = |path: &PathBuf| path.is_file() && is_executable(path);
     if program.contains('/') {
@@ -152,7 +155,7 @@ pub(super) fn find(program: &str) -> Option<PathBuf> {
     places.into_iter().find(is_program)
 }
 
-/// The words of a command, as the shell sees them: up to the first that it would have to work out.
+/// Words of a command as the shell parses them, up to the first one that needs an expansion.
 struct Words<'c> {
     rest: &'c str,
 }
@@ -184,11 +187,11 @@ impl Words<'_> {
     }
 }
 
-/// What means something to the shell where it stands outside of quotes.
+/// Characters with a special meaning for the shell outside of quotes.
 const SPECIAL: &str = "`*?[;&|<>(){}#!\n";
 
-/// The value of the variable whose name follows, as a child sees it, too. `None`: it is not set, or the
-/// shell would take it apart.
+/// Returns the value of the variable whose name follows. A child sees the same value. Returns
+/// `None` if it is not set, or if the shell would split or expand the value.
 fn variable(letters: &mut CharIndices<'_>) -> Option<String> {
     let rest = letters.as_str();
     let (name, length) = match rest.strip_prefix('{') {
@@ -207,12 +210,13 @@ fn variable(letters: &mut CharIndices<'_>) -> Option<String> {
     }
     let value = std::env::var(name).ok()?;
     let plain = |c: char| !c.is_whitespace() && !SPECIAL.contains(c);
-    // The name is letters of one byte each.
+    // The name consists of one-byte characters.
     letters.nth(length - 1);
     value.chars().all(plain).then_some(value)
 }
 
-/// Takes what stands in quotes. `None`: they are not closed, or the shell would work something out.
+/// Reads a quoted text. Returns `None` if the quote is not closed, or if the shell would expand
+/// something.
 fn quote(letters: &mut CharIndices<'_>, word: &mut String, mark: char) -> Option<()> {
     loop {
         match letters.next()?.1 {

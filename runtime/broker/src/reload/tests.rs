@@ -1,4 +1,4 @@
-//! What a start reads, and what of a change is taken.
+//! The sources that a start reads, and the changes that a reload applies.
 
 use super::*;
 use crate::core::Restart;

@@ -1,4 +1,4 @@
-//! The files, who writes them, and what the kernel tells of it.
+//! The simulated files, their writers, and the kernel's events about them.
 
 use std::collections::HashMap;
 use std::fs::{self, File};
@@ -13,7 +13,7 @@ use qcbus_messages::Digest;
 use super::kernel::Telling;
 use crate::store::digest_of;
 
-/// The files: two maps, scenarios on them, and what the second map includes.
+/// The files: two maps, scenarios on them, and the part that the second map includes.
 pub const FILES: [&str; 6] = [
     "a.xodr",
     "b.xodr",
@@ -22,12 +22,12 @@ pub const FILES: [&str; 6] = [
     "sub/u.xosc",
     "p.xml",
 ];
-/// Of them those that get a verdict.
+/// Range of the files that get a verdict.
 pub const JUDGED: std::ops::Range<usize> = 0..5;
-/// The part that the second map includes.
+/// Index of the part that the second map includes.
 const PART: usize = 5;
 
-/// The map of a scenario.
+/// Returns the map of a scenario.
 pub fn map_of(file: usize) -> Option<usize> {
     match file {
         2 | 4 => Some(0),
@@ -36,42 +36,42 @@ pub fn map_of(file: usize) -> Option<usize> {
     }
 }
 
-/// What is wrong with bytes.
+/// Defect of a file's bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mark {
     Good,
     Bad,
-    /// Of a map: it is sound, but not for scenarios.
+    /// For a map: it is sound but not suitable for scenarios.
     Unfit,
 }
 
-/// Bytes, as who wrote them meant them.
+/// Properties that the writer intended for the bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Meant {
     pub mark: Mark,
-    /// All of them are there.
+    /// Whether the bytes are complete.
     pub whole: bool,
-    /// They include the part.
+    /// Whether the bytes include the part.
     pub includes: bool,
 }
 
-/// What lies at every path.
+/// Digest of the bytes at every path.
 pub type Lying = [Option<Digest>; FILES.len()];
 
-/// The files.
+/// The simulated files.
 pub struct Disk {
     pub root: PathBuf,
     pub lying: Lying,
-    /// What lay there before each step at which something changed, the newest last.
+    /// State before each step that changed something, newest last.
     pub changes: Vec<(usize, Lying)>,
     pub meant: HashMap<Digest, Meant>,
-    /// Who tells of changes.
+    /// Queue of change events.
     pub telling: Telling,
-    /// Files that somebody has not written to their end.
+    /// Files with an unfinished write. They stay open.
     open: Vec<File>,
-    /// By the time of modification that a file really has: both its times in the simulation.
+    /// Simulated modification and change time for each real modification time.
     times: HashMap<i128, (i128, i128)>,
-    /// Numbers in the order in which files were first looked at, the same every time.
+    /// Inode numbers in the order of the first lookup, so that every run gives the same numbers.
     inodes: Mutex<HashMap<u64, u64>>,
     serial: u64,
     texts: u64,
@@ -121,29 +121,30 @@ impl Disk {
         lying[file].and_then(|digest| self.meant.get(&digest).copied())
     }
 
-    /// Whether a file must be accepted where this lies. `maps`: who looks at maps must judge, too.
+    /// Checks whether a file must be accepted in this state. `maps`: the bundle that checks maps
+    /// must judge, too.
     pub fn is_sound(&self, lying: &Lying, file: usize, maps: bool) -> bool {
         let sound = |it: Meant| it.whole && it.mark != Mark::Bad;
         let part = self.meant_at(lying, PART);
         let own = |it: Meant| sound(it) && (!it.includes || part.is_some_and(sound));
-        // A scenario is as good as its map.
+        // A scenario is only as good as its map.
         let map = |it: Meant| own(it) && (it.mark != Mark::Unfit || !maps);
         self.meant_at(lying, file).is_some_and(own)
             && map_of(file).is_none_or(|it| self.meant_at(lying, it).is_some_and(map))
     }
 
-    /// Whether a bundle must have found an error in the file itself.
+    /// Checks whether a bundle must have found an error in the file itself.
     pub fn is_faulty(&self, lying: &Lying, file: usize) -> bool {
         let faulty = |it: Meant| !it.whole || it.mark == Mark::Bad;
         self.meant_at(lying, file).is_some_and(faulty)
     }
 
-    /// Whether what lies there includes the part.
+    /// Checks whether the file includes the part in this state.
     pub fn includes(&self, lying: &Lying, file: usize) -> bool {
         self.meant_at(lying, file).is_some_and(|it| it.includes)
     }
 
-    /// Everything that lay there at some moment since a step.
+    /// Returns all states that existed at some time since a step.
     pub fn since(&self, step: usize) -> impl Iterator<Item = &Lying> {
         let recent = self.changes.iter().rev();
         let recent = recent.take_while(move |(at, _)| *at >= step);
@@ -199,14 +200,14 @@ impl Disk {
         self.lying[file] = digest;
     }
 
-    /// Gives a file its times: as if it had been changed now, and modified then.
+    /// Sets the simulated times of a file: changed now, and modified at the given time or now.
     fn mark_times(&mut self, path: &Path, wall: i128, modified: Option<i128>) {
         self.serial += 1;
         let real = Duration::from_secs(1_000_000) + Duration::from_nanos(self.serial);
         let key = 1_000_000_000_000_000 + i128::from(self.serial);
         let now = wall + i128::from(self.serial);
         self.times.insert(key, (modified.unwrap_or(now), now));
-        // Without opening it, which would be told as well.
+        // The times are set by path, because opening the file would cause further events.
         let set = |time: Duration| rustix::fs::Timespec {
             tv_sec: i64::try_from(time.as_secs()).unwrap_or(i64::MAX),
             tv_nsec: i64::from(time.subsec_nanos()),
@@ -220,7 +221,7 @@ impl Disk {
             .expect("a file of the simulation takes a time");
     }
 
-    /// Times of modification of a file that is there.
+    /// Returns the simulated modification time of an existing file.
     fn modified(&self, path: &Path) -> Option<i128> {
         let data = fs::metadata(path).ok()?;
         Some(self.stat(Stat::of(&data)).modified_ns)
@@ -266,7 +267,7 @@ impl Disk {
         self.lies(file, step, Some(digest));
     }
 
-    /// The bytes stay what they are.
+    /// Changes a file without changing its bytes.
     fn touch(&mut self, file: usize, (_, wall): (usize, i128), how: How) {
         let path = self.path(file);
         let before = self.modified(&path).filter(|_| how == How::Touched);
@@ -284,7 +285,7 @@ impl Disk {
         }
     }
 
-    /// One file takes the place of another.
+    /// Replaces one file by another.
     pub fn rename(&mut self, from: usize, to: usize, (step, wall): (usize, i128)) {
         let (old, new) = (self.path(from), self.path(to));
         let parent_is_there = new.parent().is_some_and(Path::exists);
@@ -295,11 +296,11 @@ impl Disk {
         fs::rename(&old, &new).expect("a file is renamed");
         self.mark_times(&new, wall, modified);
         self.lies(from, step, None);
-        // At once.
+        // Both changes happen in the same step.
         self.lying[to] = Some(digest);
     }
 
-    /// The directory goes as a whole, or comes back.
+    /// Moves the whole directory away, or back.
     pub fn move_directory(&mut self, step: usize) {
         let (here, away) = (self.root.join("sub"), self.root.with_extension("away"));
         let file = 4;
@@ -317,17 +318,17 @@ impl Disk {
     }
 }
 
-/// How a file is written.
+/// Manner in which a file is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum How {
     InPlace,
     TimePutBack,
     Renamed,
-    /// Not to its end: it stays open.
+    /// The write is incomplete: the file stays open.
     Torn,
-    /// The same bytes again.
+    /// The same bytes are written again.
     Again,
-    /// Other rights.
+    /// Only the metadata changes.
     Touched,
 }
 
@@ -337,7 +338,7 @@ impl How {
     }
 }
 
-/// What can be seen in an image.
+/// Properties of a file that are visible in its image.
 pub struct Found {
     whole: bool,
     bad: bool,
@@ -356,7 +357,7 @@ impl Found {
     }
 }
 
-/// Looks through an image, without any model.
+/// Searches the bytes of an image without any model.
 pub fn found_in(image: &[u8]) -> Found {
     let text = String::from_utf8_lossy(image);
     Found {

@@ -1,5 +1,5 @@
-//! What the broker takes from the system, taken from the simulation where one runs: tests without one
-//! have the system's.
+//! The system interface of the broker in tests. Inside a simulation it uses the simulation,
+//! otherwise the real system.
 
 use std::io;
 use std::path::Path;
@@ -15,35 +15,35 @@ use super::threads::{Signal, State, here};
 pub use super::kernel::{Bell, Kernel};
 pub use super::surroundings::{Children, ControlSocket, Host};
 
-/// Whether all this is simulated.
+/// Checks whether the current thread is simulated.
 pub fn is_simulated() -> bool {
     here().is_some_and(|it| it.task.is_some())
 }
 
-/// The time that passes.
+/// Returns the monotonic time.
 pub fn now() -> Instant {
     here().map_or_else(Instant::now, |it| it.simulation.instant())
 }
 
-/// The time of the day, which may be set.
+/// Returns the time of day, which may be set.
 pub fn wall_time() -> SystemTime {
     here().map_or_else(SystemTime::now, |it| it.simulation.wall_time())
 }
 
-/// What `stat` says of the times of a file.
+/// Returns the simulated result of `stat`.
 pub fn stat(told: Stat) -> Stat {
     here().map_or(told, |it| it.simulation.stat(told))
 }
 
-/// What tells files apart when they are shared out: the path, without the directory of this run.
+/// Returns the key by which files are distributed: the path without the directory of this run.
 pub fn place(path: &Path) -> &Path {
     let root = here().map(|it| it.simulation.world().disk.root.clone());
     root.and_then(|root| path.strip_prefix(root).ok())
         .unwrap_or(path)
 }
 
-/// Here others may come in between. No lock is held by who calls it, but for what is said while
-/// files are read: then nobody comes in between but who writes them.
+/// Marks a point at which other threads may run. The caller holds no lock, except at the steps
+/// while files are read. At those steps only writers of files may intervene.
 pub fn step(what: &'static str, path: &Path) {
     let Some(here) = here() else { return };
     let Some(task) = &here.task else { return };
@@ -59,7 +59,7 @@ pub fn step(what: &'static str, path: &Path) {
     }
 }
 
-/// What the disk answers to who is about to write: now and then that it is broken.
+/// Returns the disk's answer to a write: now and then an I/O error.
 pub fn disk() -> io::Result<()> {
     let is_broken = here().is_some_and(|it| it.task.is_some() && it.simulation.disk_breaks());
     match is_broken {
@@ -68,14 +68,14 @@ pub fn disk() -> io::Result<()> {
     }
 }
 
-/// As [`mpsc::channel`].
+/// Works as [`mpsc::channel`].
 pub fn channel<T>() -> (Sender<T>, Receiver<T>) {
     let (sender, receiver) = mpsc::channel();
     let signal = Signal::default();
     (Sender(sender, signal.clone()), Receiver(receiver, signal))
 }
 
-/// As [`mpsc::Sender`].
+/// Counterpart of [`mpsc::Sender`].
 pub struct Sender<T>(mpsc::Sender<T>, Signal);
 
 impl<T> std::fmt::Debug for Sender<T> {
@@ -91,7 +91,7 @@ impl<T> Clone for Sender<T> {
 }
 
 impl<T> Sender<T> {
-    /// As [`mpsc::Sender::send`].
+    /// Works as [`mpsc::Sender::send`].
     pub fn send(&self, value: T) -> Result<(), mpsc::SendError<T>> {
         self.1.store(true, Ordering::Relaxed);
         self.0.send(value)
@@ -100,21 +100,21 @@ impl<T> Sender<T> {
 
 impl<T> Drop for Sender<T> {
     fn drop(&mut self) {
-        // It may have been the last.
+        // This may have been the last sender.
         self.1.store(true, Ordering::Relaxed);
     }
 }
 
-/// As [`mpsc::Receiver`].
+/// Counterpart of [`mpsc::Receiver`].
 pub struct Receiver<T>(mpsc::Receiver<T>, Arc<AtomicBool>);
 
 impl<T> Receiver<T> {
-    /// As [`mpsc::Receiver::try_recv`].
+    /// Works as [`mpsc::Receiver::try_recv`].
     pub fn try_recv(&self) -> Result<T, TryRecvError> {
         self.0.try_recv()
     }
 
-    /// As [`mpsc::Receiver::recv`].
+    /// Works as [`mpsc::Receiver::recv`].
     pub fn recv(&self) -> Result<T, RecvError> {
         let Some(task) = here().and_then(|it| it.task) else {
             return self.0.recv();
@@ -130,7 +130,7 @@ impl<T> Receiver<T> {
         }
     }
 
-    /// As [`mpsc::Receiver::recv_timeout`].
+    /// Works as [`mpsc::Receiver::recv_timeout`].
     pub fn recv_timeout(&self, timeout: Duration) -> Result<T, RecvTimeoutError> {
         let here = here();
         let simulated = here.and_then(|it| Some((it.simulation, it.task?)));
@@ -153,7 +153,7 @@ impl<T> Receiver<T> {
     }
 }
 
-/// Does something aside.
+/// Runs `body` on another thread.
 pub fn spawn_blocking<R: Send + 'static>(body: impl FnOnce() -> R + Send + 'static) {
     match here() {
         Some(here) => here
@@ -163,7 +163,7 @@ pub fn spawn_blocking<R: Send + 'static>(body: impl FnOnce() -> R + Send + 'stat
     }
 }
 
-/// As [`std::thread`].
+/// Counterpart of [`std::thread`].
 pub mod thread {
     use std::io;
 
@@ -171,22 +171,22 @@ pub mod thread {
 
     pub use std::thread::sleep;
 
-    /// As [`std::thread::Builder`].
+    /// Counterpart of [`std::thread::Builder`].
     #[derive(Default)]
     pub struct Builder(String);
 
     impl Builder {
-        /// As there.
+        /// Works as the original.
         pub fn new() -> Builder {
             Builder::default()
         }
 
-        /// As there.
+        /// Works as the original.
         pub fn name(self, name: String) -> Builder {
             Builder(name)
         }
 
-        /// As there.
+        /// Works as the original.
         pub fn spawn(self, body: impl FnOnce() + Send + 'static) -> io::Result<JoinHandle<()>> {
             let Some(here) = here() else {
                 let thread = std::thread::Builder::new().name(self.0);
@@ -197,19 +197,20 @@ pub mod thread {
         }
     }
 
-    /// As [`std::thread::JoinHandle`]. No simulated thread is waited for: a simulated broker is killed.
+    /// Counterpart of [`std::thread::JoinHandle`]. It does not wait for simulated threads, because
+    /// a simulated broker is killed.
     #[derive(Debug)]
     pub struct JoinHandle<T>(Option<std::thread::JoinHandle<T>>);
 
     impl JoinHandle<()> {
-        /// As there.
+        /// Works as the original.
         pub fn is_finished(&self) -> bool {
             self.0
                 .as_ref()
                 .is_none_or(std::thread::JoinHandle::is_finished)
         }
 
-        /// As there.
+        /// Works as the original.
         pub fn join(self) -> std::thread::Result<()> {
             self.0.map_or(Ok(()), std::thread::JoinHandle::join)
         }

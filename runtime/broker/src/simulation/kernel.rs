@@ -1,5 +1,5 @@
-//! The kernel that tells the simulated broker of files: it is the real one, but what it tells is passed
-//! on when the schedule says so, or never.
+//! The source of file events for the simulated broker: it is the real kernel, but the schedule
+//! decides when events are passed on, or that they are lost.
 
 use std::io;
 use std::path::Path;
@@ -14,7 +14,7 @@ use super::Simulation;
 use super::threads::{Signal, State, here};
 use crate::watch::kernel::{self, Told};
 
-/// Who is asked for events.
+/// Source of file events.
 pub enum Kernel {
     Real(kernel::Kernel),
     Simulated(Arc<kernel::Kernel>, Arc<Simulation>),
@@ -60,7 +60,7 @@ impl Kernel {
     }
 }
 
-/// What wakes the watcher.
+/// Wakes the watcher.
 pub enum Bell {
     Real(kernel::Bell),
     Simulated(Signal),
@@ -104,27 +104,27 @@ impl Bell {
     }
 }
 
-/// What the kernel has to tell.
+/// Queue of kernel events of the simulation.
 #[derive(Default)]
 pub struct Telling {
-    /// Who is asked, if anybody.
+    /// Real kernel that provides the events, if the broker has opened it.
     kernel: Option<Arc<kernel::Kernel>>,
-    /// What it has not told yet.
+    /// Events that are not passed on yet.
     waiting: std::collections::VecDeque<Told>,
-    /// What it has, and nobody has taken.
+    /// Events that are passed on but not read yet.
     told: Vec<Told>,
     bell: Signal,
 }
 
 impl Telling {
-    /// Takes what the real one says of what has just been done.
+    /// Takes over the real kernel's events about the latest changes.
     pub fn hear(&mut self) {
         let Some(kernel) = &self.kernel else { return };
         self.waiting
             .extend(kernel.events().expect("the kernel tells"));
     }
 
-    /// Nobody is told of what has just been done.
+    /// Drops the events about the latest changes: only the first `of` events stay.
     pub fn drop_new(&mut self, of: usize) {
         self.hear();
         self.waiting.truncate(of);
@@ -135,7 +135,7 @@ impl Telling {
         self.waiting.len()
     }
 
-    /// The queue of the kernel is full.
+    /// Simulates a full event queue of the kernel.
     pub fn overflow(&mut self) {
         self.hear();
         self.waiting.clear();
@@ -148,7 +148,7 @@ impl Telling {
         }
     }
 
-    /// The next event is told; gives how it reads.
+    /// Passes the next event on and returns its text.
     pub fn tell(&mut self) -> Option<String> {
         self.hear();
         let event = self.waiting.pop_front()?;
@@ -158,7 +158,7 @@ impl Telling {
         Some(said)
     }
 
-    /// The broker is dead.
+    /// Drops all state because the broker is dead.
     pub fn forget(&mut self) {
         *self = Telling::default();
     }

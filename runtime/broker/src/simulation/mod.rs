@@ -1,8 +1,8 @@
-//! The broker in a simulated world: its loop, its watcher, its writers, its readers, its journal and what
-//! a start makes of them, all of it real, on threads of which one runs at a time. A seed says who
-//! is next, how far the clock goes, what happens to the files, when bundles answer, when the kernel
-//! tells of changes, when the broker is killed. Real are also the files, in a directory in memory; not
-//! real are time, the bus, processes and the kernel's tellings.
+//! The broker in a simulated world: its loop, watcher, writers, readers, journal and start are
+//! real, on threads of which one runs at a time. A seed determines the next thread, the clock,
+//! changes of files, answers of bundles, events of the kernel and kills of the broker. The files
+//! are real, too, in a directory in memory. Time, the bus, processes and the delivery of kernel
+//! events are not real.
 //!
 //! `QCBUS_SIM_SEED=7` plays one schedule and prints it, `QCBUS_SIM_SCHEDULES=10000` plays as many,
 //! `QCBUS_SIM_FROM=1000000` begins with that seed.
@@ -30,7 +30,7 @@ use threads::{Crew, State, Steps, here};
 use world::World;
 pub use world::{Serving, Summary};
 
-/// One schedule being played.
+/// A schedule that is being played.
 pub struct Simulation {
     world: Mutex<World>,
     crew: Arc<Crew>,
@@ -61,13 +61,13 @@ impl Simulation {
         self.world().disk.stat(told)
     }
 
-    /// Does something on a thread of its own, when it is its turn.
+    /// Runs `body` on a simulated thread when the schedule selects it.
     pub fn spawn(self: &Arc<Simulation>, name: String, body: Box<dyn FnOnce() + Send>) {
         let task = self.crew.start(self, name, body);
         self.world().tasks.push(task);
     }
 
-    /// A thread has got so far.
+    /// Records that a thread has reached a step.
     pub fn reaches(&self, what: &'static str, path: &Path) {
         let mut world = self.world();
         world.say(|| format!("  {what} {}", name_of(path)));
@@ -78,7 +78,7 @@ impl Simulation {
         }
     }
 
-    /// And goes on from there.
+    /// Records that a thread continues after a step.
     pub fn goes_on(&self, what: &'static str, path: &Path) {
         let mut world = self.world();
         let step = world.step;
@@ -89,7 +89,7 @@ impl Simulation {
         }
     }
 
-    /// While a file is read, others may be written.
+    /// May change a file while another one is being read.
     pub fn user_meddles(&self) {
         let mut world = self.world();
         if world.meddles && world.rng.u32(0..12) == 0 {
@@ -97,7 +97,7 @@ impl Simulation {
         }
     }
 
-    /// Whether the disk does not do what it is told to this time. While a broker starts it does.
+    /// Decides whether a disk operation fails this time. It never fails while a broker starts.
     pub fn disk_breaks(&self) -> bool {
         let mut world = self.world();
         let breaks = world.meddles && world.serving.is_some() && world.rng.u32(0..40) == 0;
@@ -123,13 +123,13 @@ fn name_of(path: &Path) -> String {
     parts.join("/")
 }
 
-/// What the loop of a simulated broker does where the real one waits for anything to happen.
+/// Replaces the point at which the loop of a real broker waits for events.
 pub struct Turns {
     simulation: Arc<Simulation>,
 }
 
 impl Turns {
-    /// The loop begins.
+    /// Begins the loop.
     pub fn begin(serving: Serving) -> Turns {
         let simulation = here().expect("a simulation").simulation;
         simulation.world().serving = Some(serving);
@@ -140,7 +140,7 @@ impl Turns {
         self.simulation.now()
     }
 
-    /// One of so many.
+    /// Chooses a number below `count`.
     pub fn choose(&self, count: usize) -> usize {
         self.simulation.world().rng.usize(0..count)
     }
@@ -149,7 +149,7 @@ impl Turns {
         self.simulation.world().say(line);
     }
 
-    /// A turn is over.
+    /// Ends an iteration of the loop.
     pub fn is_over(&self, summary: Summary) {
         let mut world = self.simulation.world();
         if summary.demanded.iter().any(|it| it == peers::SECOND) {
@@ -161,7 +161,7 @@ impl Turns {
         self.stop(State::Ready);
     }
 
-    /// Nothing is there to be done until then.
+    /// Pauses because no work exists before `until`.
     pub fn rest(&self, until: Duration) {
         self.stop(State::AtRest(self.simulation.steps.count(), until));
     }

@@ -1,4 +1,4 @@
-//! What must be so: at every moment, and when everything has settled.
+//! Invariants: those of every moment, and those after everything has settled.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::journal::Remembered;
 use crate::result_paths::with_suffix;
 use crate::store::digest_of;
 
-/// A verdict file, as anybody can read it.
+/// Content of a verdict file, as any program can read it.
 #[derive(Debug, Clone, Deserialize)]
 struct Written {
     verdict: Verdict,
@@ -26,7 +26,7 @@ struct Written {
 }
 
 impl Written {
-    /// Whether who looks at maps had to judge.
+    /// Checks whether the bundle that checks maps was required.
     fn maps(&self) -> bool {
         self.demanded.iter().any(|it| it == SECOND)
     }
@@ -40,13 +40,13 @@ struct Dependency {
 
 type Seen<T> = HashMap<PathBuf, (FileFingerprint, T)>;
 
-/// Looks at results and gate all the time.
+/// Checks results and gate all the time.
 pub struct Scanner {
     pub out: PathBuf,
     pub gate: PathBuf,
-    /// The step at which a writer last began to store a result of each file.
+    /// Step at which a writer last began to store a result of each file.
     looked: HashMap<PathBuf, usize>,
-    /// And at which it asked who must judge.
+    /// Step at which a writer last asked for the required bundles of each file.
     asked: HashMap<PathBuf, usize>,
     verdicts: Seen<Option<Written>>,
     published: Seen<Digest>,
@@ -78,7 +78,7 @@ impl Scanner {
         seen(&mut self.verdicts, path, read).flatten()
     }
 
-    /// The bytes behind the gate.
+    /// Returns the digest of the bytes behind the gate.
     fn published(&mut self, file: usize) -> Option<Digest> {
         let path = self.gate.join(FILES[file]);
         let read = |path: &Path| digest_of(&std::fs::read(path).unwrap_or_default());
@@ -86,7 +86,7 @@ impl Scanner {
     }
 }
 
-/// What was read of a file, which is only read again when it is another.
+/// Returns the value read from a file. The file is read again only if it has changed.
 fn seen<T: Clone>(known: &mut Seen<T>, path: PathBuf, read: impl Fn(&Path) -> T) -> Option<T> {
     let fingerprint = FileFingerprint::at(&path)?;
     if let Some((_, value)) = known.get(&path).filter(|it| it.0 == fingerprint) {
@@ -102,7 +102,8 @@ fn is(digest: Option<Digest>, text: &str) -> bool {
 }
 
 impl World {
-    /// A verdict has its name: it must be true of what lay there when the writer looked, or later.
+    /// Checks a verdict file that has just got its name. It must fit the bytes that existed when
+    /// the writer looked, or later.
     pub fn verdict_is_written(&mut self, path: &Path) {
         let Some(file) = self.disk.file_at(path) else {
             return;
@@ -140,7 +141,7 @@ impl World {
         }
     }
 
-    /// What lies behind the gate stands accepted and is complete.
+    /// Checks that every file behind the gate is accepted and complete.
     pub fn gate_is_true(&mut self) {
         for (file, name) in FILES.iter().enumerate() {
             let Some(digest) = self.scanner.published(file) else {
@@ -172,7 +173,7 @@ impl World {
         }
     }
 
-    /// Nothing is under way: what is doubted is not behind the gate.
+    /// Checks that no stale file is behind the gate while no work is under way.
     pub fn shut_is_shut(&mut self) {
         let open = self.summary.unpublished.iter();
         let mut open = open.filter_map(|path| self.disk.file_at(path));
@@ -185,13 +186,13 @@ impl World {
         }
     }
 
-    /// Takes in what those who wait are told.
+    /// Takes over the answers to waiting clients.
     pub fn hear_answers(&mut self) {
         for mut wait in std::mem::take(&mut self.waits) {
             match wait.answer.try_recv() {
                 Ok(response) => self.is_answered(&wait, &response),
                 Err(tokio::sync::oneshot::error::TryRecvError::Empty) => self.waits.push(wait),
-                // The broker is no more.
+                // The broker is dead.
                 Err(tokio::sync::oneshot::error::TryRecvError::Closed) => {}
             }
         }
@@ -225,7 +226,10 @@ impl World {
         }
     }
 
-    /// What is not as it must be once everything has settled.
+    /// Checks the state after everything has settled.
+    ///
+    /// # Errors
+    /// The first violation.
     pub fn unsettled(&mut self) -> Result<(), String> {
         if !self.summary.quiet {
             return Err("there is work left".to_owned());
@@ -261,7 +265,7 @@ impl World {
         Ok(())
     }
 
-    /// Whether a file is accepted, if all that is said of it is the same and true.
+    /// Checks whether a file is accepted, provided that all sources about it agree and are true.
     fn agrees(&mut self, file: usize, row: Option<&Remembered>) -> Result<bool, String> {
         let written = self.scanner.verdict(file);
         let result = with_suffix(&self.scanner.out.join(FILES[file]), ".xqar").exists();
@@ -287,7 +291,7 @@ impl World {
         {
             return Err("the journal knows another verdict file".to_owned());
         }
-        // The file itself, or the map that it rests on.
+        // This concerns the file itself or the map that it depends on.
         let given_up = judged.why.iter().any(|it| {
             it.contains("alone in a fresh process") || it.contains("is undetermined: see")
         });
@@ -366,10 +370,10 @@ impl World {
     }
 }
 
-/// Whether a verdict is about what lies there.
+/// Checks whether a verdict is about the bytes of this state.
 fn fits(disk: &Disk, lying: &Lying, file: usize, written: &Written) -> bool {
     let dependency = |it: &Dependency| match disk.file_at(Path::new(&it.path)) {
-        // One that could not be read has no digest, either.
+        // A dependency that could not be read has no digest, either.
         Some(other) => it.sha256.as_ref().is_none_or(|text| is(lying[other], text)),
         None => true,
     };

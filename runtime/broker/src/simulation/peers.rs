@@ -1,4 +1,4 @@
-//! Bundles and a reporter: processes that come, answer, hang, die and outlive brokers.
+//! Bundles and a reporter: processes that join, answer, hang, die and outlive brokers.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
@@ -18,14 +18,14 @@ use super::disk::found_in;
 use super::surroundings::word;
 use crate::core::{ChildEnd, ChildSpec, Event, Launch, Restart};
 
-/// A child that looks at the file itself.
+/// Child bundle that checks the file itself.
 pub const FIRST: &str = "First";
-/// One that joins by hand and looks at what the file refers to.
+/// Bundle that joins by hand and checks the files that are referred to.
 pub const SECOND: &str = "Second";
-/// The reporter, a child.
+/// Child that is the reporter.
 pub const REPORTER: &str = "text";
 
-/// The children that the broker starts.
+/// Returns the children that the broker starts.
 pub fn children() -> Vec<ChildSpec> {
     let child = |name: &str, role| ChildSpec {
         name: name.to_owned(),
@@ -41,14 +41,14 @@ pub fn children() -> Vec<ChildSpec> {
     vec![child(FIRST, Role::Bundle), child(REPORTER, Role::Reporter)]
 }
 
-/// A job that a bundle has, and what it will say.
+/// A job of a bundle, with its findings.
 pub struct Work {
     pub job: JobId,
     finds: bool,
     begun: bool,
 }
 
-/// What a reporter is to do.
+/// A request to a reporter.
 pub enum Letter {
     Write(String, JobId),
     TakeBack(String),
@@ -65,17 +65,17 @@ pub struct Process {
     drained: bool,
 }
 
-/// All processes, and what is on the bus.
+/// All processes and the messages on the bus.
 #[derive(Default)]
 pub struct Peers {
     pub processes: BTreeMap<u32, Process>,
     pub words: VecDeque<HostEvent>,
     pub exits: Option<UnboundedSender<Event>>,
-    /// What the reporter has written: of which job the report on each file is.
+    /// Reports written by the reporter: the job of the report on each file.
     pub reports: BTreeMap<String, JobId>,
-    /// How often a bundle died with work in hands.
+    /// Number of bundle processes that died with unfinished work.
     pub deaths: usize,
-    /// The step since which the second bundle must judge.
+    /// Step since which the second bundle is required.
     pub second_since: Option<usize>,
     starting: Vec<(u64, &'static str)>,
     last_pid: u32,
@@ -99,7 +99,7 @@ impl Peers {
         !self.starting.is_empty()
     }
 
-    /// A process that the broker has started comes to say hello.
+    /// Starts a process that the broker has launched, and lets it say hello.
     pub fn arrive(&mut self) {
         if !self.starting.is_empty() {
             let (launch, name) = self.starting.remove(0);
@@ -167,7 +167,7 @@ impl Peers {
         }
     }
 
-    /// The broker has ended a session: the process ends, too.
+    /// Ends a process because the broker has ended its session.
     pub fn dropped(&mut self, peer: PeerId) {
         self.words.retain(|it| peer_of(it) != Some(peer));
         let of = |it: &(&u32, &Process)| it.1.peer == Some(peer);
@@ -188,7 +188,7 @@ impl Peers {
         if let (Some(launch), Some(exits)) = (process.launch, &self.exits) {
             let end = ChildEnd::Failed("it was killed by signal 9".to_owned());
             let launch = Launch(launch);
-            // Nobody may be there to hear it.
+            // The receiver may be gone.
             let _ = exits.send(Event::Exited { launch, end });
         }
     }
@@ -205,7 +205,8 @@ impl Peers {
         }
     }
 
-    /// `heard`: before it has said all that it has to say of it.
+    /// Cancels a job. `heard`: the process hears of it before it has sent all its findings on the
+    /// job.
     pub fn cancelled(&mut self, peer: PeerId, job: JobId, heard: bool) {
         if let Some(process) = self.of(peer).filter(|_| heard) {
             process.works.retain(|it| it.job != job);
@@ -224,7 +225,7 @@ impl Peers {
         }
     }
 
-    /// The broker is no more.
+    /// Resets all processes because the broker is dead.
     pub fn are_alone(&mut self) {
         self.words.clear();
         self.exits = None;
@@ -237,7 +238,7 @@ impl Peers {
         self.processes.retain(|_, it| !it.drained);
     }
 
-    /// Those that outlived a broker come to the next.
+    /// Connects a process that outlived its broker to the next broker.
     pub fn return_one(&mut self, n: usize) -> bool {
         let alone = self.processes.iter().filter(|it| it.1.peer.is_none());
         let alone: Vec<u32> = alone.map(|it| *it.0).collect();
@@ -253,7 +254,7 @@ impl Peers {
         all.any(|it| it.name == name && !it.drained)
     }
 
-    /// The processes that could do something.
+    /// Returns the processes that could do something.
     pub fn at_work(&self) -> Vec<u32> {
         let busy = |it: &Process| !it.works.is_empty() || !it.letters.is_empty() || it.drained;
         let all = self.processes.iter();
@@ -261,7 +262,7 @@ impl Peers {
         able.map(|it| *it.0).collect()
     }
 
-    /// A process does the next thing. `at_once`: says all that it has to say.
+    /// Lets a process do its next step. `at_once`: it sends all its findings at once.
     pub fn act(&mut self, pid: u32, n: usize, at_once: bool) -> String {
         let Some(process) = self.processes.get_mut(&pid) else {
             return String::new();
@@ -338,7 +339,7 @@ fn peer_of(event: &HostEvent) -> Option<PeerId> {
     }
 }
 
-/// What a bundle finds: it looks at images and nothing else.
+/// Checks whether a bundle finds an error. It looks only at images.
 fn finds(name: &str, job: &Job, images: &[(DocId, MappedImage)]) -> bool {
     let image = |doc: DocId| images.iter().find(|it| it.0 == doc).map(|it| &*it.1);
     let mut documents = job.documents.iter();

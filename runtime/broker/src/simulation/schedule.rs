@@ -1,4 +1,4 @@
-//! A schedule: what happens next, as a seed says.
+//! A schedule: the sequence of events that a seed determines.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -15,21 +15,21 @@ use crate::engine::{line_of, simulate};
 use crate::options::Options;
 use crate::watch::OPEN_QUIET;
 
-/// What is used for many schedules, one after the other.
+/// Resources shared by many schedules, one after the other.
 pub struct Stage {
     pub crew: Arc<Crew>,
     pub documents: Documents,
     pub dir: PathBuf,
 }
 
-/// A schedule in which something was wrong.
+/// A schedule that violated an invariant.
 #[derive(Debug)]
 pub struct Wrong {
     pub what: String,
     pub lines: Vec<String>,
 }
 
-/// How much one schedule was.
+/// Statistics of a schedule.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct Figures {
     pub steps: usize,
@@ -38,11 +38,11 @@ pub struct Figures {
     pub virtual_seconds: f64,
 }
 
-/// Half seconds until everything has settled, at most. A look through everything during which the clock jumped by a
-/// minute or two is followed by the next one after four times as long.
+/// Maximum number of half seconds until everything has settled. If the clock jumps by a minute or
+/// two during a full scan, the next scan follows after four times as long.
 const ROUNDS: usize = 1_200;
 
-/// Steps to rest, at most: beyond that nothing comes to rest.
+/// Maximum number of steps until the world is at rest. More steps mean that it never comes to rest.
 const MOST_STEPS: usize = 30_000;
 
 struct Play {
@@ -51,7 +51,7 @@ struct Play {
     kills: u64,
 }
 
-/// Plays one schedule, and writes it down if wanted.
+/// Plays a schedule, and records it if `verbose` is set.
 pub fn play(stage: &Stage, seed: u64, verbose: bool) -> Result<(Figures, Vec<String>), Wrong> {
     let dir = stage.dir.join(format!("{seed}"));
     let root = dir.join("farm");
@@ -87,7 +87,8 @@ pub fn play(stage: &Stage, seed: u64, verbose: bool) -> Result<(Figures, Vec<Str
     };
     drop(world);
     enter(None);
-    // It lies in memory, and goes with all others at the end if it does not now.
+    // The directory is in memory. If it cannot be removed now, it is removed with all others at the
+    // end.
     let _ = std::fs::remove_dir_all(&dir);
     match ended {
         Ok(()) => Ok((figures, lines)),
@@ -141,7 +142,7 @@ type Ended = Result<(), String>;
 impl Play {
     fn all(&mut self) -> Ended {
         self.prologue();
-        // What changes after all has settled shows what was forgotten.
+        // Changes after everything has settled reveal state that was lost.
         for most in [400, 160] {
             let steps = self.with(|world| {
                 world.meddles = true;
@@ -163,7 +164,7 @@ impl Play {
         body(&mut self.simulation.world())
     }
 
-    /// Some files are there before the broker comes.
+    /// Creates some files before the broker starts.
     fn prologue(&mut self) {
         self.with(|world| {
             for _ in 0..world.rng.usize(0..8) {
@@ -247,7 +248,7 @@ impl Play {
         self.with(|world| world.fault.clone().map_or(Ok(()), Err))
     }
 
-    /// One of the threads goes on. That of a writer may be the last to do so.
+    /// Lets one of the threads go on. If it is a writer, the broker may be killed afterwards.
     fn go_on(&mut self) -> Ended {
         let ran = self.run_one()?;
         if ran.is_some_and(|name| name.starts_with("write"))
@@ -258,7 +259,7 @@ impl Play {
         Ok(())
     }
 
-    /// The threads that could go on.
+    /// Returns the threads that can go on.
     fn runnable(&self) -> Vec<Arc<Task>> {
         let count = self.simulation.steps.count();
         let world = self.simulation.world();
@@ -275,7 +276,8 @@ impl Play {
         world.tasks.iter().filter(can).cloned().collect()
     }
 
-    /// One of the threads goes on to where it stops next; gives its name, if one can.
+    /// Lets one of the threads run to its next stop. Returns its name, or `None` if no thread can
+    /// run.
     fn run_one(&mut self) -> Result<Option<String>, String> {
         let runnable = self.runnable();
         if runnable.is_empty() {
@@ -291,7 +293,7 @@ impl Play {
         let mut world = self.simulation.world();
         world.step += 1;
         world.tasks.retain(|it| !it.has_ended());
-        // The loop itself touches the disk while it starts.
+        // The loop itself changes the disk while it starts.
         if task.name.starts_with("write") || world.serving.is_none() {
             world.gate_is_true();
         }
@@ -304,7 +306,7 @@ impl Play {
         Ok(Some(task.name.clone()))
     }
 
-    /// The kernel tells of one change.
+    /// Passes on one event of the kernel. Returns whether there was one.
     fn tell_one(&self) -> bool {
         let told = self.with(|world| {
             let said = world.disk.telling.tell()?;
@@ -358,7 +360,8 @@ impl Play {
         });
     }
 
-    /// A clock is set, the kernel loses something, processes wake up.
+    /// Simulates a failure: the clock is set, the kernel loses events, or hanging processes
+    /// continue.
     fn failure(&self) {
         self.with(|world| match world.rng.u32(0..6) {
             0 => {
@@ -384,7 +387,7 @@ impl Play {
         });
     }
 
-    /// When something is due next.
+    /// Returns the time of the next deadline.
     fn next_due(&self) -> Option<Duration> {
         let world = self.simulation.world();
         let due = |task: &Arc<Task>| match &*task.state.lock().unwrap() {
@@ -408,7 +411,8 @@ impl Play {
         });
     }
 
-    /// Everybody is there, nothing is in the way, and time passes until all is as it must be.
+    /// Connects all processes, stops all disturbances and lets time pass until every invariant
+    /// holds.
     fn settle(&mut self) -> Ended {
         self.with(|world| {
             world.meddles = false;
@@ -420,7 +424,7 @@ impl Play {
         let mut last = Ok(());
         for round in 0..ROUNDS {
             self.come_to_rest()?;
-            // It must stay so for a while, and to look costs more than to wait.
+            // The state must be stable for a while, and checking it costs more than waiting.
             if round > 3 {
                 last = self.with(World::unsettled);
                 if last.is_ok() {
@@ -432,7 +436,7 @@ impl Play {
         last.map_err(|why| format!("it does not settle: {why}"))
     }
 
-    /// All goes on until nothing can, without time passing.
+    /// Lets everything go on, without time passing, until nothing can run.
     fn come_to_rest(&mut self) -> Ended {
         for _ in 0..MOST_STEPS {
             let acted = self.all_peers_act();
@@ -474,9 +478,10 @@ impl Play {
         acted
     }
 
-    /// What has settled stands after a kill, too.
+    /// Checks that settled results stay valid after a kill, too.
     fn nothing_is_judged_again(&mut self) -> Ended {
-        // A file whose close was lost counts as open for so long, and what depends on it is judged after that.
+        // A file counts as open for this time if the event about its close was lost. Its dependants
+        // are judged only after that.
         self.with(|world| world.now += OPEN_QUIET);
         self.settle()?;
         let before = self.with(|world| world.peers.reports.clone());

@@ -1,4 +1,4 @@
-//! The bus, the control socket and the processes, as the simulated broker has them.
+//! The bus, the control socket and the processes of the simulated broker.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -46,7 +46,7 @@ impl Host {
         std::future::pending().await
     }
 
-    /// What is on the bus for the broker.
+    /// Takes the next event on the bus for the broker.
     pub fn take(&mut self) -> Option<HostEvent> {
         self.simulation.world().peers.words.pop_front()
     }
@@ -91,7 +91,7 @@ impl Host {
     }
 }
 
-/// Where commands ask.
+/// Control socket for commands.
 pub struct ControlSocket;
 
 impl ControlSocket {
@@ -228,7 +228,7 @@ impl Children {
     }
 }
 
-/// What a process says first after it was let in.
+/// Returns the bus event for a message of a process.
 pub fn word(peer: PeerId, message: FromPeer) -> HostEvent {
     HostEvent::Message { peer, message }
 }

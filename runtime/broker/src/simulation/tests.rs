@@ -1,4 +1,4 @@
-//! Schedules by the hundred.
+//! Tests that play hundreds of schedules.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use qcbus_bus::{Host, HostOptions, Instance};
 use super::schedule::{Figures, Stage, Wrong, play};
 use super::threads::Crew;
 
-/// Schedules in a run of the tests.
+/// Number of schedules in a test run.
 const SCHEDULES: u64 = 500;
 
 fn number(name: &str) -> Option<u64> {
@@ -21,7 +21,7 @@ fn number(name: &str) -> Option<u64> {
     )
 }
 
-/// A directory in memory, where there is one.
+/// Creates a directory in memory, if possible.
 fn directory() -> tempfile::TempDir {
     let memory = Path::new("/dev/shm");
     let made = tempfile::Builder::new()
@@ -30,7 +30,7 @@ fn directory() -> tempfile::TempDir {
     made.or_else(|_| tempfile::tempdir()).unwrap()
 }
 
-/// Gives schedules to play, one after the other, where a bus carries the images.
+/// Calls `body` with a stage for schedules, on which a bus carries the images.
 fn on_stage<T>(body: impl FnOnce(&Stage) -> T) -> T {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
@@ -122,7 +122,7 @@ fn play_many(
             Ok((figures, _)) => sum.add(figures),
             Err(wrong) => {
                 failed.store(true, Ordering::Relaxed);
-                // The same once more, to be read.
+                // The schedule is played again with its lines recorded.
                 let written = play(stage, seed, true).err();
                 return Err(report(seed, &written.unwrap_or(wrong)));
             }

@@ -1,5 +1,5 @@
-//! Threads of which one runs at a time: who is next is said by whoever resumes it. They stop where
-//! the broker waits for something, and at the steps that it names.
+//! Threads of which one runs at a time: the resuming thread selects the next one. They stop at the
+//! broker's wait points and at the steps that it names.
 
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -9,11 +9,11 @@ use std::time::Duration;
 
 use super::Simulation;
 
-/// Who runs here, and in which simulation.
+/// Current thread and its simulation.
 #[derive(Clone)]
 pub struct Here {
     pub simulation: Arc<Simulation>,
-    /// None: whoever resumes the others.
+    /// `None` for the thread that resumes the others.
     pub task: Option<Arc<Task>>,
 }
 
@@ -21,45 +21,45 @@ thread_local! {
     static HERE: RefCell<Option<Here>> = const { RefCell::new(None) };
 }
 
-/// The simulation that this thread belongs to, if any.
+/// Returns the simulation of the current thread, if any.
 pub fn here() -> Option<Here> {
     HERE.with_borrow(Clone::clone)
 }
 
-/// From now on this thread belongs to it, or to none.
+/// Assigns the current thread to a simulation, or to none.
 pub fn enter(here: Option<Here>) {
     HERE.set(here);
 }
 
-/// Something has come for whoever waits for it.
+/// Signal to a waiting thread that something has arrived.
 pub type Signal = Arc<AtomicBool>;
 
-/// What a thread waits for.
+/// Condition that a thread waits for.
 #[derive(Clone)]
 pub enum State {
-    /// For its turn.
+    /// Waits until it is resumed.
     Ready,
-    /// For a signal, or for a time.
+    /// Waits for a signal or a time.
     Asleep(Signal, Option<Duration>),
-    /// For anything to happen after so many steps of others, or for a time.
+    /// Waits until the step count exceeds this number, or for a time.
     AtRest(usize, Duration),
     Ended,
 }
 
-/// One thread.
+/// A simulated thread.
 pub struct Task {
     pub name: String,
     pub state: Mutex<State>,
-    /// Whether it is its turn.
+    /// Whether the thread may run.
     has_control: Mutex<bool>,
     changed: Condvar,
-    /// It is to end where it stands, as a process does that is killed.
+    /// Whether the thread must end where it stands, as in a killed process.
     killed: AtomicBool,
-    /// It has ended with a panic of its own.
+    /// Message of a panic in the thread's own code.
     pub panic: Mutex<Option<String>>,
 }
 
-/// How a thread leaves that is killed.
+/// Panic payload that ends a killed thread.
 struct Killed;
 
 impl Task {
@@ -77,7 +77,7 @@ impl Task {
         );
     }
 
-    /// Lets it run until it stops the next time. To be called by who has the turn.
+    /// Lets the thread run until its next stop. Only the thread that has control may call this.
     pub fn resume(&self) {
         self.hand_over(true);
         self.await_control(false);
@@ -94,9 +94,9 @@ impl Task {
         matches!(*self.state.lock().unwrap(), State::Ended)
     }
 
-    /// Stops here until it is resumed.
+    /// Stops until the thread is resumed.
     pub fn stop(&self, state: State) {
-        // One that is killed puts away what it has in hands without others in between.
+        // A killed thread drops its values without an interruption by others.
         if std::thread::panicking() {
             return;
         }
@@ -115,7 +115,7 @@ impl Task {
             task: Some(self.clone()),
         }));
         if self.killed.load(Ordering::Relaxed) {
-            // Before it has ended for others: what it holds may be a lock.
+            // The body is dropped before the thread counts as ended, because it may hold a lock.
             drop(body);
         } else if let Err(payload) = catch_unwind(AssertUnwindSafe(body))
             && !payload.is::<Killed>()
@@ -132,14 +132,14 @@ impl Task {
 
 type Work = Box<dyn FnOnce() + Send>;
 
-/// Threads of the system that are used again and again.
+/// Threads of the system that are reused.
 #[derive(Default)]
 pub struct Crew {
     idle: Mutex<Vec<mpsc::Sender<Work>>>,
 }
 
 impl Crew {
-    /// A thread that does this once it is resumed.
+    /// Starts a thread that runs `body` once it is resumed.
     pub fn start(
         self: &Arc<Crew>,
         simulation: &Arc<Simulation>,
@@ -179,7 +179,7 @@ impl Crew {
     }
 }
 
-/// How many steps there were, for those who wait for any.
+/// Number of steps so far, for threads that wait for any step.
 #[derive(Default)]
 pub struct Steps(AtomicUsize);
 

@@ -19,37 +19,37 @@ use crate::control::Asked;
 use crate::intake::Intake;
 use crate::store::Store;
 
-/// What the broker is made of, as far as the simulation looks into it.
+/// Parts of the broker that the simulation inspects.
 pub struct Serving {
     pub store: Arc<Store>,
     pub intake: Arc<Intake>,
 }
 
-/// What the state machine has come to.
+/// Current state of the state machine.
 #[derive(Debug, Default)]
 pub struct Summary {
-    /// Nothing waits and nothing is under way.
+    /// Whether no work is waiting or under way.
     pub quiet: bool,
-    /// Acceptances that must not lie behind the gate.
+    /// Acceptances that must not be behind the gate.
     pub unpublished: Vec<Arc<Path>>,
-    /// Who must judge.
+    /// Required bundles.
     pub demanded: Vec<String>,
 }
 
 /// A client that waits for a verdict.
 pub struct Wait {
     pub file: usize,
-    /// The step at which it asked.
+    /// Step at which the client asked.
     pub asked: usize,
     pub answer: oneshot::Receiver<Response>,
 }
 
-/// The world.
+/// The simulated world.
 pub struct World {
     pub rng: Rng,
     pub now: Duration,
     pub start: Instant,
-    /// Nanoseconds since 1970, less what has passed.
+    /// Nanoseconds since 1970, minus the simulated time that has passed.
     pub wall: i128,
     pub generation: u64,
     pub disk: Disk,
@@ -58,13 +58,13 @@ pub struct World {
     pub serving: Option<Serving>,
     pub summary: Summary,
     pub waits: Vec<Wait>,
-    /// The simulated threads, the loop of the broker first.
+    /// Simulated threads. The loop of the broker comes first.
     pub tasks: Vec<Arc<Task>>,
     pub scanner: Scanner,
-    /// What must never happen and has.
+    /// First violation of an invariant.
     pub fault: Option<String>,
     pub lines: Vec<String>,
-    /// Whether the schedule is written down.
+    /// Whether the schedule is recorded.
     pub verbose: bool,
     /// Whether files are written while they are read.
     pub meddles: bool,
@@ -97,7 +97,7 @@ impl World {
         }
     }
 
-    /// Writes a line of the schedule.
+    /// Records a line of the schedule.
     pub fn say(&mut self, line: impl FnOnce() -> String) {
         if !self.verbose {
             return;
@@ -112,7 +112,7 @@ impl World {
         self.lines.push(line);
     }
 
-    /// Something that must never happen.
+    /// Records a violation of an invariant.
     pub fn wrong(&mut self, what: String) {
         self.say(|| format!("WRONG: {what}"));
         self.fault.get_or_insert(what);
@@ -122,7 +122,7 @@ impl World {
         self.wall + i128::try_from(self.now.as_nanos()).unwrap_or(i128::MAX)
     }
 
-    /// A peer is told something.
+    /// Delivers a message to a peer.
     pub fn told(
         &mut self,
         peer: PeerId,
@@ -149,7 +149,7 @@ impl World {
         }
     }
 
-    /// Somebody does something to the files.
+    /// Makes a random change to the files.
     pub fn deed(&mut self) {
         let step = self.step;
         let at = (step, self.wall_now());
@@ -192,7 +192,7 @@ impl World {
         }
     }
 
-    /// A client asks for a verdict.
+    /// Lets a client ask for a verdict.
     pub fn ask(&mut self) {
         let Some(asked) = &self.asked else { return };
         let file = self.rng.usize(JUDGED);

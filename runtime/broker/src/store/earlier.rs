@@ -1,4 +1,4 @@
-//! What earlier runs of `check` have left.
+//! Removal of results that earlier runs of `check` have left.
 
 use std::io;
 use std::path::Path;
@@ -11,11 +11,11 @@ use super::leftovers::{input_of, named_by_result, walk};
 use crate::result_paths::ResultPaths;
 use qcbus_disk::{foreign, remove};
 
-/// Removes the results of earlier runs that are about the files and directories of this one, with
-/// the reports beside them: of files that are no more, and of those to be checked now, because a
-/// run that is killed half-way must not leave a result that was given for other bytes.
+/// Removes the results of earlier runs for the files and directories of this run, with the reports
+/// next to them. This includes results of removed files and of files to be checked now: a killed
+/// run must not leave a result for other bytes.
 ///
-/// Says what could not be removed: for a person.
+/// Returns messages for the user about results that could not be removed.
 pub fn remove_earlier_results(paths: &ResultPaths) -> Vec<String> {
     let mut failed = Vec::new();
     let mut clear = |xqar: &Path| {
@@ -39,7 +39,7 @@ pub fn remove_earlier_results(paths: &ResultPaths) -> Vec<String> {
     failed
 }
 
-/// Whether it is worth reading: where only files are given, their names are known.
+/// Checks whether a result must be read. If only files are given, their names are known.
 fn may_be_ours(paths: &ResultPaths, xqar: &Path) -> bool {
     if xqar.extension().is_none_or(|it| it != "xqar") {
         return false;
@@ -48,10 +48,10 @@ fn may_be_ours(paths: &ResultPaths, xqar: &Path) -> bool {
     !paths.roots.is_empty() || given.any(|file| file.file_name() == xqar.file_stem())
 }
 
-/// A report says as much as its result does; one of ours is shorter.
+/// Maximum size of a report in bytes. A report has the same content as its result and is shorter.
 const MOST_OF_A_REPORT: u64 = 1 << 30;
 
-/// Removes the standard reports beside a result, if they are about it.
+/// Removes the standard reports next to a result, if they belong to it.
 fn remove_reports(xqar: &Path) -> io::Result<()> {
     let (json, text) = (xqar.with_extension("json"), xqar.with_extension("txt"));
     if foreign::read(&json, MOST_OF_A_REPORT).is_ok_and(|report| is_json_of(&report, xqar)) {
@@ -63,7 +63,7 @@ fn remove_reports(xqar: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// The part of a report that says what it is about.
+/// The part of a report that names its result.
 #[derive(Deserialize)]
 struct Report {
     qcbus: About,
@@ -80,7 +80,8 @@ fn is_json_of(report: &[u8], xqar: &Path) -> bool {
     report.is_some_and(|it| from_text(&it.qcbus.result_file) == xqar)
 }
 
-/// A report as text says the verdict in a line of its own.
+/// Checks whether a text report belongs to a result. The report has the verdict in a line of its
+/// own.
 fn is_text_of(report: &[u8], xqar: &Path) -> bool {
     let Ok(report) = std::str::from_utf8(report) else {
         return false;

@@ -1,4 +1,4 @@
-//! Results of a run of `check` that a broker has found for it.
+//! Results of a run of `check` that were found by a broker.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -12,21 +12,22 @@ use crate::core::{Epoch, Judged, RequiredSet};
 use crate::directory_lock::{DirectoryLock, LockError};
 use crate::result_paths::ResultPaths;
 
-/// Where a run keeps results that others have found for it.
+/// Stores the results that another broker has found for a run.
 #[derive(Debug)]
 pub struct GivenResults {
     places: ResultPaths,
     config: Digest,
-    /// No broker writes results there.
+    /// Lock that excludes brokers from writing results there.
     _results: DirectoryLock,
 }
 
 impl GivenResults {
-    /// Makes room for the results of a run, as a broker of its own would: those of earlier runs go. What of them
-    /// cannot be removed is said, for a person. `config` is the digest of the configuration that the run works under.
+    /// Prepares the directory for the results of a run and removes those of earlier runs. Returns
+    /// messages for the user about results that cannot be removed. `config` is the digest of the
+    /// configuration of the run.
     ///
     /// # Errors
-    /// When the directory belongs to somebody else, or cannot be written to.
+    /// When the directory belongs to another user or broker, or cannot be written to.
     pub fn open(
         places: ResultPaths,
         config: Digest,
@@ -41,7 +42,7 @@ impl GivenResults {
         Ok((given, left))
     }
 
-    /// Writes the result of a file. One that cannot be written leaves it undetermined.
+    /// Writes the result of a file. If this fails, the file becomes undetermined.
     pub fn keep(&self, file: &Path, checked: Checked) -> Arc<Judged> {
         let told = checked.verdict;
         let xqar = self.places.xqar(file);

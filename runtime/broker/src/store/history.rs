@@ -1,4 +1,4 @@
-//! What the journal keeps of how a verdict came about.
+//! History of a verdict for the journal.
 
 use qcbus_formats::pool::Pooled;
 use qcbus_formats::xqar::Status;
@@ -6,7 +6,8 @@ use qcbus_formats::xqar::Status;
 use crate::core::FinishedJob;
 use crate::journal::History;
 
-/// What each bundle did, and the checkers worth mentioning.
+/// Returns the statistics of each bundle, and the checkers that failed, have findings or were
+/// skipped.
 pub(super) fn history(job: &FinishedJob, pooled: &Pooled) -> History {
     let bundles = job.bundles.iter().map(|it| {
         (

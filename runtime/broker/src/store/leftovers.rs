@@ -1,4 +1,4 @@
-//! Results of ours that nobody remembers.
+//! Results of this program that the journal does not contain.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -11,14 +11,14 @@ use serde::Deserialize;
 use crate::result_paths::{verdict_beside, with_suffix};
 use crate::verdict_file::FORMAT;
 
-/// A result and the file that it is about.
+/// A result and its file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Leftover {
     pub(super) path: Arc<Path>,
     pub(super) xqar: PathBuf,
 }
 
-/// All results below `out` that are certainly ours and not among those that are `owned`.
+/// Returns all results below `out` that certainly come from qcbus and are not in `owned`.
 pub(super) fn leftovers(out: &Path, owned: &HashSet<PathBuf>) -> Vec<Leftover> {
     let mut places = HashSet::new();
     walk(out, &mut |path| {
@@ -47,15 +47,15 @@ pub(super) fn leftovers(out: &Path, owned: &HashSet<PathBuf>) -> Vec<Leftover> {
 
 const VERDICT: &str = ".verdict.json";
 
-/// Every file below a directory of results. Directories with a state of their own are those of
-/// other brokers.
+/// Visits every file below a directory of results. Skips other brokers' directories, which have a
+/// state.
 pub(super) fn walk(out: &Path, found: &mut dyn FnMut(PathBuf)) {
     let mut open = vec![out.to_path_buf()];
     while let Some(next) = open.pop() {
         if next != *out && next.join(STATE).exists() {
             continue;
         }
-        // A directory that cannot be looked into holds nothing that could be removed.
+        // An unreadable directory contains no result that could be removed.
         let Ok(entries) = std::fs::read_dir(&next) else {
             continue;
         };
@@ -71,7 +71,7 @@ pub(super) fn walk(out: &Path, found: &mut dyn FnMut(PathBuf)) {
 
 const STATE: &str = ".qcbus";
 
-/// The part of a verdict file that says what it is about.
+/// The part of a verdict file that names its file and result.
 #[derive(Deserialize)]
 struct About {
     format: u32,
@@ -79,7 +79,7 @@ struct About {
     result: String,
 }
 
-/// The file that the verdict file beside a result is about, if it is ours.
+/// Returns the file that the verdict file next to a result names, if qcbus wrote it.
 fn named_by_verdict(xqar: &Path) -> Option<PathBuf> {
     let text = foreign::read(&verdict_beside(xqar)?, MOST_OF_A_VERDICT).ok()?;
     let about: About = serde_json::from_slice(&text).ok()?;
@@ -87,14 +87,14 @@ fn named_by_verdict(xqar: &Path) -> Option<PathBuf> {
         .then(|| from_text(&about.input_file))
 }
 
-/// The file that a result is about, if it is ours: it bears the name of that file.
+/// Returns the file of a result, if qcbus wrote the result: its name must be that of the file.
 pub(super) fn named_by_result(xqar: &Path) -> Option<PathBuf> {
     let input = input_of(xqar)?;
     let expected = with_suffix(Path::new(input.file_name()?), ".xqar");
     (input.is_absolute() && Some(expected.as_os_str()) == xqar.file_name()).then_some(input)
 }
 
-/// The first `InputFile` of a result. It stands near the beginning, so that the rest is not read.
+/// Returns the first `InputFile` of a result. It is near the beginning, so the rest is not read.
 pub(super) fn input_of(xqar: &Path) -> Option<PathBuf> {
     let mut head = Vec::new();
     let (mut file, _) = foreign::open(xqar).ok()?;
@@ -102,8 +102,9 @@ pub(super) fn input_of(xqar: &Path) -> Option<PathBuf> {
     qcbus_formats::xqar::input_file(&head).map(|it| from_text(&it))
 }
 
-/// A verdict file names every file that its verdict depends on, and nothing else that is long.
+/// Maximum size of a verdict file in bytes. Its only long part is the list of the verdict's
+/// dependencies.
 const MOST_OF_A_VERDICT: u64 = 64 << 20;
 
-/// Bytes that hold the beginning of a result.
+/// Number of bytes that contain the beginning of a result.
 const HEAD: u64 = 16 << 10;

@@ -44,41 +44,41 @@ pub use refresh::digest_of;
 use refresh::refreshed;
 pub use trial::TrialResults;
 
-/// Writes results. Shared by the threads that do so.
+/// Writes results. The writer threads share it.
 #[derive(Debug)]
 pub struct Store {
-    /// Where results go.
+    /// Paths of the results.
     pub places: ResultPaths,
-    /// What of all that would be demanded is asked for.
+    /// Selection among the required checkers.
     pub choice: Choice,
-    /// The form of the results.
+    /// Dialect of the results.
     pub dialect: Dialect,
-    /// Whether results are on the disk before they are announced.
+    /// Whether results are flushed to the disk before they are announced.
     pub durable: bool,
     /// Whether `NAME.verdict.json` is written.
     pub verdict_files: bool,
-    /// Whether what cannot be written now is tried again.
+    /// Whether a failed write is tried again.
     pub retries: bool,
-    /// Whether the verdict on a file is its own, whatever it rests on.
+    /// Whether the verdict on a file is independent of its dependencies.
     pub own_verdicts: bool,
-    /// Where accepted files are published.
+    /// Gate that publishes accepted files.
     pub gate: Option<Gate>,
-    /// Keeps what is written.
+    /// Monitors the written files.
     pub outputs: Outputs,
-    /// Nobody else writes results there.
+    /// Lock that excludes other brokers from writing results there.
     pub lock: DirectoryLock,
-    /// Who looks at files.
+    /// Probe threads that access files.
     pub probes: Probes,
-    /// Where results of trials are kept, if anything is.
+    /// Directory for results of trials, if they are kept.
     pub trials: Option<TrialResults>,
-    /// What is remembered; without it, nothing is: of a single run nobody asks later.
+    /// Journal. A single run has none, because its state is not needed later.
     pub journal: Option<SharedJournal>,
-    /// The epoch of who must judge: what was judged in an earlier one is not stored.
+    /// Current epoch of the required set. A verdict from an earlier epoch is not stored.
     pub epoch: AtomicU64,
 }
 
 impl Store {
-    /// Pools, writes, publishes, records.
+    /// Pools the findings, writes the result, publishes the file and records the verdict.
     pub fn store(
         &self,
         job: &mut FinishedJob,
@@ -97,7 +97,7 @@ impl Store {
         let verdict = pooled.verdict();
         let why = reasons(job, &pooled, verdict);
         let judged = judged(job, &pooled, verdict, why, self.places.xqar(&job.path));
-        // At the last moment: from here on a verdict is on its way to where others see it.
+        // This check is as late as possible: after it the verdict becomes visible to others.
         if self.epoch.load(Ordering::Acquire) != job.epoch.0 {
             return StoreOutcome::Outdated;
         }
@@ -105,7 +105,8 @@ impl Store {
             return self.not_written(job, judged, failed);
         }
         step("recorded", &job.path);
-        // The file may have gone between the look and the rename: nothing may lie there then.
+        // The file may have been removed between the check and the rename. In that case no result
+        // may stay.
         if self.has_gone(&job.path) {
             let _ = self.withdraw_files(&job.path);
             return StoreOutcome::Stale;
@@ -113,8 +114,9 @@ impl Store {
         StoreOutcome::Stored(Box::new(judged))
     }
 
-    /// A result that can never be written leaves its file undetermined: nobody may take what is
-    /// not there for an acceptance, and nobody should wait for it.
+    /// Returns the outcome of a failed write. If the result can never be written, the file becomes
+    /// undetermined: a missing result must not count as an acceptance, and no process should wait
+    /// for it.
     fn not_written(
         &self,
         job: &mut FinishedJob,
@@ -127,7 +129,7 @@ impl Store {
         if self.retries && !failed.for_good {
             return StoreOutcome::Failed(failed.what + failed.further);
         }
-        // As far as it goes: what lies there is not of these bytes.
+        // A failure here is ignored. The existing result does not belong to these bytes.
         let _ = self.withdraw(&job.path, &[]);
         judged.verdict = Verdict::Undetermined;
         judged.why.insert(0, failed.what);
@@ -135,8 +137,8 @@ impl Store {
         StoreOutcome::Stored(Box::new(judged))
     }
 
-    /// Whether everything that the verdict depends on is what it was when it was read. Stamps that
-    /// moved although the bytes are the same (another link to the file, other rights) are taken over.
+    /// Checks whether all inputs of the verdict are unchanged since they were read. A changed stamp
+    /// with the same bytes (another link to the file, other permissions) is stored.
     ///
     /// # Errors
     /// When the system does not answer.
@@ -152,23 +154,23 @@ impl Store {
         if let Some(moved) = now {
             let prepared = Arc::make_mut(prepared);
             prepared.inputs = moved;
-            // They moved a moment ago, and may move again without telling.
+            // The stamps changed just now, and may change again without a visible difference.
             prepared.racy = true;
         }
         Ok(true)
     }
 
-    /// Whether a file certainly is no more. One that does not answer is there.
+    /// Checks whether a file certainly no longer exists. Without an answer of the system it exists.
     fn has_gone(&self, path: &Arc<Path>) -> bool {
         let path = path.clone();
         let stamp = self.probes.within(move || stamp_of(&path));
         matches!(stamp, Ok(Ok(None)))
     }
 
-    /// The verdict stands after all, or got fresh stamps: the file lies behind the gate again.
+    /// Publishes a file again, because its verdict still holds or got new stamps.
     ///
     /// # Errors
-    /// What a person should know; it is to be tried again.
+    /// A message for the user. The action must be tried again.
     pub fn open_gate(&self, path: &Arc<Path>, judged: &Judged) -> Result<(), StoreFailure> {
         match self.gate.as_ref().filter(|_| judged.is_accepted()) {
             None => Ok(()),
@@ -178,10 +180,10 @@ impl Store {
         }
     }
 
-    /// The file goes from behind the gate with everything that rests on it.
+    /// Removes a file from behind the gate with everything that depends on it.
     ///
     /// # Errors
-    /// What a person should know; it is to be tried again.
+    /// A message for the user. The action must be tried again.
     pub fn close_gate(&self, path: &Arc<Path>) -> Result<(), StoreFailure> {
         let revoked = self.gate.as_ref().map_or(Ok(()), |gate| gate.revoke(path));
         revoked.map_err(|error| StoreFailure {
@@ -190,10 +192,10 @@ impl Store {
         })
     }
 
-    /// Publishes an accepted file if that has not been done, and what waited for it.
+    /// Publishes an accepted file if it is not published yet, and the files that waited for it.
     ///
     /// # Errors
-    /// What a person should know; it is to be tried again.
+    /// A message for the user. The action must be tried again.
     pub fn follow(&self, path: &Arc<Path>) -> Result<(), StoreFailure> {
         let followed = self.gate.as_ref().map_or(Ok(()), |gate| gate.follow(path));
         followed.map_err(|(path, error)| StoreFailure::not_published(&path, &error))
@@ -202,7 +204,7 @@ impl Store {
     /// Writes to the journal.
     ///
     /// # Errors
-    /// What a person should know; the entries are not written then.
+    /// A message for the user. The entries are not written then.
     pub fn record(&self, entries: &[Entry]) -> Result<(), String> {
         disk().map_err(|error| format!("the journal cannot be written: {error}"))?;
         let Some(journal) = &self.journal else {
@@ -215,7 +217,7 @@ impl Store {
         journal.settle(&noted)
     }
 
-    /// Everything that is remembered of files.
+    /// Returns all files in the journal.
     ///
     /// # Errors
     /// When the journal cannot be read.
@@ -224,10 +226,10 @@ impl Store {
         journal.map_or(Ok(Vec::new()), |it| it.get().remembered())
     }
 
-    /// Forgets the history of jobs older than `keep`.
+    /// Deletes the history of jobs older than `keep`.
     ///
     /// # Errors
-    /// What a person should know.
+    /// A message for the user.
     pub fn prune(&self, keep: std::time::Duration) -> Result<(), String> {
         let Some(journal) = &self.journal else {
             return Ok(());
@@ -237,12 +239,12 @@ impl Store {
     }
 }
 
-/// Why something that is to be tried again could not be done.
+/// Failure of an action that must be tried again.
 #[derive(Debug)]
 pub struct StoreFailure {
-    /// For a person.
+    /// Message for the user.
     pub what: String,
-    /// It is not about one file: the journal cannot be written.
+    /// Whether the failure is not about one file, because the journal cannot be written.
     pub concerns_all: bool,
 }
 
@@ -254,7 +256,7 @@ impl StoreFailure {
         }
     }
 
-    /// The journal cannot be written.
+    /// Returns the failure to write the journal.
     pub fn of_all(what: String) -> StoreFailure {
         StoreFailure {
             what,
@@ -268,13 +270,13 @@ fn unlooked(path: &Path, error: &io::Error) -> String {
     format!("cannot tell whether {path} is still what was checked: {error}; it is tried again")
 }
 
-/// Why a result is not there.
+/// Reason why a result is missing.
 struct Unwritten {
-    /// For a person.
+    /// Message for the user.
     what: String,
-    /// What is said besides when it is tried again.
+    /// Additional text if the write is tried again.
     further: &'static str,
-    /// No waiting helps.
+    /// Whether waiting does not help.
     for_good: bool,
 }
 
@@ -295,7 +297,7 @@ fn judged(
 ) -> Judged {
     let prepared = job.prepared.as_deref();
     let root = prepared.and_then(crate::core::PreparedJob::root);
-    // What is said of the files that it rests on is no fault of its own.
+    // Findings about files that it depends on are not its own errors.
     let of_others = pooled.results.bundles.iter().flat_map(|it| &it.checkers);
     let of_others = of_others.filter(|it| &*it.id == RESTS_ON_CHECKER);
     let of_others = of_others.flat_map(|it| &it.issues);

@@ -1,4 +1,4 @@
-//! A result for somebody who asked for it: pooled like any other, and written nowhere.
+//! Result of an on-demand check: pooled like any other, but not written to the disk.
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -13,7 +13,7 @@ use super::{Store, judged, unlooked};
 use crate::core::{FinishedJob, OnDemandOutcome, Referenced, TaskOutcome, file_verdict};
 
 impl Store {
-    /// Pools what was found for an errand.
+    /// Pools the findings of an on-demand check.
     pub fn pool_on_demand(
         &self,
         job: &mut FinishedJob,
@@ -43,7 +43,7 @@ impl Store {
         }))
     }
 
-    /// Pools what was found, unless something that it rests on is not any more what was read.
+    /// Pools the findings, unless an input has changed since it was read.
     pub(super) fn pool_as_it_is(
         &self,
         job: &mut FinishedJob,

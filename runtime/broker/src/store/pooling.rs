@@ -1,4 +1,4 @@
-//! From what the bundles said of a file to what its result says.
+//! Pooling: combines the findings of the bundles on a file into its result.
 
 use qcbus_document::Document;
 use qcbus_formats::config::Config;
@@ -49,8 +49,8 @@ impl Store {
 }
 
 impl Store {
-    /// What the file rests on and is not accepted itself. A file that is broken is said to be so at the same
-    /// reference already.
+    /// Returns findings about files that this file depends on and that are not accepted. A broken
+    /// file is left out, because it is already reported at the same reference.
     fn resting(
         &self,
         job: &FinishedJob,
@@ -84,7 +84,8 @@ impl Store {
     }
 }
 
-/// The remark that nobody could answer for the file: it cannot be read, or nobody checks its kind.
+/// Returns a finding if no bundle could check the file: it cannot be read, or no bundle checks its
+/// kind.
 fn unanswered(job: &FinishedJob) -> Option<Remark> {
     let takes = |it: &TaskOutcome| {
         let catalogue = it.catalogue.as_ref();
@@ -114,7 +115,8 @@ fn unanswered(job: &FinishedJob) -> Option<Remark> {
     })
 }
 
-/// What was found when the file was read cannot be told without its image: then nothing is accepted.
+/// Returns a finding for a missing image. Without the diagnostics of the reader the file is not
+/// accepted.
 fn unseen_root() -> Remark {
     Remark {
         checker: "qcbus_file".to_owned(),
@@ -124,11 +126,12 @@ fn unseen_root() -> Remark {
     }
 }
 
-/// Reasons shown to a person; more than these are counted.
+/// Maximum number of reasons shown to the user. Further ones are only counted.
 const REASONS: usize = 20;
 
-/// Returns what a person is told of a verdict: what keeps it open, and what it takes over from others. Beside an
-/// error only what failed counts: that the error kept others from looking goes without saying.
+/// Returns the reasons of a verdict for the user: open points, and errors taken over from other
+/// files. If the verdict is rejected, only failures are listed. Checkers that were skipped because
+/// of the error are left out.
 pub(super) fn reasons(job: &FinishedJob, pooled: &Pooled, verdict: Verdict) -> Vec<String> {
     if let Some(open) = unanswered(job).and_then(|remark| remark.open) {
         return vec![open];
@@ -147,7 +150,7 @@ pub(super) fn reasons(job: &FinishedJob, pooled: &Pooled, verdict: Verdict) -> V
     why
 }
 
-/// The findings that reject a file without errors of its own.
+/// Returns the findings that reject a file without errors of its own.
 fn taken_over(pooled: &Pooled) -> impl Iterator<Item = String> {
     let checkers = pooled.results.bundles.iter().flat_map(|it| &it.checkers);
     let resting = checkers.filter(|it| &*it.id == RESTS_ON_CHECKER);

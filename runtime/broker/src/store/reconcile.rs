@@ -1,6 +1,6 @@
-//! Before anything is judged: what lies on the disk, what the journal knows and what stands are
-//! brought in agreement. A broker may have been killed between writing a result and recording it,
-//! the journal may have been moved away, and other directories may be watched than before.
+//! Reconciliation at the start: makes the disk, the journal and the valid verdicts agree before any
+//! file is judged. A broker may have been killed between writing a result and recording it. The
+//! journal may have been moved away, and the watched directories may have changed.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::io;
@@ -21,35 +21,35 @@ use crate::stamp::{stamp_of, stamp_through_links};
 use crate::watch::hidden_above;
 use qcbus_disk::{FileFingerprint, remove, remove_empty_above};
 
-/// What stands after all was looked through.
+/// Result of the reconciliation.
 #[derive(Debug, Default)]
 pub struct Reconciled {
-    /// Files with their verdicts.
+    /// Files with valid verdicts.
     pub standing: Vec<Remembered>,
-    /// Accepted files that do not lie behind the gate.
+    /// Accepted files that are not behind the gate.
     pub unpublished: Vec<Arc<Path>>,
-    /// The present stamps of everything that verdicts depend on.
+    /// Current stamps of all files that verdicts depend on.
     pub stamps: BTreeMap<Arc<Path>, Option<Stamp>>,
-    /// For a person.
+    /// Messages for the user.
     pub said: Vec<String>,
-    /// Of files whose stamps alone do not tell: whether they still have the bytes that were read.
+    /// For files with inconclusive stamps: whether they still have the bytes that were read.
     reread: HashMap<(Arc<Path>, Digest), bool>,
 }
 
-/// Why a result does not stand.
+/// Reason why a result is no longer valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Fall {
-    /// Nobody watches its file today.
+    /// The file of the result is no longer watched.
     Unwatched,
-    /// It would be written elsewhere today.
+    /// The result would now be written to another path.
     Moved,
-    /// It is not all there, or it is not the one that the journal knows.
+    /// The result is incomplete, or differs from the one in the journal.
     Incomplete,
 }
 
 impl Store {
-    /// Withdraws from the disk what does not stand, and remembers it. `reporters` are those that
-    /// may have reported results that the journal knows nothing of.
+    /// Removes invalid results from the disk and records this. `reporters` are those that may have
+    /// sent reports about results that are not in the journal.
     ///
     /// # Errors
     /// When the gate cannot be cleared.
@@ -68,7 +68,7 @@ impl Store {
             }
             owned.extend(row.judged.xqar.clone());
             self.is_written(&row);
-            // What cannot be looked at now says nothing: its result is kept.
+            // If the file cannot be accessed now, its state is unknown and its result is kept.
             let lookable = stamp_of(&row.path);
             let as_read = found.as_read(&row.judged, lookable.as_ref().ok());
             if as_read || !row.judged.is_accepted() {
@@ -86,7 +86,7 @@ impl Store {
         Ok(found)
     }
 
-    /// From now on it is noticed when the result goes.
+    /// Registers the outputs of a file, so that their loss is noticed.
     fn is_written(&self, row: &Remembered) {
         let outputs = [self.places.xqar(&row.path), self.places.verdict(&row.path)];
         for output in outputs {
@@ -103,21 +103,21 @@ impl Store {
         if !self.places.contains(path) || hidden.is_some() {
             return Some(Fall::Unwatched);
         }
-        // One that could not be written anywhere is tried anew.
+        // A result that could not be written is tried again.
         let xqar = judged.xqar.as_deref();
         let Some(xqar) = xqar.filter(|it| *it == self.places.xqar(path)) else {
             return Some(Fall::Moved);
         };
         let now = FileFingerprint::at(&self.places.verdict(path));
-        // What older versions have written has no fingerprint.
+        // Results of older versions have no recorded fingerprint.
         let same = now.is_some() && (row.written.is_none() || row.written == now);
         (!same || !xqar.exists()).then_some(Fall::Incomplete)
     }
 
-    /// Removes results, and records that they are gone and who is to take back reports. A result outside of our
-    /// directory of results stays, with the reports beside it: only the broker that holds the lock of a
-    /// directory removes anything in it. The journal may name such a result because the state was copied from
-    /// another broker, or because results went elsewhere before.
+    /// Removes results, and records the removal and the reporters that must withdraw reports. A
+    /// result outside of this broker's directory stays, with the reports next to it: only the
+    /// broker that holds the lock of a directory removes files in it. The journal may name such a
+    /// result if the state was copied from another broker, or if results went elsewhere before.
     fn let_fall(
         &self,
         fallen: Vec<(Remembered, Fall)>,
@@ -138,14 +138,14 @@ impl Store {
                 });
                 continue;
             }
-            // By now the result of another file may lie there.
+            // The result of another file may be at this path by now.
             let xqar = xqar.filter(|xqar| !owned.contains(*xqar));
             let mine = xqar.is_some();
             if let Some(error) = xqar.and_then(|xqar| self.remove_result(xqar).err()) {
                 found.cannot_withdraw(&row.path, &error);
                 continue;
             }
-            // A reporter may have written its report, and nobody lived to record it.
+            // A reporter may have written its report, but the broker ended before recording it.
             let delivered = row.delivered.into_iter().map(|(name, _)| name);
             let all: BTreeSet<String> = delivered.chain(reporters.iter().cloned()).collect();
             let reporters = all.into_iter().filter(|_| mine).collect();
@@ -168,7 +168,7 @@ impl Store {
         }
     }
 
-    /// Removes results of ours that the journal does not know.
+    /// Removes results of this program that the journal does not contain.
     fn clear_leftovers(
         &self,
         owned: &HashSet<PathBuf>,
@@ -184,7 +184,7 @@ impl Store {
                 failed.push((path, error));
                 continue;
             }
-            // Reports of a file that has a verdict are about that.
+            // If the file has a verdict, its reports belong to that verdict.
             if !known.contains(&*path) {
                 entries.push(Entry::Left {
                     path: path.clone(),
@@ -207,7 +207,7 @@ impl Store {
         }
     }
 
-    /// Removes a result, and last the verdict file, which tells that there was one.
+    /// Removes a result, and last the verdict file, which shows that a result existed.
     fn remove_result(&self, xqar: &Path) -> io::Result<()> {
         remove(xqar)?;
         verdict_beside(xqar).map_or(Ok(()), |verdict| remove(&verdict))?;
@@ -219,7 +219,7 @@ impl Store {
         if entries.is_empty() {
             return;
         }
-        // The next start finds the same and tries again.
+        // The next start finds the same state and tries again.
         if let Err(why) = self.record(entries).map_err(StoreFailure::of_all) {
             found.said.push(why.what);
         }
@@ -227,7 +227,7 @@ impl Store {
 }
 
 impl Reconciled {
-    /// Nothing stands; `said` is for a person.
+    /// Returns a reconciliation without valid verdicts. `said` contains messages for the user.
     pub fn nothing(said: Vec<String>) -> Reconciled {
         Reconciled {
             said,
@@ -235,8 +235,8 @@ impl Reconciled {
         }
     }
 
-    /// Whether everything that a verdict depends on is as it was read; `root` is what `stat` says of
-    /// the file itself, if it can be looked at.
+    /// Checks whether all inputs of a verdict are unchanged since they were read. `root` is the
+    /// result of `stat` for the file itself, if it can be accessed.
     fn as_read(&mut self, judged: &Judged, root: Option<&Option<Stamp>>) -> bool {
         let mut same = true;
         for (number, input) in judged.inputs.iter().enumerate() {
@@ -254,7 +254,7 @@ impl Reconciled {
         same
     }
 
-    /// Another link to a file, or other rights, make no other bytes of it.
+    /// Checks whether an input has the same bytes, even after a change of links or permissions.
     fn has_same_bytes(&mut self, input: &Input, now: Option<Stamp>) -> bool {
         let (Some((read, digest)), Some(now)) = (input.content.read(), now) else {
             return false;
@@ -288,7 +288,8 @@ fn directory_of(xqar: &Path) -> PathBuf {
     xqar.parent().unwrap_or(xqar).to_path_buf()
 }
 
-/// What is said of results that the journal names and that lie outside of our directory of results.
+/// Returns the message about results that the journal names outside of this broker's directory of
+/// results.
 fn left_alone(directories: &BTreeSet<PathBuf>, out: &Path) -> String {
     let directories: Vec<Arc<Path>> = directories.iter().map(|it| it.as_path().into()).collect();
     format!(
@@ -300,7 +301,7 @@ fn left_alone(directories: &BTreeSet<PathBuf>, out: &Path) -> String {
     )
 }
 
-/// The first of many.
+/// Returns the first few paths and the number of the others.
 fn some_of(paths: &[Arc<Path>]) -> String {
     const SHOWN: usize = 3;
     let shown = paths.iter().take(SHOWN);

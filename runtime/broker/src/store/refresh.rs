@@ -1,4 +1,4 @@
-//! Is what a verdict rests on still what was read?
+//! Checks whether the inputs of a verdict are unchanged since they were read.
 
 use qcbus_disk::foreign;
 use qcbus_messages::Digest;
@@ -6,14 +6,14 @@ use qcbus_messages::Digest;
 use crate::core::{Input, Reading};
 use crate::stamp::stamp_through_links;
 
-/// Whether inputs still have the bytes that were read: `None` if one has not, else those with their
-/// present stamps if one has moved.
+/// Checks whether inputs still have the bytes that were read. Returns `None` if one has changed.
+/// Otherwise returns the inputs with their current stamps if a stamp differs.
 pub(super) fn refreshed(inputs: &[Input]) -> Option<Option<Vec<Input>>> {
     let now: Vec<Input> = inputs.iter().map(as_it_is).collect::<Option<_>>()?;
     Some((now != *inputs).then_some(now))
 }
 
-/// The input with its present stamp, if it still has the bytes that were read.
+/// Returns the input with its current stamp, if it still has the bytes that were read.
 pub(super) fn as_it_is(input: &Input) -> Option<Input> {
     let now = stamp_through_links(&input.path);
     let Some((read, digest)) = input.content.read() else {
@@ -43,7 +43,7 @@ mod tests {
     use crate::stamp::tests::put;
 
     fn rewrite(path: &Path, bytes: &[u8]) {
-        // Before 1970, for good measure.
+        // A time before 1970 is covered as well.
         put(path, bytes, UNIX_EPOCH - Duration::from_secs(1));
     }
 
@@ -60,7 +60,7 @@ mod tests {
         };
         assert_eq!(as_it_is(&input), Some(input.clone()));
 
-        // Another link: the same bytes under a new stamp.
+        // Another link gives the same bytes a new stamp.
         let link = dir.path().join("link");
         let linked = std::iter::repeat_with(|| {
             let _ = std::fs::remove_file(&link);
@@ -71,7 +71,7 @@ mod tests {
         let now = as_it_is(&input).unwrap();
         assert_eq!(now.content, Reading::Read(linked, digest_of(b"one")));
 
-        // Other bytes of the same size, with the time put back.
+        // Other bytes of the same size get the old modification time.
         rewrite(&path, b"two");
         assert_eq!(stamp().map(|it| it.mtime_ns), Some(read.mtime_ns));
         assert_eq!(as_it_is(&input), None);

@@ -1,4 +1,4 @@
-//! What a shadow found in a file, by itself: pooled like any other result, and kept beside the journal.
+//! Results of shadows: pooled like any other result, but stored next to the journal.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -14,29 +14,31 @@ use sha2::{Digest as _, Sha256};
 use super::Store;
 use crate::core::{FinishedJob, OnDemandOutcome, TrialEnd};
 
-/// Below the directory of state.
+/// Name of the directory below the state directory.
 const DIRECTORY: &str = "shadow";
 
-/// Reasons that are kept of one trial.
+/// Maximum number of reasons kept of one trial.
 const REASONS: usize = 3;
 
-/// Bytes of a file's name in that of its result.
+/// Maximum number of bytes of a file's name in the name of its result.
 const MOST_OF_A_NAME: usize = 128;
 
-/// Where the results of trials lie.
+/// Directory of the results of trials.
 #[derive(Debug, Clone)]
 pub struct TrialResults(PathBuf);
 
 impl TrialResults {
-    /// Those of a broker with this directory of state. Nothing of an earlier broker stays: all is tried anew.
+    /// Creates an empty directory for a broker with this state directory. Every file is tried
+    /// again.
     pub fn anew(state: &Path) -> TrialResults {
         let directory = state.join(DIRECTORY);
-        // What cannot be removed is written over, or nobody names it.
+        // A result that cannot be removed is overwritten, or no longer referenced.
         let _ = std::fs::remove_dir_all(&directory);
         TrialResults(directory)
     }
 
-    /// The result of one file. Names say which file it is, and differ where only directories do.
+    /// Returns the path of the result for one file. It contains the file's name and a digest of its
+    /// path.
     fn of(&self, shadow: &str, file: &Path) -> PathBuf {
         let digest = Sha256::digest(file.as_os_str().as_encoded_bytes());
         let number = digest.iter().take(4).map(|byte| format!("{byte:02x}"));
@@ -50,9 +52,10 @@ impl TrialResults {
         self.0.join(shadow).join(name)
     }
 
-    /// Forgets what a shadow found in a file, or in all.
+    /// Removes the results of a shadow for one file, or for all files.
     pub fn forget(&self, shadow: &str, file: Option<&Path>) {
-        // One that was never written need not be removed, and what cannot be is written over.
+        // A missing result need not be removed, and one that cannot be removed is overwritten
+        // later.
         let _ = match file {
             Some(file) => std::fs::remove_file(self.of(shadow, file)),
             None => std::fs::remove_dir_all(self.0.join(shadow)),
@@ -61,7 +64,7 @@ impl TrialResults {
 }
 
 impl Store {
-    /// Pools what a shadow found, and keeps its result if it found anything.
+    /// Pools the findings of a shadow, and stores its result if it has findings.
     pub fn pool_trial(
         &self,
         shadow: &str,
@@ -101,7 +104,7 @@ impl Store {
     }
 }
 
-/// Its issues: errors, warnings, information.
+/// Returns the numbers of issues: errors, warnings, information.
 fn counts(bundle: &CheckerBundle) -> [u64; 3] {
     let issues = bundle.checkers.iter().flat_map(|it| &it.issues);
     let mut counts = [0; 3];

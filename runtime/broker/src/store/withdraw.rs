@@ -1,4 +1,4 @@
-//! Taking back what was written about a file.
+//! Withdrawal of the output about a file.
 
 use std::io;
 use std::path::Path;
@@ -12,11 +12,11 @@ use crate::journal::{Entry, JournalError, Void};
 use qcbus_disk::{remove, remove_empty_above};
 
 impl Store {
-    /// Removes what was written for a file that has gone, and remembers who is to take back a
+    /// Removes the output about a removed file, and records the reporters that must withdraw a
     /// report about it.
     ///
     /// # Errors
-    /// What a person should know; it is to be tried again.
+    /// A message for the user. The action must be tried again.
     pub fn withdraw(&self, path: &Arc<Path>, reporters: &[String]) -> Result<(), StoreFailure> {
         self.withdraw_files(path).map_err(|error| StoreFailure {
             what: format!("cannot withdraw the result of {}: {error}", to_text(path)),
@@ -30,7 +30,8 @@ impl Store {
         self.record(&[entry]).map_err(StoreFailure::of_all)
     }
 
-    /// First what others may take for accepted, last what tells that there was a result.
+    /// Removes the published copy first. Removes the verdict file last, because it shows that a
+    /// result existed.
     pub(super) fn withdraw_files(&self, path: &Arc<Path>) -> io::Result<()> {
         if let Some(gate) = &self.gate {
             gate.forget(path)?;
@@ -49,13 +50,15 @@ impl Store {
         Ok(())
     }
 
-    /// Removes the directories of results that are empty now that a result, or a report beside it, has gone.
+    /// Removes directories of results that became empty when a result, or a report next to it, was
+    /// removed.
     pub fn tidy_above(&self, path: &Path) {
         remove_empty_above(&self.places.xqar(path), &self.places.out);
     }
 
-    /// What reporters are still to take back. Reports beside results outside of our directory belong to
-    /// another broker: nobody takes them back, and they are forgotten.
+    /// Returns the reports that reporters must still withdraw. Reports next to results outside of
+    /// this broker's directory belong to another broker: their entries are deleted and the reports
+    /// stay.
     ///
     /// # Errors
     /// When the journal cannot be read.
@@ -77,7 +80,7 @@ impl Store {
         if !forgotten.is_empty()
             && let Err(why) = self.record(&forgotten)
         {
-            // The next start finds the same and tries again.
+            // The next start finds the same state and tries again.
             tracing::warn!("{why}");
         }
         Ok(ours)

@@ -1,4 +1,4 @@
-//! Writing a result, its verdict file and its journal entry, and publishing the file.
+//! Writes a result, its verdict file and its journal entry, and publishes the file.
 
 use std::cell::Cell;
 use std::path::Path;
@@ -57,7 +57,7 @@ impl Store {
         })
     }
 
-    /// Writes the result and the verdict file, and gives the fingerprint of the latter.
+    /// Writes the result and the verdict file, and returns the fingerprint of the verdict file.
     fn write_files(
         &self,
         job: &FinishedJob,
@@ -96,7 +96,7 @@ impl Store {
         let verdict = verdict_file::render(job, pooled, judged, outside);
         let path = self.places.verdict(&job.path);
         self.outputs.changing(&path);
-        // Whoever sees the new result sees its verdict.
+        // A reader that sees the new result also sees its verdict.
         let written = write_both((&path, &verdict), result, self.durable);
         let [first, second] = written.map_err(|(path, error)| unwritten(path, &error))?;
         self.outputs.written(&path, &job.path, first);
@@ -104,7 +104,7 @@ impl Store {
         Ok(Some(first))
     }
 
-    /// Returns what was written for a file and is not there any more, or is another file.
+    /// Returns the outputs of a file that are missing or replaced by another file.
     pub fn lost_outputs(&self, file: &Arc<Path>) -> Vec<LostOutput> {
         let results = [self.places.xqar(file), self.places.verdict(file)];
         let copy = self.gate.as_ref().map(|gate| gate.place(file));
@@ -119,10 +119,10 @@ impl Store {
 }
 
 thread_local! {
-    /// The memory of the last result's text: to have as much anew for every small file costs more than to
-    /// write the text.
+    /// Buffer of the last result's text. It is reused because an allocation for every small file
+    /// costs more than writing the text.
     static TEXT: Cell<String> = const { Cell::new(String::new()) };
 }
 
-/// Bytes that a thread keeps for the next text.
+/// Maximum number of bytes that a thread keeps for the next text.
 const MOST_KEPT: usize = 1 << 20;

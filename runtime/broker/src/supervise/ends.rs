@@ -1,4 +1,4 @@
-//! How children end.
+//! Ends of children.
 
 use qcbus_bus::Process;
 use tokio::process::Child;
@@ -8,7 +8,7 @@ use super::Started;
 use crate::core::{ChildEnd, Event, Launch};
 use crate::final_output::FinalOutput;
 
-/// Waits for the end of a child and tells it, after what the child has said last was taken down.
+/// Waits for the end of a child, stores its final output, and then reports the end.
 pub(super) async fn watch(
     launch: Launch,
     name: String,
@@ -30,7 +30,7 @@ fn end_of(status: std::process::ExitStatus) -> ChildEnd {
     use std::os::unix::process::ExitStatusExt;
     let manifest = "see its manifest";
     match (status.code(), status.signal()) {
-        // What the shell says when it cannot start a command.
+        // The shell returns these exit codes if it cannot start a command.
         (Some(code @ 127), _) => ChildEnd::NotStarted(format!(
             "its command was not found (exit code {code}); {manifest}"
         )),
@@ -44,9 +44,9 @@ fn end_of(status: std::process::ExitStatus) -> ChildEnd {
     }
 }
 
-/// Kills a child that is not wanted after all.
+/// Kills a child that is not needed after all.
 pub(super) fn kill_early(child: &Child) {
-    // Nobody has waited for it yet, so the id is its own; the runtime does.
+    // The child is not reaped yet, so the id certainly belongs to it. The runtime reaps it.
     let process = child.id().and_then(|id| Process::open(id, None));
     process.iter().for_each(Process::kill);
 }

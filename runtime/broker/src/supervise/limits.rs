@@ -1,11 +1,11 @@
-//! What a child is restricted to before its program begins.
+//! Restrictions of a child before its program starts.
 
 use rustix::process::{Resource, setrlimit};
 use tokio::process::Command;
 
 use super::Surroundings;
 
-/// Limits that must be set between fork and exec.
+/// Sets the limits that must be set between fork and exec.
 #[expect(
     unsafe_code,
     reason = "pre_exec is the only place where a child's own limits can be set"
@@ -15,11 +15,11 @@ pub(super) fn restrict(command: &mut Command, surroundings: &Surroundings) {
     let descriptors = surroundings.descriptors;
     let with_broker = surroundings.die_with_broker;
     let broker = std::process::id();
-    // SAFETY: between fork and exec only async-signal-safe functions are called: close_range, setrlimit,
-    // prctl and getppid; nothing is allocated and no lock is taken.
+    // SAFETY: between fork and exec only async-signal-safe functions are called: close_range,
+    // setrlimit, prctl and getppid; nothing is allocated and no lock is taken.
     unsafe {
         command.pre_exec(move || {
-            // What this program was given by whoever started it is nobody else's.
+            // File descriptors that the broker inherited must not reach the child.
             libc::syscall(
                 libc::SYS_close_range,
                 3,

@@ -68,7 +68,7 @@ async fn how_a_child_ends_is_told() {
     }
 }
 
-/// On a busy machine a program may have ended before its handle was opened.
+/// A program may end before its handle is opened, for example on a busy machine.
 #[tokio::test]
 async fn child_that_ends_at_once_is_no_orphan() {
     let (mut children, mut inbox) = children();
@@ -99,7 +99,7 @@ fn pids_of(children: &Children) -> Vec<u32> {
 async fn is_gone(pid: u32) {
     let stat = PathBuf::from(format!("/proc/{pid}/stat"));
     let gone = async {
-        // A zombie that nobody has buried yet is as good as gone.
+        // A zombie that is not reaped yet counts as ended.
         let runs = || std::fs::read_to_string(&stat).is_ok_and(|it| !it.contains(") Z "));
         while runs() {
             tokio::task::yield_now().await;
@@ -184,7 +184,7 @@ async fn a_child_is_killed_with_what_it_has_started() {
     let grandchild = std::fs::read_to_string(&pid).unwrap();
     let stat = PathBuf::from(format!("/proc/{}/stat", grandchild.trim()));
     let gone = async {
-        // A zombie that nobody has buried yet is as good as gone.
+        // A zombie that is not reaped yet counts as ended.
         let runs = || std::fs::read_to_string(&stat).is_ok_and(|it| !it.contains(") Z "));
         while runs() {
             tokio::task::yield_now().await;
@@ -222,7 +222,7 @@ async fn only_what_a_broker_has_started_is_believed_and_killed() {
         .unwrap();
     children.kill(earlier);
     assert!(!stale_children.wait().unwrap().success());
-    // A child of this broker is known without any proof, and nobody else is taken for it.
+    // A child of this broker is known without any proof. No other process is taken for it.
     children.spawn(Launch(1), &spec(&["sh", "-c", "exec sleep 1000", "sh"]));
     let own = children.own[&Launch(1)].process.clone().unwrap();
     children.joined(Launch(1), "child", Some(&own), "").unwrap();

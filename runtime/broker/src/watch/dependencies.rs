@@ -1,6 +1,6 @@
-//! Files on which verdicts depend, wherever they are. Where the kernel tells of their changes they
-//! are only looked at now and then, for kernels and file systems lose events; anywhere else
-//! looking at them often is the only way.
+//! Dependencies of verdicts, wherever they are. Files with kernel events are only scanned from time
+//! to time, because kernels and file systems lose events. Files without events must be scanned
+//! often.
 
 use std::collections::BTreeMap;
 use std::ops::Bound;
@@ -15,37 +15,38 @@ use super::tree::below;
 use crate::core::Stamp;
 use crate::stamp::stamp_through_links;
 
-/// How often what no event tells of is looked at.
+/// Interval of scans of files without events.
 pub const INTERVAL: Duration = Duration::from_secs(1);
 
-/// In so many intervals all are looked at of which events tell.
+/// Number of intervals in which all files with events are scanned once.
 const TURNS: usize = 30;
 
-/// The files, each with the stamp that was last seen of it.
+/// Dependencies with the stamps that were last seen.
 #[derive(Debug, Default)]
 pub struct Dependencies {
-    /// Looked at in every interval.
+    /// Files that are scanned in every interval.
     polled: BTreeMap<Arc<Path>, Polled>,
-    /// Changes of these come as events.
+    /// Files with kernel events.
     told: BTreeMap<Arc<Path>, Option<Stamp>>,
-    /// The last of `told` that was looked at: the others have their turn after it.
+    /// Last scanned file of `told`. The next scan continues after it.
     last: Option<Arc<Path>>,
 }
 
 #[derive(Debug)]
 struct Polled {
     stamp: Option<Stamp>,
-    /// Whether events tell of it has been asked since its stamp last changed.
+    /// Whether the check for kernel events was made since the last change of the stamp.
     asked: bool,
 }
 
-/// A file that is not what it was; `None` when it has gone.
+/// A changed file with its new stamp, or `None` if it was removed.
 pub type Changed = (Arc<Path>, Option<Stamp>);
 
 impl Dependencies {
-    /// Adds files, each with the stamp under which it was read: a change since then is one, too. Returns what to tell
-    /// of those that are there already and were read as something else than was last seen of them: it may have come
-    /// and gone since, so that a look finds nothing new, and whoever read it earlier may not have been told.
+    /// Adds files with the stamps at which they were read; later changes are reported. Returns the
+    /// changes of known files that were read with another stamp than the last one seen. Such a file
+    /// may have appeared and disappeared since then. A scan would find no change, and earlier
+    /// readers may not have been informed.
     pub fn add(&mut self, files: Vec<(Arc<Path>, Option<Stamp>)>) -> Vec<Changed> {
         let mut changed = Vec::new();
         for (path, stamp) in files {
@@ -63,13 +64,13 @@ impl Dependencies {
         changed
     }
 
-    /// The stamp that was last seen of a file; the outer `None`: nothing depends on it.
+    /// Returns the last seen stamp of a file. The outer `None` means that no verdict depends on it.
     fn seen(&self, path: &Path) -> Option<Option<Stamp>> {
         let polled = self.polled.get(path).map(|polled| polled.stamp);
         polled.or_else(|| self.told.get(path).copied())
     }
 
-    /// Forgets files on which nothing depends any more.
+    /// Removes files that no verdict depends on any more.
     pub fn remove(&mut self, paths: &[Arc<Path>]) {
         for path in paths {
             self.polled.remove(path);
@@ -77,13 +78,13 @@ impl Dependencies {
         }
     }
 
-    /// Whether some verdict depends on it.
+    /// Checks whether a verdict depends on the file.
     pub fn contains(&self, path: &Path) -> bool {
         self.seen(path).is_some()
     }
 
-    /// Looks at a file out of turn, because of an event; `None` when it is what it was, or nothing
-    /// depends on it.
+    /// Scans a file immediately because of an event. Returns `None` if it is unchanged or no
+    /// verdict depends on it.
     pub fn look(&mut self, path: &Path) -> Option<Changed> {
         let polled = self.polled.remove_entry(path);
         let polled = polled.map(|(path, polled)| (path, polled.stamp));
@@ -93,14 +94,14 @@ impl Dependencies {
         (stamp != seen).then_some((path, stamp))
     }
 
-    /// The files below a directory that came or went as a whole.
+    /// Returns the files below a directory that appeared or disappeared as a whole.
     pub fn below(&self, directory: &Path) -> Vec<Arc<Path>> {
         let polled = below(&self.polled, directory).map(|(path, _)| path);
         let told = below(&self.told, directory).map(|(path, _)| path);
         polled.chain(told).cloned().collect()
     }
 
-    /// No events come any more, or some were lost.
+    /// Treats all files as files without events, after events were lost or stopped.
     pub fn poll_all(&mut self) {
         for (path, stamp) in std::mem::take(&mut self.told) {
             self.poll(path, stamp);
@@ -112,12 +113,13 @@ impl Dependencies {
         self.polled.insert(path, Polled { stamp, asked });
     }
 
-    /// Looks at what is due in this interval. `tells` says whether events tell of changes of a file.
+    /// Scans the files of this interval. `tells` checks whether the kernel reports changes of a
+    /// file.
     pub fn changed(&mut self, mut tells: impl FnMut(&Path) -> bool) -> Vec<Changed> {
         let mut changed = self.turn();
         let mut told = Vec::new();
         for (path, polled) in &mut self.polled {
-            // Asked before the look: what changes in between comes as an event.
+            // This check precedes the scan, so a change in between arrives as an event.
             if !polled.asked {
                 polled.asked = true;
                 if tells(path) {
@@ -139,8 +141,8 @@ impl Dependencies {
         changed
     }
 
-    /// Those of which events should have told and did not, among the few whose turn it is. What
-    /// kind of file they are now decides again whether events tell of them.
+    /// Returns files whose change was missed by the events. Only a few are scanned per interval.
+    /// The check for kernel events is then repeated for them.
     fn turn(&mut self) -> Vec<Changed> {
         let due = self.told.len().div_ceil(TURNS);
         let begin = self.last.take().map_or(Bound::Unbounded, Bound::Excluded);
@@ -168,15 +170,15 @@ impl Dependencies {
     }
 }
 
-/// The stamp as it is now; as it was, where others wait for an answer in vain.
+/// Returns the current stamp, or the last seen one if the system does not answer.
 fn look_through(path: &Path, seen: Option<Stamp>) -> Option<Stamp> {
     let stamp = foreign::access(path, || Ok(stamp_through_links(path)));
     stamp.unwrap_or(seen)
 }
 
-/// Whether the kernel tells of every change of a file whose directory is watched. It does not of
-/// what lies behind a symbolic link, of what is written under another name of the same file, nor of
-/// what is in a directory by that directory's own name.
+/// Checks whether the kernel reports every change of a file in a watched directory. It reports no
+/// change through a symbolic link or under another hard link. It also does not report the contents
+/// of a directory that is given by its own name.
 pub fn events_tell(path: &Path) -> bool {
     match foreign::symlink_metadata(path) {
         Ok(data) => data.is_file() && data.nlink() == 1,
@@ -195,7 +197,7 @@ mod tests {
         path.into()
     }
 
-    /// A directory without links in its path.
+    /// Creates a directory without links in its path.
     fn farm() -> (tempfile::TempDir, PathBuf) {
         let dir = tempfile::tempdir().unwrap();
         let root = dir.path().canonicalize().unwrap();
@@ -212,7 +214,7 @@ mod tests {
         std::fs::write(&part, "1").unwrap();
         let read = stamp_through_links(&part);
         std::fs::remove_file(&part).unwrap();
-        // Who read it rests on what is not there, and a look finds what it found before.
+        // The reader depends on a file that is missing now, and a scan would find no change.
         assert_eq!(all.add(vec![(part.clone(), read)]), [(part.clone(), None)]);
         assert_eq!(all.changed(|_| false), []);
         assert_eq!(all.counts(), [1, 0]);
@@ -246,7 +248,7 @@ mod tests {
         let mut all = Dependencies::default();
         all.add(vec![(shared(&map), None), (shared(&view), None)]);
         let tells = |path: &Path| path == view;
-        // It was not there when it was read.
+        // The file did not exist when it was read.
         let there = stamp_through_links(&view);
         assert_eq!(all.changed(tells), [(shared(&view), there)]);
         assert_eq!(all.changed(tells), []);

@@ -1,31 +1,31 @@
-//! Directories that are to be looked through: those of which an event told, and all of them at
-//! intervals. Each waits its turn, once: who makes much of the one waits behind the others.
+//! Queue of directories to scan: those with an event, and all directories at intervals. Each is
+//! queued once, so a directory with many events cannot delay the others.
 
 use std::collections::{HashSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// A look through everything begins no sooner after the last than this...
+/// Minimum pause between two full scans...
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// ...and than so many times as long as that one took.
+/// ...and minimum pause as a multiple of the duration of the last full scan.
 const SHARE: u32 = 4;
 
-/// A directory whose turn it is.
+/// The next directory to scan.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Turn {
-    /// Something happened in it, or may have.
+    /// An event has happened in the directory, or may have.
     Told(PathBuf),
-    /// All are looked through, and this is the next.
+    /// The directory is the next one of a full scan.
     Passed {
         /// The directory.
         directory: PathBuf,
-        /// Whether nothing was looked at before.
+        /// Whether this is the first full scan.
         first: bool,
     },
 }
 
-/// A look through everything.
+/// A full scan.
 #[derive(Debug)]
 struct Pass {
     first: bool,
@@ -33,7 +33,7 @@ struct Pass {
     directories: VecDeque<PathBuf>,
 }
 
-/// The directories that wait for their turn.
+/// Queue of directories to scan.
 #[derive(Debug)]
 pub struct Due {
     told: VecDeque<PathBuf>,
@@ -41,12 +41,12 @@ pub struct Due {
     pass: Option<Pass>,
     is_passed_next: bool,
     next_pass: Instant,
-    /// Before this no pass begins.
+    /// Earliest time of the next full scan.
     rest: Instant,
 }
 
 impl Due {
-    /// Nothing is due but the first look at everything, now.
+    /// Creates a queue in which only the first full scan is due, now.
     pub fn new(now: Instant) -> Due {
         Due {
             told: VecDeque::new(),
@@ -58,7 +58,7 @@ impl Due {
         }
     }
 
-    /// A directory is to be looked through.
+    /// Queues a directory for a scan.
     pub fn push(&mut self, directory: &Path) {
         if !self.queued.contains(directory) {
             self.queued.insert(directory.to_path_buf());
@@ -66,24 +66,24 @@ impl Due {
         }
     }
 
-    /// A directory was found in a look through everything.
+    /// Adds a directory that was found in a full scan to that scan.
     pub fn pass_on(&mut self, directory: PathBuf) {
         if let Some(pass) = &mut self.pass {
             pass.directories.push_back(directory);
         }
     }
 
-    /// Whether a directory will be looked through without anything else to happen.
+    /// Checks whether a directory will be scanned without a further event.
     pub fn covers(&self, directory: &Path) -> bool {
         self.pass.is_some() || self.queued.contains(directory)
     }
 
-    /// Whether there is nothing to do at once.
+    /// Checks whether no directory has to be scanned now.
     pub fn is_empty(&self) -> bool {
         self.told.is_empty() && self.pass.is_none()
     }
 
-    /// Begins to look through everything.
+    /// Starts a full scan.
     pub fn begin_pass(&mut self, roots: &[PathBuf], first: bool, now: Instant) {
         self.pass = Some(Pass {
             first,
@@ -93,17 +93,17 @@ impl Due {
         self.next_pass = now + Duration::from_secs(u64::from(u32::MAX));
     }
 
-    /// When everything is to be looked through again; `None` while that is being done.
+    /// Returns the time of the next full scan, or `None` during a full scan.
     pub fn next_pass(&self) -> Option<Instant> {
         self.pass.is_none().then_some(self.next_pass.max(self.rest))
     }
 
-    /// Everything is to be looked through at that time at the latest.
+    /// Schedules a full scan at that time at the latest.
     pub fn pass_at(&mut self, at: Instant) {
         self.next_pass = self.next_pass.min(at);
     }
 
-    /// Whose turn it is: those of which events told and those of a pass take turns.
+    /// Returns the next directory. Directories with events and those of a full scan alternate.
     pub fn next(&mut self) -> Option<Turn> {
         self.is_passed_next = !self.is_passed_next;
         if self.is_passed_next {
@@ -125,7 +125,7 @@ impl Due {
         Some(Turn::Passed { directory, first })
     }
 
-    /// Whether a look through everything has just come to its end, and whether it was the first.
+    /// Returns a value if a full scan has just ended: whether it was the first.
     pub fn ended_pass(&mut self, now: Instant) -> Option<bool> {
         let pass = self.pass.take_if(|pass| pass.directories.is_empty())?;
         let took = now.saturating_duration_since(pass.began);
@@ -174,7 +174,7 @@ mod tests {
         assert_eq!(names.collect::<Vec<_>>(), ["r", "a", "s", "b"]);
         assert_eq!(due.ended_pass(now + PAUSE), Some(true));
         assert_eq!(due.ended_pass(now + PAUSE), None);
-        // However often it is wished for.
+        // Repeated requests do not shorten the pause.
         due.pass_at(now);
         assert_eq!(due.next_pass(), Some(now + PAUSE + PAUSE * SHARE));
     }

@@ -1,4 +1,4 @@
-//! Events from the kernel, and what is done where they cannot be had.
+//! Kernel events, and polling where events are not available.
 
 use std::io;
 use std::path::Path;
@@ -16,34 +16,34 @@ use super::tree::{Told, Unwatched};
 use crate::environment::now;
 use crate::stamp::stamp_of;
 
-/// How often what no event tells of is looked through.
+/// Interval of scans of directories without events.
 const EVERY: Duration = Duration::from_secs(2);
 
-/// So much longer for each directory, so that very many do not take all the time.
+/// Additional time for each directory, so that a large number of them does not use all the time.
 const FOR_EACH: Duration = Duration::from_micros(100);
 
-/// How often it is said that events were lost.
+/// Minimum interval of the notice about lost events.
 const SAY_AGAIN: Duration = Duration::from_secs(60);
 
-/// What is looked at because no event tells of it.
+/// State of the polling of directories without events.
 #[derive(Debug, Default)]
 pub struct Polling {
-    /// Why no events can be had at all.
+    /// Reason why no events are available at all.
     without: Option<String>,
-    /// The kernel gave no watch; it is asked again with the next look through everything.
+    /// Whether the kernel refused a watch. The next full scan tries again.
     none_left: bool,
-    /// That was said.
+    /// Whether the notice about this was sent.
     is_said: bool,
-    /// When directories without a watch were last looked through.
+    /// Time of the last scan of directories without a watch.
     last: Option<Instant>,
-    /// When it was last said that events were lost.
+    /// Time of the last notice about lost events.
     lost_events: Option<Instant>,
-    /// How changes are noticed, as it was last told.
+    /// Last reported mode of detecting changes.
     mode: String,
 }
 
 impl Scanner {
-    /// Asks the kernel for events; where it refuses, says so and looks around instead.
+    /// Opens the kernel's event queue. If this fails, sends a notice and polls instead.
     pub(super) fn ask_for_events(&mut self) {
         if self.options.poll.is_none() && !self.tree.is_open() {
             match self.tree.open() {
@@ -68,14 +68,14 @@ impl Scanner {
         }
     }
 
-    /// How often everything is looked through.
+    /// Returns the interval of full scans.
     pub(super) fn pass_interval(&self) -> Duration {
         let without = self.polling.without.is_some().then_some(EVERY);
         let interval = self.options.poll.or(without);
         interval.unwrap_or(self.options.rescan).min(A_YEAR)
     }
 
-    /// With a look through everything what could not be watched is tried again.
+    /// Tries failed watches again at the start of a full scan.
     pub(super) fn begin_to_watch_again(&mut self) {
         self.polling.none_left = false;
         if self.polling.without.is_some() {
@@ -83,7 +83,7 @@ impl Scanner {
         }
     }
 
-    /// Has a directory watched, or kept in mind as one of which nothing is told.
+    /// Watches a directory, or registers it as one without events.
     pub(super) fn watch_directory(&mut self, directory: &Path) -> Result<(), Unwatched> {
         if !self.tree.is_open() || (self.polling.none_left && !self.tree.tells_of(directory)) {
             self.tree.keep_unwatched(directory);
@@ -97,7 +97,7 @@ impl Scanner {
                 self.tree.keep_unwatched(directory);
                 self.say_that_none_are_left();
             }
-            // What cannot be read is said so by who tries. A watched directory has to be known.
+            // The scan reports an unreadable directory. A root must be registered nevertheless.
             Err(Unwatched::Closed) => {
                 if self.options.roots.iter().any(|root| root == directory) {
                     self.tree.keep_unwatched(directory);
@@ -125,7 +125,7 @@ impl Scanner {
         )));
     }
 
-    /// Looks through the directories of which no event tells.
+    /// Scans the directories without events.
     pub(super) fn poll_what_is_not_watched(&mut self) {
         self.tell_mode();
         let (_, without) = self.tree.counts();
@@ -162,7 +162,7 @@ impl Scanner {
         }
     }
 
-    /// Takes what the kernel has told until now, some hundreds of events at most.
+    /// Reads the pending kernel events, at most a few hundred.
     pub(super) fn take_events(&mut self) {
         let events = match self.tree.events() {
             Ok(events) => events,
@@ -218,7 +218,7 @@ impl Scanner {
         }
     }
 
-    /// What happens to a directory is told by the one above it, unless that is not watched.
+    /// Handles an event of a directory itself. A watched parent already reports the change.
     fn event_of_itself(&mut self, directory: &Path, what: ReadFlags) {
         if self.options.roots.iter().any(|root| root == directory) {
             self.check_roots();
@@ -232,19 +232,19 @@ impl Scanner {
             return;
         }
         if what.intersects(ReadFlags::CREATE | ReadFlags::MOVED_TO) {
-            // Another one may have lain there.
+            // Another directory may have been at this path before.
             self.tree.remove_below(path);
             self.forget_rules_below(path);
             self.due.push(path);
         } else if what.intersects(ReadFlags::DELETE | ReadFlags::MOVED_FROM) {
             self.gone(path);
         } else if !self.tree.tells_of(path) {
-            // It may be read now.
+            // The directory may be readable now.
             self.due.push(path);
         }
     }
 
-    /// Renamed or removed, or closed and at rest: look at once.
+    /// Scans a file immediately after it was renamed, removed or closed.
     fn finished(&mut self, path: &Path) {
         self.settling.done(path);
         if self.known.contains_key(path) || self.cares_about(path) {
@@ -263,7 +263,8 @@ impl Scanner {
     fn touched(&mut self, path: &Path, what: ReadFlags) {
         if self.cares_about(path) {
             let stamp = stamp_of(path).ok().flatten();
-            // Another name for a file comes as one that was created, too. Only an empty one is sure to be filled.
+            // A new hard link for a file also creates an event. Only an empty file will certainly
+            // be written.
             let is_empty = stamp.is_some_and(|it| it.size == 0);
             if what.contains(ReadFlags::MODIFY) || (what.contains(ReadFlags::CREATE) && is_empty) {
                 self.settling.written(path, stamp, now());
@@ -274,8 +275,8 @@ impl Scanner {
         self.look_for_a_link(path);
     }
 
-    /// Whether a link came that hides a directory, or no longer does; one whose name promises a
-    /// file is looked at as that file.
+    /// Checks whether a link has appeared or disappeared that hides a directory. A link with the
+    /// name of a checkable file is scanned as that file.
     fn look_for_a_link(&mut self, path: &Path) {
         if !foreign::is_symlink(path).unwrap_or(false) {
             if self.unseen.contains_key(path) {
@@ -304,5 +305,5 @@ fn since(moment: Instant) -> Duration {
     now().saturating_duration_since(moment)
 }
 
-/// Longer than anything runs; more cannot be added to every point in time.
+/// Upper limit for intervals: longer than any run, but small enough to be added to any time.
 const A_YEAR: Duration = Duration::from_secs(365 * 86_400);

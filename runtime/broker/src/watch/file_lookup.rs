@@ -1,4 +1,4 @@
-//! What lies at a path: a file, perhaps behind a symbolic link, or why there is none to be seen.
+//! Lookup of a path: a file, possibly behind a symbolic link, or the reason why no file is visible.
 
 use std::io;
 use std::os::fd::OwnedFd;
@@ -13,39 +13,39 @@ use crate::core::Stamp;
 use crate::result_paths::leads_upwards;
 use crate::stamp::from_metadata;
 
-/// What lies at a path.
+/// Result of the lookup of a path.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FileLookup {
-    /// A regular file, here or behind a symbolic link.
+    /// A regular file, at the path or behind a symbolic link.
     File(Stamp),
-    /// A directory to look into, no link to one.
+    /// A directory to scan, not a link to one.
     Directory,
-    /// A symbolic link to a directory that is looked at where it lies.
+    /// A symbolic link to a directory that is scanned at its own path.
     Known,
-    /// Nothing.
+    /// The path does not exist.
     Nothing,
-    /// Something that is no file and leads to none, and what it is.
+    /// An entry that is no file and leads to none, with its kind.
     NoFile(NoFile),
-    /// It is there, or may be, and cannot be looked at; what the system says.
+    /// The path exists or may exist, but is inaccessible. Contains the error of the system.
     Hidden(String),
 }
 
-/// What has a name and is no file.
+/// Kind of an entry that is no file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum NoFile {
-    /// A symbolic link to nothing.
+    /// A symbolic link to a missing target.
     Dangling(PathBuf),
     /// A symbolic link that leads back to itself.
     Loop,
-    /// A symbolic link to a directory that nobody looks at.
+    /// A symbolic link to a directory that is not scanned.
     Outside(PathBuf),
     /// A pipe, a socket or a device.
     Special,
 }
 
 impl NoFile {
-    /// Whether it is missed whatever its name is: a whole directory may lie behind it. Anything
-    /// else is missed only if its name promises a file that is checked.
+    /// Checks whether the entry is reported whatever its name is, because it may hide a whole
+    /// directory. Any other entry is reported only if it has the name of a checkable file.
     pub fn hides_more(&self) -> bool {
         matches!(self, NoFile::Loop | NoFile::Outside(_))
     }
@@ -73,8 +73,8 @@ impl std::fmt::Display for NoFile {
     }
 }
 
-/// Looks at a path. `roots` are the directories that are looked at, without symbolic links. What lies
-/// behind a symbolic link to a directory is not looked at: there is nothing.
+/// Looks up a path. `roots` are the scanned directories, without symbolic links. A path behind a
+/// symbolic link to a directory counts as missing.
 pub fn look_at(path: &Path, roots: &[PathBuf]) -> FileLookup {
     let looked = foreign::access(path, || Ok(look(path, roots)));
     looked.unwrap_or_else(|error| FileLookup::Hidden(format!("cannot look at it: {error}")))
@@ -83,7 +83,7 @@ pub fn look_at(path: &Path, roots: &[PathBuf]) -> FileLookup {
 fn look(path: &Path, roots: &[PathBuf]) -> FileLookup {
     if is_behind_a_link(path, roots) {
         return match std::fs::metadata(path) {
-            // Of what is behind a link to itself nobody knows whether it has gone.
+            // Behind a link loop it is unknown whether the path still exists.
             Err(error) if !is_absent(&error) => {
                 FileLookup::Hidden(format!("cannot look at it: {error}"))
             }
@@ -110,7 +110,7 @@ fn behind(link: &Path, roots: &[PathBuf]) -> FileLookup {
         },
         Ok(_) => FileLookup::NoFile(NoFile::Special),
         Err(error) if is_absent(&error) => {
-            // It may have gone meanwhile; then there is nothing to name.
+            // The link may be gone meanwhile. Its target is then unknown.
             let target = std::fs::read_link(link).unwrap_or_default();
             FileLookup::NoFile(NoFile::Dangling(target))
         }
@@ -119,14 +119,14 @@ fn behind(link: &Path, roots: &[PathBuf]) -> FileLookup {
     }
 }
 
-/// Whether a directory is looked at where it lies. Nobody misses what tools keep there.
+/// Checks whether a directory is scanned at its own path. Directories of tools count as scanned.
 fn is_looked_into(roots: &[PathBuf], directory: &Path) -> bool {
     let is_inside = roots.iter().any(|root| directory.starts_with(root));
     is_inside && hidden_above(roots, directory).is_none()
 }
 
-/// Whether a path below a root leads through a symbolic link to a directory, or has a `..`, which is there only
-/// behind one. What lies there is not looked at under this path.
+/// Checks whether a path below a root leads through a symbolic link to a directory, or contains
+/// `..`. A `..` only occurs behind a link. Such a path is not scanned under this name.
 pub fn is_behind_a_link(path: &Path, roots: &[PathBuf]) -> bool {
     if leads_upwards(path) {
         return true;
@@ -145,13 +145,13 @@ pub fn is_behind_a_link(path: &Path, roots: &[PathBuf]) -> bool {
         })
 }
 
-/// Opens a directory to read it, if no symbolic link leads there from its root.
+/// Opens a directory for reading, if the path from its root contains no symbolic link.
 ///
 /// # Errors
-/// What the system says; `ELOOP` when there is a link on the way.
+/// The error of the system. `ELOOP` if the path contains a link.
 pub fn open_directory(directory: &Path, roots: &[PathBuf]) -> io::Result<OwnedFd> {
     let inside = roots.iter().filter(|root| directory.starts_with(root));
-    // The nearest one: fewer links can lie between.
+    // The nearest root is used, because fewer links can lie between.
     match inside.max_by_key(|root| root.as_os_str().len()) {
         Some(root) => open_below(root, directory, OFlags::RDONLY),
         None => open_below(directory, directory, OFlags::RDONLY),
@@ -168,7 +168,7 @@ fn open_below(root: &Path, directory: &Path, how: OFlags) -> io::Result<OwnedFd>
     let top = rustix::fs::openat(CWD, root, top, Mode::empty())?;
     let no_links = ResolveFlags::NO_SYMLINKS | ResolveFlags::NO_MAGICLINKS;
     match rustix::fs::openat2(&top, below, how, Mode::empty(), no_links) {
-        // A kernel before 5.6, or a container that does not know of this call.
+        // The kernel is older than 5.6, or the container does not support this call.
         Err(Errno::NOSYS | Errno::PERM) if has_link(root, directory) => Err(Errno::LOOP.into()),
         Err(Errno::NOSYS | Errno::PERM) => Ok(rustix::fs::openat(
             &top,
@@ -238,7 +238,7 @@ mod tests {
         assert_eq!(null, FileLookup::NoFile(NoFile::Special));
         assert_eq!(look_at(&root.join("maps"), &roots), FileLookup::Directory);
         assert_eq!(look_at(&root.join("none"), &roots), FileLookup::Nothing);
-        // What lies behind a link to a directory has another path, or is nobody's to look at.
+        // A file behind a link to a directory has another path, or lies outside of the roots.
         std::fs::write(root.join("maps/c.xodr"), "").unwrap();
         assert!(matches!(
             look_at(&root.join("maps/c.xodr"), &roots),
@@ -259,7 +259,7 @@ mod tests {
             assert!(has_link(&root, &root.join(link)));
         }
         assert!(!has_link(&root, &root.join("maps")));
-        // What lies below a link that leads nowhere may be there.
+        // A path below a link loop may exist.
         let below = look_at(&root.join("self/c.xodr"), &roots);
         assert!(matches!(below, FileLookup::Hidden(_)), "{below:?}");
     }

@@ -1,9 +1,9 @@
-//! Which files are looked at: the names that editors and copy tools leave behind are not, nor is
-//! what lies in hidden directories or what a `.qcignore` names (the grammar of `.gitignore`).
+//! Selection of the files to scan. Temporary names of editors and copy tools are ignored. Hidden
+//! directories and paths in a `.qcignore` (the syntax of `.gitignore`) are ignored, too.
 //!
-//! Copy tools, snapshots and volumes keep files in hidden directories that are unfinished, old, or seen
-//! elsewhere. A hidden directory is looked into if somebody names it: as a watched or given directory, or with
-//! `!.name/` in a `.qcignore`.
+//! Copy tools, snapshots and volumes keep unfinished, old or duplicate files in hidden directories.
+//! A hidden directory is scanned if it is named explicitly: as a watched or given directory, or
+//! with `!.name/` in a `.qcignore`.
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -16,12 +16,12 @@ use qcbus_disk::foreign;
 
 use super::tree::below;
 
-/// Name of the file in which a directory's owner says what is not to be checked.
+/// Name of the file that excludes paths of a directory from checking.
 pub const IGNORE_FILE: &str = ".qcignore";
 
 const SUFFIXES: [&str; 4] = ["~", ".tmp", ".part", ".swp"];
 
-/// Ignore rules below one directory, read when they are first needed.
+/// Ignore rules below one directory. They are read when first needed.
 #[derive(Debug)]
 pub struct IgnoreRules {
     root: PathBuf,
@@ -29,7 +29,7 @@ pub struct IgnoreRules {
 }
 
 impl IgnoreRules {
-    /// Rules below `root`.
+    /// Creates the rules below `root`.
     pub fn new(root: &Path) -> IgnoreRules {
         IgnoreRules {
             root: root.to_path_buf(),
@@ -37,12 +37,12 @@ impl IgnoreRules {
         }
     }
 
-    /// Forgets what was read, because a rule file may have changed.
+    /// Drops all rules, because a rule file may have changed.
     pub fn forget(&mut self) {
         self.by_directory.clear();
     }
 
-    /// Forgets what was read in a directory and below it, because it came or went as a whole.
+    /// Drops the rules in a directory and below it, because it appeared or disappeared as a whole.
     pub fn forget_below(&mut self, directory: &Path) {
         let below = below(&self.by_directory, directory).map(|(at, _)| at.clone());
         for at in below.collect::<Vec<_>>() {
@@ -50,15 +50,15 @@ impl IgnoreRules {
         }
     }
 
-    /// Whether a path below the root is left alone.
+    /// Checks whether a path is ignored.
     pub fn ignores(&mut self, path: &Path, is_dir: bool) -> bool {
         let directory = if is_dir { Some(path) } else { path.parent() };
         let by_name = !is_dir && path.file_name().is_some_and(is_ignored_file);
         by_name || directory.is_none_or(|it| self.passes_over(it)) || self.excludes(path, is_dir)
     }
 
-    /// Whether a directory is not looked into: it is outside of the root, belongs to a tool, or is or lies in a
-    /// hidden directory that nobody has named.
+    /// Checks whether a directory is not scanned: it is outside of the root, belongs to a tool, or
+    /// is at or below a hidden directory without a rule.
     pub fn passes_over(&mut self, directory: &Path) -> bool {
         let Ok(below) = directory.strip_prefix(&self.root) else {
             return true;
@@ -68,13 +68,13 @@ impl IgnoreRules {
         inside.any(|it| is_of_a_tool(it) || (is_hidden(it) && !self.names(it)))
     }
 
-    /// Whether a rule file names a hidden directory itself.
+    /// Checks whether a rule file names a hidden directory itself.
     fn names(&mut self, directory: &Path) -> bool {
         let said = self.said_of(directory, |rules| rules.matched(directory, true));
         said == Some(Said::Kept)
     }
 
-    /// Whether a rule file excludes a path, or a directory in which it lies.
+    /// Checks whether a rule file excludes a path or a directory above it.
     fn excludes(&mut self, path: &Path, is_dir: bool) -> bool {
         let said = self.said_of(path, |rules| {
             rules.matched_path_or_any_parents(path, is_dir)
@@ -82,7 +82,8 @@ impl IgnoreRules {
         said == Some(Said::Excluded)
     }
 
-    /// What the rule files say of a path: the nearest that says anything decides.
+    /// Returns the decision of the rule files for a path. The nearest file with a matching rule
+    /// decides.
     fn said_of(
         &mut self,
         path: &Path,
@@ -105,50 +106,51 @@ impl IgnoreRules {
     }
 }
 
-/// What a rule file says of a path.
+/// Decision of a rule file for a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Said {
     Excluded,
-    /// Excepted from what is left out, with `!`.
+    /// Included again with `!`.
     Kept,
 }
 
-/// Whether all say that a path is left alone; each has the rules below one root.
+/// Checks whether all rules ignore a path. Each element contains the rules below one root.
 pub fn ignores(rules: &mut [IgnoreRules], path: &Path, is_dir: bool) -> bool {
     rules.iter_mut().all(|it| it.ignores(path, is_dir))
 }
 
-/// Whether all say that a directory is not looked into.
+/// Checks whether all rules exclude a directory from scanning.
 pub fn passes_over(rules: &mut [IgnoreRules], directory: &Path) -> bool {
     rules.iter_mut().all(|it| it.passes_over(directory))
 }
 
-/// Returns the outermost hidden directory for which a directory below the roots is passed over: it lies in it, or is
-/// that one.
+/// Returns the outermost hidden directory because of which a directory below the roots is not
+/// scanned. It may be the directory itself.
 pub fn hidden_above(roots: &[PathBuf], directory: &Path) -> Option<PathBuf> {
     let mut hidden = None;
     for root in roots.iter().filter(|root| directory.starts_with(root)) {
         let mut rules = IgnoreRules::new(root);
         let above = directory.ancestors().take_while(|it| it != root);
         let above = above.filter(|it| is_hidden(it) && !is_of_a_tool(it) && !rules.names(it));
-        // Another root may lie within it.
+        // Another root may lie inside it.
         hidden = Some(above.last()?.to_path_buf());
     }
     hidden
 }
 
-/// Whether a `.qcignore` beside a file or in any directory above it excludes the file. The path is absolute.
+/// Checks whether a `.qcignore` next to a file or in any directory above excludes it. The path is
+/// absolute.
 pub fn is_excluded(file: &Path) -> bool {
     IgnoreRules::new(Path::new("/")).excludes(file, false)
 }
 
-/// Whether a file's name alone is reason enough: dotfiles and unfinished copies.
+/// Checks whether a file is ignored because of its name alone: dotfiles and unfinished copies.
 pub fn is_ignored_file(name: &OsStr) -> bool {
     let name = name.to_string_lossy();
     name.starts_with('.') || SUFFIXES.iter().any(|suffix| name.ends_with(suffix))
 }
 
-/// Directories that hold no work of people, whoever names them: git's, and our own state.
+/// Checks whether a directory belongs to git or qcbus. It is never scanned, even if it is named.
 pub fn is_of_a_tool(path: &Path) -> bool {
     path.file_name()
         .is_some_and(|name| name == ".git" || name == ".qcbus")
@@ -159,7 +161,7 @@ fn is_hidden(path: &Path) -> bool {
     name.is_some_and(|name| name.as_encoded_bytes().starts_with(b"."))
 }
 
-/// People write these by hand.
+/// Maximum size of a rule file in bytes. Rule files are written by hand.
 const MOST_OF_RULES: u64 = 1 << 20;
 
 fn read(directory: &Path) -> Option<Gitignore> {
@@ -174,7 +176,7 @@ fn read(directory: &Path) -> Option<Gitignore> {
     };
     let mut builder = GitignoreBuilder::new(directory);
     for line in String::from_utf8_lossy(&bytes).lines() {
-        // A line that cannot be understood is passed over; the others count.
+        // An invalid line is skipped. The other lines stay valid.
         if let Err(error) = builder.add_line(Some(file.clone()), line) {
             tracing::warn!("{}: {error}", file.display());
         }
@@ -231,7 +233,8 @@ mod tests {
             inside
         };
         assert!(looks_into(".work") && looks_into("other/.work/deep"));
-        // Each hidden directory needs a name of its own; the nearest rule file decides; tools stay out.
+        // Each hidden directory needs its own rule. The nearest rule file decides. Directories of
+        // tools stay excluded.
         assert!(!looks_into(".work/.deeper") && !looks_into(".other/.work"));
         assert!(!looks_into("maps/.work") && !looks_into(".git"));
         assert!(rules.ignores(&root.join(".work/.a.xodr"), false));

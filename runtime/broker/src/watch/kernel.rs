@@ -1,4 +1,4 @@
-//! What the kernel is asked for, and how its events are waited for.
+//! Kernel interface for file events (inotify), and the wait for them.
 
 use std::ffi::{OsStr, OsString};
 use std::io;
@@ -11,13 +11,14 @@ use rustix::event::{EventfdFlags, PollFd, PollFlags, Timespec};
 use rustix::fs::inotify::{self, CreateFlags, ReadFlags, Reader, WatchFlags};
 use rustix::io::Errno;
 
-/// Bytes of events that are taken at once: some hundreds of events.
+/// Size of the event buffer in bytes: a few hundred events.
 const AT_ONCE: usize = 64 * 1024;
 
-/// How long a wait is that cannot be one.
+/// Pause if `poll` fails.
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// What is worth an event. Who only opens or reads a file, as we do ourselves, is not.
+/// Returns the events to watch. Opening or reading a file is not included, because the broker does
+/// this itself.
 fn worth() -> WatchFlags {
     WatchFlags::ONLYDIR
         | WatchFlags::DONT_FOLLOW
@@ -32,49 +33,49 @@ fn worth() -> WatchFlags {
         | WatchFlags::MOVE_SELF
 }
 
-/// An event as the kernel tells it.
+/// An event from the kernel.
 #[derive(Debug)]
 pub struct Told {
     /// Number of the watch.
     pub watch: i32,
-    /// What happened.
+    /// Kind of the event.
     pub what: ReadFlags,
-    /// To what in the directory; `None`: to itself.
+    /// Name of the entry in the directory, or `None` for the directory itself.
     pub name: Option<OsString>,
 }
 
-/// The kernel, which tells of files.
+/// The kernel's event queue (inotify).
 #[derive(Debug)]
 pub struct Kernel(OwnedFd);
 
 impl Kernel {
-    /// Begins to ask for events.
+    /// Opens the event queue.
     ///
     /// # Errors
-    /// When it gives none.
+    /// When the kernel provides none.
     pub fn open() -> io::Result<Kernel> {
         let flags = CreateFlags::CLOEXEC | CreateFlags::NONBLOCK;
         Ok(Kernel(inotify::init(flags)?))
     }
 
-    /// Asks for the events of a directory, and gives the number of the watch.
+    /// Watches a directory and returns the number of the watch.
     ///
     /// # Errors
-    /// What the system says when there is no watch on it.
+    /// The error of the system if the directory cannot be watched.
     pub fn watch(&self, directory: &Path) -> Result<i32, Errno> {
         inotify::add_watch(&self.0, directory, worth())
     }
 
-    /// Asks for them no more.
+    /// Removes a watch.
     pub fn forget(&self, watch: i32) {
-        // The directory may have gone, and its watch with it.
+        // The directory may be gone, together with its watch.
         let _ = inotify::remove_watch(&self.0, watch);
     }
 
-    /// The events that are there now, some hundreds at most.
+    /// Returns the pending events, at most a few hundred.
     ///
     /// # Errors
-    /// What the system says when it gives none that are there.
+    /// The error of the system if the events cannot be read.
     pub fn events(&self) -> io::Result<Vec<Told>> {
         let mut buffer = Box::new_uninit_slice(AT_ONCE);
         let mut reader = Reader::new(&self.0, &mut buffer);
@@ -99,37 +100,37 @@ impl Kernel {
     }
 }
 
-/// Wakes who waits for events.
+/// Wakes the thread that waits for events.
 #[derive(Debug)]
 pub struct Bell(OwnedFd);
 
 impl Bell {
-    /// One that has not rung.
+    /// Creates a bell that has not rung.
     ///
     /// # Errors
-    /// When there is no descriptor left.
+    /// When no file descriptor is available.
     pub fn new() -> io::Result<Bell> {
         let flags = EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK;
         Ok(Bell(rustix::event::eventfd(0, flags)?))
     }
 
-    /// Wakes who waits, or is about to.
+    /// Wakes the waiting thread, or prevents its next wait.
     pub fn ring(&self) {
-        // A bell that has rung too often for one more has been heard.
+        // The write fails only if the counter is full. The bell has rung then.
         let _ = rustix::io::write(&self.0, &1_u64.to_ne_bytes());
     }
 
-    /// Waits until it rings, the kernel has events, or the time is over.
+    /// Waits until the bell rings, the kernel has events, or the time is over.
     pub fn wait(&self, kernel: Option<&Kernel>, rest: Duration) {
         let timeout = Timespec::try_from(rest).unwrap_or_default();
         let mut descriptors = vec![PollFd::new(&self.0, PollFlags::IN)];
         descriptors.extend(kernel.map(|it| PollFd::new(&it.0, PollFlags::IN)));
         match rustix::event::poll(&mut descriptors, Some(&timeout)) {
             Ok(_) | Err(Errno::INTR) => {}
-            // There is no other way to wait; that it does not spin is enough.
+            // No other way to wait is available. The pause prevents a busy loop.
             Err(_) => std::thread::sleep(rest.min(PAUSE)),
         }
-        // Rung or not: what was ordered is looked for anyway.
+        // The result does not matter, because the caller checks for orders anyway.
         let _ = rustix::io::read(&self.0, &mut [0_u8; 8]);
     }
 }

@@ -1,10 +1,10 @@
-//! Watching directories: events from the kernel where they can be had, looking around at
-//! intervals where they cannot, and both with the same outcome.
+//! Watches directories with kernel events where available, and by scanning at intervals elsewhere.
+//! Both have the same result.
 //!
-//! One thread looks, and takes the events itself: the kernel keeps those that wait, as many as it
-//! likes, and not the broker. Every directory is watched by itself and looked through right after, so
-//! that one that has just come is seen as a whole, and one that cannot be watched costs itself.
-//! Symbolic links to directories are never followed.
+//! One thread scans and reads the events itself. Pending events stay in the kernel, up to its
+//! limit, and not in the broker. Every directory is watched separately and scanned immediately
+//! afterwards. Therefore a new directory is seen completely, and a failed watch affects only that
+//! directory. Symbolic links to directories are never followed.
 
 mod dependencies;
 mod due;
@@ -45,13 +45,13 @@ pub(crate) use self::settle::OPEN_QUIET;
 pub use self::settle::Why;
 pub(crate) use self::tree::{Told, Tree, Unwatched, below};
 
-/// Every checkable file below a directory, once. `roots` are all the directories that are looked
-/// at, without symbolic links.
+/// Returns every checkable file below a directory, once. `roots` are all scanned directories,
+/// without symbolic links.
 pub fn scan_directory(directory: &Path, roots: &[PathBuf]) -> Scan {
     scan(directory, roots, &mut IgnoreRules::new(directory))
 }
 
-/// Whether a file below one of the roots is ignored, by its name or a `.qcignore`.
+/// Checks whether a file below one of the roots is ignored because of its name or a `.qcignore`.
 pub fn is_left_alone(roots: &[PathBuf], file: &Path) -> bool {
     let inside = roots.iter().filter(|root| file.starts_with(root));
     let mut ignored = inside
@@ -60,8 +60,8 @@ pub fn is_left_alone(roots: &[PathBuf], file: &Path) -> bool {
     ignored.peek().is_some() && ignored.all(|it| it)
 }
 
-/// Whether a file is one that a look through the roots finds: of a kind that is checked, not
-/// ignored, and not behind a link to a directory.
+/// Checks whether a scan of the roots finds a file: it has a checkable kind, is not ignored, and is
+/// not behind a link to a directory.
 pub fn is_looked_at(roots: &[PathBuf], file: &Path) -> bool {
     FileKind::of_path(file).is_some()
         && roots.iter().any(|root| file.starts_with(root))
@@ -69,54 +69,55 @@ pub fn is_looked_at(roots: &[PathBuf], file: &Path) -> bool {
         && !is_left_alone(roots, file)
 }
 
-/// What the watcher has to say.
+/// Report of the watcher.
 #[derive(Debug)]
 pub enum Seen {
-    /// A file is there and quiet.
+    /// A file exists and has settled.
     Settled(Arc<Path>, Stamp),
-    /// A file was there in the first scan, and may still be written to.
+    /// A file existed in the first scan, and may still be written to.
     Present(Arc<Path>),
-    /// A file is being written to, as it is now, and is not judged until it has settled.
+    /// A file is being written to, with its current stamp. It is judged when it has settled.
     Unfinished(Arc<Path>, Option<Stamp>, Why),
-    /// Something that a verdict depends on has become another. It need not be a file to check.
+    /// A dependency of a verdict has changed. It need not be a checkable file.
     Touched(Arc<Path>, Stamp),
-    /// A file has gone.
+    /// A file was removed.
     Vanished(Arc<Path>),
-    /// Something cannot be looked at; said once, until it can.
+    /// A path is inaccessible. This is reported once until the path is accessible again.
     Unseen(Unseen),
-    /// A watched directory is away, which is said by a notice.
+    /// A watched directory is missing. A notice reports this.
     Away(Unseen),
-    /// What could not be looked at can be, or has gone.
+    /// A path is accessible again, or was removed.
     SeenAgain(PathBuf),
-    /// The first scan of everything is complete.
+    /// The first full scan is complete.
     Scanned,
-    /// How changes are noticed, for `status`.
+    /// Mode of detecting changes, for `status`.
     Mode(String),
-    /// Something for a person.
+    /// A message for the user.
     Notice(String),
 }
 
-/// How to watch.
+/// Options of a watcher.
 #[derive(Debug, Clone)]
 pub struct WatchOptions {
     /// Directories, absolute and without symbolic links.
     pub roots: Vec<PathBuf>,
-    /// Look around this often instead of relying on events.
+    /// Interval of scans that replace events.
     pub poll: Option<Duration>,
-    /// Look around this often even when events arrive, because kernels and file systems lose some.
+    /// Interval of scans in addition to events, because kernels and file systems lose some events.
     pub rescan: Duration,
-    /// How long files must be quiet that are written in place, also once they are closed.
+    /// Time without changes that a file written in place must have, even after it is closed.
     pub settle: Option<Duration>,
 }
 
-/// What a watcher goes on with that takes the place of another. The first look through everything is over then.
+/// State that a watcher takes over from an earlier one. The first full scan is already complete
+/// then.
 #[derive(Debug)]
 pub struct Known {
-    /// The files that were there.
+    /// Files that existed.
     pub files: Vec<Arc<Path>>,
 }
 
-/// A running watcher. It stops when this is dropped.
+/// A running watcher. It stops when this value is dropped.
 #[derive(Debug)]
 pub struct Watcher {
     orders: Sender<Order>,
@@ -140,11 +141,12 @@ impl Drop for Watcher {
 }
 
 impl Watcher {
-    /// Starts watching on a thread of its own; `tell` is called from there, and the lookout sees under that number
-    /// where it waits. `known`: it takes the place of another.
+    /// Starts watching on a separate thread, which calls `tell`. The I/O watchdog monitors the
+    /// thread under the given number. With `known`, the watcher continues the work of an earlier
+    /// one.
     ///
     /// # Errors
-    /// When no thread can be started, or there is no descriptor left to wake it.
+    /// When no thread can be started, or when no file descriptor for waking it is available.
     pub fn start(
         options: WatchOptions,
         (io_watchdog, number): (Arc<IoWatchdog>, u64),
@@ -168,33 +170,35 @@ impl Watcher {
     }
 
     fn order(&self, order: Order) {
-        // The thread only ends when this is dropped.
+        // The thread ends only after this value is dropped, so the receiver exists.
         let _ = self.orders.send(order);
         self.bell.ring();
     }
 
-    /// Keeps an eye on files on which verdicts depend, wherever they are.
-    /// A change since the given stamp is told like any other.
+    /// Monitors dependencies of verdicts, wherever they are. A change since the given stamp is
+    /// reported like any other.
     pub fn depend(&self, files: Vec<(Arc<Path>, Option<Stamp>)>) {
         self.order(Order::Depend(files));
     }
 
-    /// The broker has let go of a file that it found gone. Should it be there again, that is told.
+    /// Removes a file that the broker found missing. If it exists again, this is reported.
     pub fn forget(&self, path: Arc<Path>) {
         self.order(Order::Forget(path));
     }
 
-    /// The broker has heard of a file from somebody else: when it goes, that is told.
+    /// Registers a file that the broker learned about from another source. Its removal is then
+    /// reported.
     pub fn learn(&self, path: Arc<Path>, stamp: Stamp) {
         self.order(Order::Learn(path, stamp));
     }
 
-    /// Somebody asks for a file of which nothing was told: what is there now, or has gone, is told once it is at rest.
+    /// Scans a file that was requested without an earlier report. Its state or removal is reported
+    /// once it has settled.
     pub fn look(&self, path: Arc<Path>) {
         self.order(Order::Look(path));
     }
 
-    /// Lets go of files on which no verdict depends any more.
+    /// Stops monitoring files that no verdict depends on any more.
     pub fn undepend(&self, paths: Vec<Arc<Path>>) {
         self.order(Order::Undepend(paths));
     }

@@ -1,4 +1,5 @@
-//! Which files are open for writing, as `/proc` tells. Of processes of other users only root is told.
+//! Files that are open for writing, according to `/proc`. Only root can see the processes of other
+//! users.
 
 use std::collections::HashSet;
 use std::ffi::OsStr;
@@ -12,15 +13,15 @@ use qcbus_document::FileKind;
 
 use crate::environment::is_simulated;
 
-/// The owner may write: in the mode of a link below `/proc/PID/fd` this says how the file was opened.
+/// Owner write permission. In the mode of a link below `/proc/PID/fd` it means: open for writing.
 const FOR_WRITING: u32 = 0o200;
 
-/// Files that somebody has open for writing, by device and inode.
+/// Device and inode of files that a process has open for writing.
 #[derive(Debug, Default)]
 pub struct OpenFiles(HashSet<(u64, u64)>);
 
 impl OpenFiles {
-    /// Looks at every process. Only files below the roots and those with names of files to check count.
+    /// Examines every process. Only files below the roots and files with checkable names count.
     pub fn look(roots: &[PathBuf]) -> OpenFiles {
         if is_simulated() {
             return OpenFiles::default();
@@ -35,14 +36,14 @@ impl OpenFiles {
         OpenFiles(open.collect())
     }
 
-    /// Whether a file is among them.
+    /// Checks whether a file is among them.
     pub fn contains(&self, path: &Path) -> bool {
         let data = foreign::metadata(path);
         data.is_ok_and(|data| self.0.contains(&(data.dev(), data.ino())))
     }
 }
 
-/// Processes end, and those of others cannot be looked into: both have no entries.
+/// Returns the entries of a directory. An ended process and an inaccessible one have no entries.
 fn entries(directory: &Path) -> impl Iterator<Item = PathBuf> + use<> {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     entries.map(|entry| entry.path())
@@ -60,7 +61,7 @@ fn open_for_writing(link: &Path, is_wanted: impl Fn(&Path) -> bool) -> Option<(u
     if fs::symlink_metadata(link).ok()?.mode() & FOR_WRITING == 0 {
         return None;
     }
-    // The file may lie on a disk that does not answer.
+    // The disk of the file may not answer.
     let data = foreign::access(&target, || fs::metadata(link)).ok()?;
     Some((data.dev(), data.ino()))
 }

@@ -1,4 +1,4 @@
-//! Files that may still be written to: when they are looked at, and what is said of them meanwhile.
+//! Files that may still be written to: the time of their scan, and their reports until then.
 
 use std::path::Path;
 use std::time::Instant;
@@ -12,10 +12,10 @@ use crate::environment::now;
 use crate::stamp::{is_younger, stamp_of};
 
 impl Scanner {
-    /// Tells of files that have settled, and of those that take longer.
+    /// Reports files that have settled, and files that take longer.
     pub(super) fn look_at_what_may_have_settled(&mut self, now: Instant) {
         let stamp = |path: &Path| stamp_of(path).ok().flatten();
-        // One look for all that are due.
+        // Open files are searched once for all due files.
         let (roots, mut open) = (&self.options.roots, None);
         let is_open = |path: &Path| {
             let open = open.get_or_insert_with(|| OpenFiles::look(roots));
@@ -31,9 +31,9 @@ impl Scanner {
         }
     }
 
-    /// Tells of a file, at once or when it has settled.
+    /// Reports a file, immediately or when it has settled.
     pub(super) fn look_if_at_rest(&mut self, path: &Path) {
-        // It may have been closed by now.
+        // The file may have been closed by now.
         self.take_events();
         let stamp = stamp_of(path).ok().flatten();
         let stamp = stamp.filter(|it| self.known.get(path) != Some(it) && self.cares_about(path));
@@ -47,8 +47,8 @@ impl Scanner {
         }
     }
 
-    /// Tells of a file that has not settled that it is there. Otherwise what is remembered of it would be taken back when
-    /// the first look is over. Should it go before it has settled, that is told, too.
+    /// Reports that an unsettled file exists. Otherwise its stored result would be withdrawn after
+    /// the first full scan. If the file is removed before it has settled, this is reported, too.
     pub(super) fn is_there(&mut self, path: &Path) {
         if !self.known.contains_key(path) {
             (self.tell)(Seen::Present(path.into()));
@@ -62,7 +62,7 @@ impl Scanner {
                 && OpenFiles::look(&self.options.roots).contains(path))
     }
 
-    /// Whether a file was open for writing at the start. No event tells of what was written before.
+    /// Checks whether a file was open for writing at the start. Earlier writes cause no event.
     pub(super) fn was_open(&mut self, path: &Path, stamp: Stamp) -> bool {
         if !is_younger(stamp, self.settling.open_rest()) {
             return false;

@@ -1,4 +1,4 @@
-//! The watched directories themselves: they may go, come back, and be replaced by others.
+//! The watched directories themselves: they may be removed, come back, or be replaced by others.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -15,24 +15,25 @@ use super::scanner::Scanner;
 /// Device and inode of a directory.
 type Identity = (u64, u64);
 
-/// What is known of the watched directories.
+/// State of the watched directories.
 #[derive(Debug, Default)]
 pub struct Roots {
-    /// Those that are away.
+    /// Missing watched directories.
     lost: BTreeSet<PathBuf>,
-    /// Which directory each was when it was last there.
+    /// Identity of each directory when it last existed.
     seen: BTreeMap<PathBuf, Identity>,
 }
 
 impl Roots {
-    /// What lies in a watched directory that has gone as a whole is kept until it is back.
+    /// Checks whether a path is in a missing watched directory. Its results are kept until it is
+    /// back.
     pub fn is_away(&self, path: &Path) -> bool {
         !self.lost.is_empty() && self.lost.iter().any(|root| path.starts_with(root))
     }
 }
 
 impl Scanner {
-    /// Looks whether each watched directory is there, and is the one that it was.
+    /// Checks whether each watched directory exists and is the same as before.
     pub fn check_roots(&mut self) {
         for root in self.options.roots.clone() {
             self.check_root(&root);
@@ -55,7 +56,8 @@ impl Scanner {
         if was_lost {
             (self.tell)(Seen::SeenAgain(root.to_path_buf()));
         }
-        // One that was made anew may have the number of the former.
+        // A new directory may have the inode number of the previous one, so the watch is checked as
+        // well.
         let is_watched = self.tree.contains(root) || self.due.covers(root);
         let what = match before {
             _ if was_lost => "is back",
@@ -95,7 +97,7 @@ impl Scanner {
         }
     }
 
-    /// Whether something is not there because its watched directory is not.
+    /// Checks whether a path is missing because its watched directory is missing.
     pub fn is_root_gone(&mut self, path: &Path) -> bool {
         let inside = |root: &&PathBuf| path.starts_with(root);
         let roots: Vec<PathBuf> = self.options.roots.iter().filter(inside).cloned().collect();
@@ -108,17 +110,18 @@ impl Scanner {
     }
 }
 
-/// What has the name of a watched directory.
+/// State of the path of a watched directory.
 enum Root {
     Here(Identity),
-    /// No directory that can be looked at; what has become of it.
+    /// The directory is missing or inaccessible, with the reason.
     Away(String),
 }
 
 fn look(root: &Path) -> Root {
     let how = match foreign::symlink_metadata(root) {
         Ok(data) if data.is_dir() => return Root::Here((data.dev(), data.ino())),
-        // It would have been resolved when the broker started; the kernel tells nothing through it.
+        // A link would have been resolved at the start of the broker. The kernel reports no events
+        // through it.
         Ok(data) if data.is_symlink() => {
             "has become a symbolic link, which only a broker that starts anew follows".to_owned()
         }
@@ -132,7 +135,7 @@ fn look(root: &Path) -> Root {
     Root::Away(how)
 }
 
-/// Whether what lies there is the place where something was mounted.
+/// Checks whether the path is now the empty mount point of an unmounted file system.
 fn is_unmounted(root: &Path, before: Identity, now: Identity) -> bool {
     let is_empty = || foreign::access(root, || Ok(std::fs::read_dir(root)?.next().is_none()));
     before.0 != now.0 && is_empty().unwrap_or(false)

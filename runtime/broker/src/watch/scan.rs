@@ -1,4 +1,4 @@
-//! Looking through directories.
+//! Scanning of directories.
 
 use std::collections::VecDeque;
 use std::ffi::OsStr;
@@ -17,32 +17,32 @@ use super::ignore::{IgnoreRules, ignores, passes_over};
 use crate::core::Stamp;
 use crate::stamp::from_statat;
 
-/// Directories in each other that are looked into, from a root on: more than people make, and few
-/// enough for a path to name what lies there.
+/// Maximum depth of scanned directories below a root. It exceeds real directory trees, but keeps
+/// paths short enough to name the files there.
 pub const DEEPEST: usize = 128;
 
-/// Directories that are looked into in all.
+/// Maximum number of scanned directories in total.
 pub const MOST_DIRECTORIES: usize = 500_000;
 
-/// Things that cannot be looked at and are named, each by itself.
+/// Maximum number of inaccessible paths that are listed individually.
 pub const MOST_UNSEEN: usize = 1_000;
 
-/// What is said in place of all others.
+/// Text that represents all further inaccessible paths.
 pub const MORE_UNSEEN: &str =
     "more than a thousand things below cannot be looked at; the first of them are named";
 
-/// What a scan saw.
+/// Result of a scan.
 #[derive(Debug, Default)]
 pub struct Scan {
-    /// Files to check, in the order of their paths; a symbolic link to a file is one.
+    /// Files to check, sorted by path. A symbolic link to a file counts as one.
     pub files: Vec<(PathBuf, Stamp)>,
-    /// What could not be looked at; of too many the first, and one that stands for the rest.
+    /// Inaccessible paths. If there are too many, one entry represents the rest.
     pub unseen: Vec<Unseen>,
 }
 
-/// Every checkable file below `directory`. Symbolic links to directories are not followed: one
-/// that leads to where is looked anyway adds nothing, any other is said to be unseen. `roots` are
-/// all the directories that are looked at.
+/// Returns every checkable file below `directory`. Symbolic links to directories are not followed.
+/// A link to a directory that is scanned anyway is ignored; any other link is reported as
+/// inaccessible. `roots` are all scanned directories.
 pub fn scan(directory: &Path, roots: &[PathBuf], rules: &mut IgnoreRules) -> Scan {
     let mut scan = Scan::default();
     let mut directories = VecDeque::from([directory.to_path_buf()]);
@@ -71,7 +71,8 @@ pub fn scan(directory: &Path, roots: &[PathBuf], rules: &mut IgnoreRules) -> Sca
     scan
 }
 
-/// Why a directory is not looked into that could be; `number` is how many there are with it.
+/// Returns why a directory exceeds the limits and is not scanned. `number` is the count including
+/// it.
 pub fn is_too_much(directory: &Path, roots: &[PathBuf], number: usize) -> Option<String> {
     let inside = roots
         .iter()
@@ -90,8 +91,8 @@ pub fn is_too_much(directory: &Path, roots: &[PathBuf], number: usize) -> Option
     }
 }
 
-/// What is to be said of a directory that cannot be read. One that was removed since its name was
-/// read, or has become a link, holds nothing.
+/// Returns the message about an unreadable directory. Returns `None` if it was removed since its
+/// name was read, or has become a link.
 pub fn cannot_look_into(error: &io::Error) -> Option<String> {
     let is_gone = matches!(
         error.kind(),
@@ -101,22 +102,23 @@ pub fn cannot_look_into(error: &io::Error) -> Option<String> {
     (!is_gone && !is_link).then(|| format!("cannot look into this directory: {error}"))
 }
 
-/// What lies in one directory.
+/// Entries of one directory.
 #[derive(Debug, Default)]
 pub struct Listing {
-    /// Files to check, in the order of their names.
+    /// Files to check, sorted by name.
     pub files: Vec<(PathBuf, Stamp)>,
-    /// Symbolic links whose names promise a file to check, whatever lies behind them.
+    /// Symbolic links with names of checkable files, whatever their targets are.
     pub links: Vec<PathBuf>,
-    /// Directories to look into, also those that a `.qcignore` excludes: others may depend on files there.
+    /// Directories to scan, including those that a `.qcignore` excludes: other files may depend on
+    /// files there.
     pub directories: Vec<PathBuf>,
-    /// What could not be looked at.
+    /// Inaccessible paths.
     pub unseen: Vec<Unseen>,
-    /// Why there may be more.
+    /// Error because of which the listing may be incomplete.
     pub broken: Option<io::Error>,
 }
 
-/// Looks through one directory, and through none to which its path has become a link.
+/// Lists one directory. Does not follow a link that has replaced a part of its path.
 pub fn list(directory: &Path, roots: &[PathBuf], rules: &mut [IgnoreRules]) -> Listing {
     let mut listing = Listing::default();
     let read = foreign::access(directory, || {
@@ -152,7 +154,7 @@ impl Listing {
             let path = directory.join(name);
             let is_checkable = FileKind::of_path(&path).is_some();
             match entry.file_type() {
-                // Most entries of most directories; nothing more is asked about them.
+                // Most entries are such files, so they need no further system call.
                 FileType::RegularFile if !is_checkable => {}
                 FileType::RegularFile => {
                     let data = foreign::access(&path, || {
@@ -163,7 +165,7 @@ impl Listing {
                         Ok(data) if FileType::from_raw_mode(data.st_mode).is_file() => {
                             self.file(path, from_statat(&data), rules);
                         }
-                        // It has become another thing since.
+                        // The file type has changed since the entry was read.
                         _ => self.other(path, is_checkable, roots, rules),
                     }
                 }
@@ -185,7 +187,7 @@ impl Listing {
         }
     }
 
-    /// A link, or something of which only a look at it tells what it is.
+    /// Handles a link, or an entry with a type that only a lookup can determine.
     fn other(
         &mut self,
         path: PathBuf,
@@ -193,7 +195,7 @@ impl Listing {
         roots: &[PathBuf],
         rules: &mut [IgnoreRules],
     ) {
-        // What ends in a slash in a `.qcignore` is meant for a directory behind a link, too.
+        // A pattern with a trailing slash in a `.qcignore` also applies to a link to a directory.
         if ignores(rules, &path, false) || ignores(rules, &path, true) {
             return;
         }

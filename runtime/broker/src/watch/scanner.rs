@@ -1,4 +1,4 @@
-//! The thread that looks: what it knows of every file, and what it tells.
+//! Scanner thread: the known state of every file, and the reports of changes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Bound;
@@ -24,35 +24,35 @@ use super::{Known, Order, Seen, WatchOptions};
 use crate::core::Stamp;
 use crate::environment::{Bell, Receiver, now, step};
 
-/// How long directories are looked through before events and orders have their turn.
+/// Maximum time of scanning before events and orders are handled.
 const SLICE: Duration = Duration::from_millis(20);
 
-/// Links behind which is looked in every interval; of more, each has its turn.
+/// Maximum number of link targets checked in one interval. Others are checked in later intervals.
 const LINKS_AT_ONCE: usize = 5_000;
 
 pub(super) struct Scanner {
     pub options: WatchOptions,
     pub tell: Box<dyn FnMut(Seen) + Send>,
     pub rules: Vec<IgnoreRules>,
-    /// What was last said of every file that is there.
+    /// Last reported stamp of every existing file.
     pub known: BTreeMap<Arc<Path>, Stamp>,
-    /// Symbolic links whose names promise a file: no event tells of what happens behind them.
+    /// Symbolic links with names of checkable files. Changes of their targets cause no event.
     pub links: BTreeSet<PathBuf>,
-    /// The last of them that was looked behind.
+    /// Last link whose target was checked.
     last_link: Option<PathBuf>,
-    /// What could not be looked at, and why; it has been said.
+    /// Inaccessible paths with the reported reasons.
     pub unseen: BTreeMap<PathBuf, String>,
-    /// There is more of it than is said.
+    /// Whether there are more of them than were reported.
     is_more_unseen: bool,
     pub settling: Settling,
-    /// What was open for writing when the first look began to need that.
+    /// Files open for writing, as found when the first full scan needed them for the first time.
     pub open_at_start: Option<OpenFiles>,
     pub dependencies: Dependencies,
     pub roots: Roots,
     pub tree: Tree,
     pub due: Due,
     pub polling: super::events::Polling,
-    /// Another has looked through everything before.
+    /// Whether an earlier watcher has already completed a full scan.
     goes_on: bool,
 }
 
@@ -83,7 +83,8 @@ impl Scanner {
         }
     }
 
-    /// Takes the place of another. What it said last of each file is not known, and is said again.
+    /// Continues the work of an earlier watcher. Its reported stamps are unknown, so files are
+    /// reported again.
     pub fn go_on_with(&mut self, known: Known) {
         let files = known.files.into_iter();
         self.known = files.map(|path| (path, Stamp::default())).collect();
@@ -110,7 +111,7 @@ impl Scanner {
         }
     }
 
-    /// What no event tells of.
+    /// Scans all paths without events.
     fn look_around(&mut self) {
         self.check_roots();
         self.poll_what_is_not_watched();
@@ -118,7 +119,7 @@ impl Scanner {
         self.look_behind_links();
     }
 
-    /// `false`: it is over.
+    /// Handles all pending orders. Returns `false` when the thread must stop.
     fn take_orders(&mut self, inbox: &Receiver<Order>) -> bool {
         loop {
             match inbox.try_recv() {
@@ -133,7 +134,7 @@ impl Scanner {
         }
     }
 
-    /// Waits for events, orders, or the time to look again.
+    /// Waits for events, orders, or the time of the next scan.
     fn wait(&self, bell: &Bell, next_look: Instant) {
         let begin = now();
         let times = [self.settling.next_due(), self.due.next_pass()];
@@ -151,7 +152,7 @@ impl Scanner {
         ignores(&mut self.rules, path, is_dir)
     }
 
-    /// Compares a path with what was last said of it, and says what is new.
+    /// Compares a path with its last reported state, and reports changes.
     pub fn look(&mut self, path: &Path) {
         if self.roots.is_away(path) {
             return;
@@ -167,7 +168,7 @@ impl Scanner {
                 self.links.insert(path.to_path_buf());
             }
             Ok(_) => drop(self.links.remove(path)),
-            // It does not answer: it is what it was.
+            // The system does not answer, so the path counts as unchanged.
             Err(_) => {}
         }
         let changed = self.dependencies.look(path);
@@ -180,7 +181,7 @@ impl Scanner {
                 (self.tell)(Seen::Settled(path, stamp));
                 return;
             }
-            // One that cannot be looked at may still be there.
+            // An inaccessible file may still exist.
             FileLookup::Hidden(why) => return self.unseen(path, why),
             FileLookup::NoFile(what)
                 if is_checkable || (what.hides_more() && !self.ignored(path, true)) =>
@@ -201,7 +202,7 @@ impl Scanner {
         }
     }
 
-    /// Looks at a file for somebody who has heard of it elsewhere; a directory is looked through.
+    /// Scans a file that another source has reported. A directory is queued for a scan.
     pub fn look_again(&mut self, path: &Path) {
         if self.tree.contains(path) {
             self.due.push(path);
@@ -209,7 +210,8 @@ impl Scanner {
         self.look_if_at_rest(path);
     }
 
-    /// It may have been one before somebody had it ignored, and others may depend on it.
+    /// Handles a file that is not checkable. It may have been before, and verdicts may depend on
+    /// it.
     fn no_file_to_check(&mut self, path: &Path, stamp: Stamp) {
         self.seen_again(path);
         if self.known.remove(path).is_some() {
@@ -230,7 +232,7 @@ impl Scanner {
         if stamp.is_none() && self.roots.is_away(&path) {
             return;
         }
-        // It is told when it has settled.
+        // The change is reported when the file has settled.
         if stamp.is_some() && self.settling.is_pending(&path) {
             return;
         }
@@ -240,14 +242,15 @@ impl Scanner {
         });
     }
 
-    /// The broker found a file gone, of which no event told, and knows nothing of it any more.
+    /// Removes a file that the broker found missing without an event. The broker has already
+    /// removed it.
     pub fn forget(&mut self, path: &Path) {
         if self.known.remove(path).is_some() {
             self.look_if_at_rest(path);
         }
     }
 
-    /// What was said of the files below may not count any more: the next look says it again.
+    /// Resets the reported state of the files below a directory. The next scan reports them again.
     pub fn tell_again_below(&mut self, directory: &Path) {
         let below: Vec<Arc<Path>> = below(&self.known, directory)
             .map(|(path, _)| path.clone())
@@ -257,7 +260,7 @@ impl Scanner {
         }
     }
 
-    /// Says that something cannot be looked at, once; of too many things no more than the first.
+    /// Reports an inaccessible path once. If there are too many, only the first ones are reported.
     pub fn unseen(&mut self, path: &Path, why: String) {
         if self.unseen.get(path) == Some(&why) {
             return;
@@ -279,7 +282,7 @@ impl Scanner {
         }
     }
 
-    /// After a look through everything with which all that is unseen has been named.
+    /// Withdraws the report about further paths after a full scan that lists all inaccessible ones.
     pub fn is_all_unseen_said(&mut self) {
         if self.is_more_unseen && self.unseen.len() < MOST_UNSEEN {
             self.is_more_unseen = false;
@@ -304,7 +307,7 @@ impl Scanner {
         }
     }
 
-    /// What lies behind a link changes without an event of the link.
+    /// Checks the targets of links, because their changes cause no event for the link.
     pub fn look_behind_links(&mut self) {
         let begin = self
             .last_link
@@ -318,7 +321,7 @@ impl Scanner {
         for path in turn {
             match look_at(&path, &self.options.roots) {
                 FileLookup::File(stamp) if self.known.get(path.as_path()) == Some(&stamp) => {}
-                // It may still be written to.
+                // The file may still be written to.
                 FileLookup::File(stamp) => self.settling.seen(&path, stamp, now()),
                 _ => self.look(&path),
             }

@@ -1,10 +1,12 @@
-//! When is a file finished? After a close or a rename into place at once; after anything else when it has been
-//! quiet for a while, neither its size nor its time has moved, and nobody has it open for writing.
+//! Detection of finished files. A file is finished immediately after a close or a rename into
+//! place. After any other change it must be quiet for a while: same size and time, and no process
+//! has it open for writing.
 //!
-//! An event tells of a write, and another of the close after it. Of files without events `/proc` tells who has them
-//! open, as far as this user may see it. A lease would tell, too, but while we had it a writer that opens the file
-//! without blocking, as FTP servers do, would be refused. Nobody is waited for longer than [`OPEN_QUIET`] without a
-//! change: a process that keeps a file open for ever does not hide it.
+//! Events report a write and the following close. For files without events, `/proc` shows the
+//! processes that have them open, as far as this user may see it. A lease would also work. While it
+//! is held, a writer that opens the file without blocking, as FTP servers do, would be refused. The
+//! maximum wait without a change is [`OPEN_QUIET`]: a process that keeps a file open for ever does
+//! not hide it.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,44 +14,44 @@ use std::time::{Duration, Instant};
 
 use crate::core::Stamp;
 
-/// Files that have been touched and may still be written to.
+/// Files that were touched and may still be written to.
 #[derive(Debug, Default)]
 pub struct Settling {
-    /// How long files must be quiet, also closed ones, if somebody asks for that.
+    /// Configured quiet time. It also applies to closed files.
     asked: Option<Duration>,
-    /// Ordered, so that what is told has the same order every time.
+    /// Pending files. The map is sorted, so that the order of reports is stable.
     pending: BTreeMap<PathBuf, Pending>,
 }
 
 #[derive(Debug)]
 struct Pending {
-    /// When it was first touched.
+    /// Time of the first change.
     since: Instant,
-    /// When it last changed.
+    /// Time of the last change.
     changed: Instant,
     due: Instant,
     stamp: Option<Stamp>,
-    /// It was written to and not closed since.
+    /// Whether the file was written to and not closed since then.
     is_open: bool,
-    /// It was said that it waits.
+    /// Whether the wait was reported.
     is_said: bool,
 }
 
-/// How long a file must be quiet, if nobody asks for another time.
+/// Default time for which a file must be quiet.
 pub const QUIET: Duration = Duration::from_millis(250);
 
-/// How long a file must be quiet that somebody has open for writing.
+/// Time for which a file must be quiet that a process has open for writing.
 pub const OPEN_QUIET: Duration = Duration::from_secs(60);
 
-/// How often it is asked who has a file open of whose close no event may tell.
+/// Interval of checks for processes that have a file open, if its close may cause no event.
 const ASK_AGAIN: Duration = Duration::from_secs(1);
 
-/// Why a file is not judged yet.
+/// Reason why a file is not judged yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Why {
-    /// It is open for writing. So long it must be quiet at most.
+    /// The file is open for writing. The value is the maximum quiet time.
     Open(Duration),
-    /// It has changed, and must be quiet for so long.
+    /// The file has changed and must be quiet for this time.
     Young(Duration),
 }
 
@@ -70,17 +72,17 @@ impl std::fmt::Display for Why {
     }
 }
 
-/// What a look at the files that are due has found.
+/// Result of a check of the due files.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Looked {
-    /// Those that have kept still.
+    /// Files that have settled.
     pub settled: Vec<PathBuf>,
-    /// Those that have to wait longer than usual, each once, as they are now.
+    /// Files that wait longer than usual, each reported once, with their current stamps.
     pub waiting: Vec<(PathBuf, Option<Stamp>, Why)>,
 }
 
 impl Settling {
-    /// `asked`: how long files must be quiet, also closed ones.
+    /// Creates an empty set. `asked` is the quiet time, also for closed files.
     pub fn new(asked: Option<Duration>) -> Settling {
         Settling {
             asked,
@@ -88,28 +90,29 @@ impl Settling {
         }
     }
 
-    /// How long a file must be quiet.
+    /// Returns the time for which a file must be quiet.
     pub fn rest(&self) -> Duration {
         self.asked.unwrap_or(QUIET)
     }
 
-    /// How long one that is open for writing must be quiet.
+    /// Returns the time for which a file that is open for writing must be quiet.
     pub fn open_rest(&self) -> Duration {
         self.rest().max(OPEN_QUIET)
     }
 
-    /// The file was touched in a way that does not say that it is finished.
+    /// Records a change that does not show whether the file is finished.
     pub fn touched(&mut self, path: &Path, stamp: Option<Stamp>, now: Instant) {
         let is_open = self.pending.get(path).is_some_and(|it| it.is_open);
         self.put(path, stamp, is_open, now);
     }
 
-    /// The file was written to: whoever did that closes it.
+    /// Records a write. The writer must still close the file.
     pub fn written(&mut self, path: &Path, stamp: Option<Stamp>, now: Instant) {
         self.put(path, stamp, true, now);
     }
 
-    /// The file was closed after it was open for writing. `false`: it is finished.
+    /// Records the close of a file that was open for writing. Returns `false` if the file is
+    /// finished.
     pub fn closed(&mut self, path: &Path, stamp: Option<Stamp>, now: Instant) -> bool {
         if self.asked.is_none() {
             self.done(path);
@@ -137,8 +140,8 @@ impl Settling {
         self.pending.insert(path.to_path_buf(), pending);
     }
 
-    /// The file was seen in passing, which may happen more often than every quiet time: only a
-    /// change starts its quiet time anew.
+    /// Records a stamp from a scan. Scans may be more frequent than the quiet time, so only a
+    /// change restarts the quiet time.
     pub fn seen(&mut self, path: &Path, stamp: Stamp, now: Instant) {
         let same = |pending: &Pending| pending.stamp == Some(stamp);
         if !self.pending.get(path).is_some_and(same) {
@@ -146,17 +149,17 @@ impl Settling {
         }
     }
 
-    /// The file is finished or gone: nothing to wait for.
+    /// Removes a file that is finished or gone.
     pub fn done(&mut self, path: &Path) {
         self.pending.remove(path);
     }
 
-    /// Whether the file may still be written to.
+    /// Checks whether the file may still be written to.
     pub fn is_pending(&self, path: &Path) -> bool {
         self.pending.contains_key(path)
     }
 
-    /// The close of a file may be among events that were lost.
+    /// Treats all files as possibly closed, because the lost events may include their close.
     pub fn events_were_lost(&mut self, now: Instant) {
         let due = now + self.rest();
         for pending in self.pending.values_mut().filter(|it| it.is_open) {
@@ -164,14 +167,14 @@ impl Settling {
         }
     }
 
-    /// When to look next.
+    /// Returns the time of the next check.
     pub fn next_due(&self) -> Option<Instant> {
         let times = self.pending.values().map(Pending::next_look);
         times.min()
     }
 
-    /// Looks at the files that are due. Those that have kept still are settled, those that moved meanwhile wait again,
-    /// and so do those that `is_open` says are open for writing.
+    /// Checks the due files. Unchanged files have settled. Files that have changed wait again, as
+    /// well as files that `is_open` reports as open for writing.
     pub fn look(
         &mut self,
         now: Instant,
@@ -213,7 +216,7 @@ impl Settling {
 }
 
 impl Pending {
-    /// When it is due, or is to be said to wait.
+    /// Returns the time at which the file is due, or at which its wait must be reported.
     fn next_look(&self) -> Instant {
         if self.is_said {
             return self.due;
@@ -239,7 +242,7 @@ mod tests {
         Path::new("/a.xodr")
     }
 
-    /// What a look finds at a file of this size, which is open or not.
+    /// Returns the result of a check for a file of this size, which may be open.
     fn look(settling: &mut Settling, now: Instant, size: u64, is_open: bool) -> Looked {
         settling.look(now, |_| Some(stamp(size)), |_| is_open)
     }
@@ -286,7 +289,7 @@ mod tests {
         assert_eq!((looked.settled.len(), looked.waiting), (0, vec![open]));
         let before = start + OPEN_QUIET - QUIET;
         assert_eq!(look(&mut settling, before, 1, false), Looked::default());
-        // Attributes that change tell of no close.
+        // A change of attributes does not show a close.
         settling.touched(path(), Some(stamp(1)), before);
         let looked = look(&mut settling, start + OPEN_QUIET, 1, false);
         assert_eq!(looked, Looked::default());

@@ -1,4 +1,4 @@
-//! The looker over real directories, without its thread: what happens, and what it tells.
+//! The scanner on real directories, without its thread: changes of files and the resulting reports.
 
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use super::scanner::Scanner;
 use super::settle::QUIET;
 use super::{Seen, WatchOptions};
 
-/// A looker around one directory, and what it says.
+/// Creates a scanner for one directory, and the receiver of its reports.
 fn scanner(root: &Path) -> (Scanner, Receiver<Seen>) {
     let (tell, told) = channel();
     let options = WatchOptions {
@@ -25,14 +25,14 @@ fn scanner(root: &Path) -> (Scanner, Receiver<Seen>) {
     (Scanner::new(options, tell), told)
 }
 
-/// A directory without links in its path.
+/// Creates a directory without links in its path.
 fn farm() -> (tempfile::TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let root = dir.path().canonicalize().unwrap();
     (dir, root)
 }
 
-/// What was told, in words, with paths below `root`.
+/// Returns the reports as text, with paths below `root`.
 fn words(root: &Path, told: &Receiver<Seen>) -> Vec<String> {
     let name = |path: &Path| path.strip_prefix(root).unwrap().display().to_string();
     let word = |seen| match seen {
@@ -48,7 +48,7 @@ fn words(root: &Path, told: &Receiver<Seen>) -> Vec<String> {
     seen.map(word).collect()
 }
 
-/// What has been touched settles.
+/// Lets all touched files settle.
 fn settle(scanner: &mut Scanner) {
     let later = Instant::now() + QUIET * 2;
     scanner.look_at_what_may_have_settled(later);
@@ -99,7 +99,7 @@ fn what_cannot_be_looked_at_is_said_once_and_when_it_can_be() {
     symlink(&outside, root.join("maps")).unwrap();
     symlink(root.join("loop"), root.join("loop")).unwrap();
     symlink("nowhere", root.join("a.xodr")).unwrap();
-    // Nobody misses these.
+    // The scanner reports none of the following links.
     symlink("nowhere", root.join("readme")).unwrap();
     std::fs::create_dir(root.join("known")).unwrap();
     symlink(root.join("known"), root.join("known_too")).unwrap();
@@ -175,7 +175,7 @@ fn a_file_that_cannot_be_looked_at_has_not_gone() {
     std::fs::write(below.join("a.xodr"), "").unwrap();
     let (mut scanner, told) = scanner(dir.path());
     scanner.look(&below.join("a.xodr"));
-    // Root may look into every directory, but through a link to itself nobody sees anything.
+    // Root may read every directory, but a link to itself cannot be followed by anyone.
     std::fs::rename(&below, &aside).unwrap();
     symlink(&below, &below).unwrap();
     scanner.scan_all(false);
@@ -220,7 +220,7 @@ fn what_the_broker_found_gone_is_told_again_if_it_is_there() {
     std::fs::write(&file, "one").unwrap();
     scanner.look(&file);
     assert_eq!(words(&root, &told), ["settled a.xodr"]);
-    // It was away for a moment in which the broker tried to read it.
+    // The file was away for a moment while the broker tried to read it.
     scanner.forget(&file);
     let may_be_written_to = ["present a.xodr"];
     assert_eq!(words(&root, &told), may_be_written_to);
@@ -257,7 +257,7 @@ fn whoever_asks_for_another_look_is_told_what_is_there_or_has_gone() {
     scanner.scan_all(true);
     settle(&mut scanner);
     words(&root, &told);
-    // It was away and came back between two events.
+    // The file was away and came back between two events.
     scanner.look(&path);
     assert_eq!(words(&root, &told), ["settled a.xodr"]);
     std::fs::remove_file(&path).unwrap();

@@ -1,5 +1,5 @@
-//! Looking through directories, one at a time: what is new in one, what has gone, and which others
-//! are to be looked through after it.
+//! Scans directories one at a time: finds new and removed entries in a directory, and queues
+//! further directories.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -16,25 +16,25 @@ use crate::core::Stamp;
 use crate::environment::{now, step};
 use crate::stamp::is_younger;
 
-/// How a directory is looked through.
+/// Mode of scanning a directory.
 #[derive(Debug, Clone, Copy)]
 struct How {
-    /// With every directory in it, not with those alone that are not known yet.
+    /// Whether all subdirectories are scanned, not only those that are not known yet.
     whole: bool,
-    /// Nothing was looked at before.
+    /// Whether this is the first full scan.
     first: bool,
 }
 
 impl Scanner {
-    /// Begins to look through everything, because events may have been lost.
+    /// Starts a full scan, because events may have been lost.
     pub fn begin_pass(&mut self, first: bool) {
-        // Those of rule files, too.
+        // The lost events may include changes of rule files.
         self.rules.iter_mut().for_each(IgnoreRules::forget);
         self.begin_to_watch_again();
         self.due.begin_pass(&self.options.roots, first, now());
     }
 
-    /// Looks through directories whose turn it is, for as long as `slice`.
+    /// Scans queued directories for the duration of `slice`.
     pub fn look_through_what_is_due(&mut self, slice: Duration) {
         let begin = now();
         while let Some(turn) = self.due.next() {
@@ -62,7 +62,7 @@ impl Scanner {
         }
     }
 
-    /// Looks through everything at once.
+    /// Scans all directories immediately.
     #[cfg(test)]
     pub fn scan_all(&mut self, first: bool) {
         self.check_roots();
@@ -72,7 +72,7 @@ impl Scanner {
         }
     }
 
-    /// What lies in no directory that was looked through.
+    /// Ends a full scan: scans the known paths that are in no scanned directory.
     fn end_pass(&mut self) {
         let outside = |path: &Path| path.parent().is_none_or(|it| !self.tree.contains(it));
         let known = self.known.keys().map(|it| &**it);
@@ -91,7 +91,7 @@ impl Scanner {
         self.due.pass_at(now() + self.pass_interval());
     }
 
-    /// Whether a file is another than the one of which something was said.
+    /// Checks whether a file differs from its last reported state.
     fn is_changed(&self, path: &Path) -> bool {
         let now = crate::stamp::stamp_of(path).ok().flatten();
         now.is_none() || self.known.get(path).copied() != now
@@ -105,7 +105,7 @@ impl Scanner {
         if let Some(why) = is_too_much(directory, &self.options.roots, number) {
             return self.unseen(directory, why);
         }
-        // First the watch, then the look: what comes in between is told, if twice.
+        // The watch is added before the scan, so a change in between is reported, possibly twice.
         if matches!(self.watch_directory(directory), Err(Unwatched::Gone)) {
             return self.gone(directory);
         }
@@ -144,7 +144,7 @@ impl Scanner {
         }
     }
 
-    /// What was in a directory and is not in its listing.
+    /// Handles entries that were in a directory and are missing in its listing.
     fn drop_what_is_gone(&mut self, directory: &Path, found: &Listing) {
         let files = found.files.iter().map(|(path, _)| path.as_path());
         let directories = found.directories.iter().map(PathBuf::as_path);
@@ -195,7 +195,7 @@ impl Scanner {
         self.settling.seen(path, stamp, now());
     }
 
-    /// A directory went as a whole.
+    /// Handles the removal of a whole directory.
     pub fn gone(&mut self, directory: &Path) {
         if self.is_root_gone(directory) {
             return;
@@ -208,7 +208,7 @@ impl Scanner {
         }
     }
 
-    /// Looks again at all of which something was said, at a path and below it.
+    /// Scans again all reported paths at and below a path.
     fn look_below(&mut self, path: &Path) {
         let known = below(&self.known, path).map(|(path, _)| path.to_path_buf());
         let unseen = below(&self.unseen, path).map(|(path, _)| path.clone());
@@ -232,7 +232,7 @@ impl Scanner {
     }
 
     fn look_at_dependency(&mut self, path: &Path) {
-        // What is checked itself is looked at as such.
+        // A checked file is scanned as such.
         if !self.known.contains_key(path)
             && let Some(changed) = self.dependencies.look(path)
         {

@@ -1,8 +1,8 @@
-//! The directories that are looked at, each with the kernel's watch on it.
+//! Scanned directories with their kernel watches.
 //!
-//! The kernel watches single directories. Here each one is asked for by itself, before it is looked
-//! through: so nothing falls between the look and the watch, and what cannot be watched costs that
-//! directory and no other. A crate that watches trees does both in the other order, or as a whole.
+//! The kernel watches single directories. Each one is watched separately before it is scanned.
+//! Therefore no change is lost between watch and scan, and a failed watch affects only its
+//! directory. Crates that watch trees use the opposite order, or watch a tree as a whole.
 
 use std::borrow::Borrow;
 use std::collections::{BTreeMap, HashMap};
@@ -19,82 +19,82 @@ use crate::environment::Kernel;
 
 pub use super::kernel::Told;
 
-/// Why a directory has no watch.
+/// Reason why a directory has no watch.
 #[derive(Debug)]
 pub enum Unwatched {
-    /// It is not there any more, or no directory.
+    /// The path does not exist any more, or is no directory.
     Gone,
-    /// The kernel gives no more watches to this user.
+    /// The kernel's limit of watches for this user is reached.
     NoneLeft,
-    /// It may not be read.
+    /// The directory is not readable.
     Closed,
-    /// Whatever else the system says.
+    /// Any other error of the system.
     Refused(io::Error),
 }
 
-/// The directories that are looked at.
+/// The scanned directories.
 #[derive(Debug, Default)]
 pub struct Tree {
     kernel: Option<Kernel>,
-    /// Each with the number of its watch, if it has one.
+    /// Directories with the numbers of their watches, if they have one.
     directories: BTreeMap<Arc<Path>, Option<i32>>,
-    /// A directory may have several paths, by mounts.
+    /// Paths by watch. A directory may have several paths because of mounts.
     watches: HashMap<i32, Vec<Arc<Path>>>,
-    /// How many have no watch.
+    /// Number of directories without a watch.
     unwatched: usize,
 }
 
 impl Tree {
-    /// Begins to ask the kernel for events.
+    /// Opens the kernel's event queue.
     ///
     /// # Errors
-    /// When it gives none.
+    /// When the kernel provides none.
     pub fn open(&mut self) -> io::Result<()> {
         self.kernel = Some(Kernel::open()?);
         Ok(())
     }
 
-    /// Whether the kernel is asked at all.
+    /// Checks whether the event queue is open.
     pub fn is_open(&self) -> bool {
         self.kernel.is_some()
     }
 
-    /// Who is asked.
+    /// Returns the event queue.
     pub fn kernel(&self) -> Option<&Kernel> {
         self.kernel.as_ref()
     }
 
-    /// How many directories there are, and how many of them have no watch.
+    /// Returns the number of directories, and the number of those without a watch.
     pub fn counts(&self) -> (usize, usize) {
         (self.directories.len(), self.unwatched)
     }
 
-    /// Whether a directory is one of them.
+    /// Checks whether a directory is one of them.
     pub fn contains(&self, directory: &Path) -> bool {
         self.directories.contains_key(directory)
     }
 
-    /// Whether the kernel tells what happens in a directory.
+    /// Checks whether the kernel reports events in a directory.
     pub fn tells_of(&self, directory: &Path) -> bool {
         matches!(self.directories.get(directory), Some(Some(_)))
     }
 
-    /// Those without a watch.
+    /// Returns the directories without a watch.
     pub fn unwatched(&self) -> Vec<Arc<Path>> {
         let without = self.directories.iter().filter(|(_, watch)| watch.is_none());
         without.map(|(path, _)| path.clone()).collect()
     }
 
-    /// The directories in this one.
+    /// Returns the subdirectories of a directory.
     pub fn children(&self, directory: &Path) -> Vec<PathBuf> {
         children(&self.directories, directory)
     }
 
-    /// Asks for the events of a directory. To ask again costs little, and finds the watch of
-    /// another directory that has come to lie under this path.
+    /// Watches a directory. A repeated call is cheap, and finds the watch of another directory that
+    /// is now at this path.
     ///
     /// # Errors
-    /// When there is no watch on it.
+    /// When the directory cannot be watched.
     pub fn watch(&mut self, directory: &Path) -> Result<(), Unwatched> {
         let Some(kernel) = &self.kernel else {
             return Err(Unwatched::Refused(io::ErrorKind::Unsupported.into()));
@@ -113,7 +113,7 @@ impl Tree {
         }
     }
 
-    /// Keeps a directory of which no event tells, or none any more.
+    /// Registers a directory without events.
     pub fn keep_unwatched(&mut self, directory: &Path) {
         self.put(directory, None);
     }
@@ -134,7 +134,7 @@ impl Tree {
         self.directories.insert(path, watch);
     }
 
-    /// Forgets a directory and all below it.
+    /// Removes a directory and everything below it.
     pub fn remove_below(&mut self, directory: &Path) {
         let below: Vec<Arc<Path>> = below(&self.directories, directory)
             .map(|(path, _)| path.clone())
@@ -158,14 +158,14 @@ impl Tree {
         if paths.is_empty() {
             self.watches.remove(&watch);
             if let Some(kernel) = &self.kernel {
-                // The directory may have gone, and its watch with it.
+                // The directory may be gone, together with its watch.
                 kernel.forget(watch);
             }
         }
     }
 
-    /// The paths of the directory in which something happened. The last word on one that has gone
-    /// ends its watch.
+    /// Returns the paths of the directory of an event. The last event of a removed directory ends
+    /// its watch.
     pub fn places(&mut self, told: &Told) -> Vec<Arc<Path>> {
         if !told.what.contains(ReadFlags::IGNORED) {
             return self.watches.get(&told.watch).cloned().unwrap_or_default();
@@ -177,10 +177,10 @@ impl Tree {
         paths
     }
 
-    /// The events that are there now, some hundreds at most.
+    /// Returns the pending events, at most a few hundred.
     ///
     /// # Errors
-    /// What the system says when it gives none that are there.
+    /// The error of the system if the events cannot be read.
     pub fn events(&self) -> io::Result<Vec<Told>> {
         let Some(kernel) = &self.kernel else {
             return Ok(Vec::new());
@@ -189,8 +189,8 @@ impl Tree {
     }
 }
 
-/// What lies at a path and below it. Paths are in the order of their components, so all of it lies
-/// together.
+/// Returns the entries at a path and below it. They are adjacent, because paths are sorted by
+/// components.
 pub fn below<'m, K: Borrow<Path> + Ord, V>(
     map: &'m BTreeMap<K, V>,
     path: &'m Path,
@@ -199,7 +199,7 @@ pub fn below<'m, K: Borrow<Path> + Ord, V>(
         .take_while(move |(key, _)| (*key).borrow().starts_with(path))
 }
 
-/// What lies directly in a directory, once each, however much lies below it.
+/// Returns the direct children of a directory, each once, even if many entries lie below it.
 pub fn children<K: Borrow<Path> + Ord, V>(map: &BTreeMap<K, V>, directory: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut from = Bound::Excluded(directory.to_path_buf());
@@ -212,7 +212,7 @@ pub fn children<K: Borrow<Path> + Ord, V>(map: &BTreeMap<K, V>, directory: &Path
             return found;
         };
         found.push(directory.join(name));
-        // The least name behind this one; no name has such a byte.
+        // This is the least name after the current one, because no name contains such a byte.
         let mut behind = name.as_os_str().to_owned();
         behind.push("\0");
         from = Bound::Included(directory.join(behind));
@@ -247,7 +247,7 @@ mod tests {
         let mut tree = Tree::default();
         tree.open().unwrap();
         tree.watch(&one).unwrap();
-        // The same directory under another name.
+        // The same directory now has another name.
         std::fs::rename(&one, &two).unwrap();
         tree.watch(&two).unwrap();
         tree.remove_below(&one);

@@ -1,4 +1,5 @@
-//! What a cleaner of temporary files takes away is made again, and nobody who has joined notices.
+//! Files removed by a cleaner of temporary files are created again, and the sessions of joined
+//! peers do not notice.
 
 use std::time::Duration;
 
@@ -7,7 +8,7 @@ use qcbus_messages::Digest;
 
 use crate::support::{Site, files_of, identity_of, join, numbered, numbered_job, run};
 
-/// A word there and one back, in the session that there is.
+/// Sends a message in each direction within the existing session.
 async fn talk(host: &mut Host, (id, peer): &mut (PeerId, Peer), number: u64) {
     peer.send(&numbered(number, 10));
     host.send(*id, &numbered_job(number, 10));
@@ -28,7 +29,7 @@ async fn talk(host: &mut Host, (id, peer): &mut (PeerId, Peer), number: u64) {
     }
 }
 
-/// Serves until `done`, in which nothing may happen.
+/// Serves until `done`. No event may occur meanwhile.
 async fn until(host: &mut Host, peer: &mut Peer, mut done: impl FnMut() -> bool) {
     while !done() {
         tokio::select! {

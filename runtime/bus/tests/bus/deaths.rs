@@ -1,4 +1,4 @@
-//! Whoever dies: the others notice, go on, and nothing is left behind.
+//! Deaths of processes: the others notice them and go on, and no files are left behind.
 
 use std::time::Duration;
 
@@ -89,7 +89,7 @@ fn peers_survive_a_killed_broker_and_join_the_next() {
         }
         while !broker.line().starts_with("done") {}
         broker.kill();
-        // The last one, in this process, cleans up after all.
+        // The last broker runs in this process and cleans up after all the others.
         let mut host = site.host();
         assert_eq!(host.generation(), 6);
         let mut there = 0;
@@ -149,7 +149,7 @@ fn without_a_new_broker_a_peer_gives_up() {
         let site = Site::new();
         let mut host = site.host();
         let options = PeerOptions {
-            // A busy machine may take its time to join.
+            // Joining may take long on a busy machine.
             patience: WATCHDOG,
             grace: Duration::from_millis(100),
             ..PeerOptions::default()

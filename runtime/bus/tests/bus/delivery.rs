@@ -1,4 +1,4 @@
-//! Messages arrive: once, in order, whatever their size, whoever else does what.
+//! Messages arrive once and in order. Their size and the actions of others do not matter.
 
 use std::time::Duration;
 
@@ -10,8 +10,8 @@ use qcbus_messages::{Digest, FromPeer, JobId, PROTOCOL_VERSION, ToPeer};
 use crate::helper::Helper;
 use crate::support::{Site, hello, join, join_with, numbered, numbered_job, run, watched, welcome};
 
-/// Sizes around everything that matters: nothing, a frame's end, many frames, nearly all that a peer may
-/// say in one message.
+/// Sizes around the limits that matter: nothing, the end of a frame, many frames, and nearly the
+/// maximum of a peer's message.
 const SIZES: [usize; 10] = [
     0, 1, 100, 16_300, 16_384, 16_400, 40_000, 700_000, 3, 4_190_000,
 ];
@@ -111,7 +111,7 @@ fn a_stopped_reader_costs_nobody_else() {
         assert_eq!(deaf.line(), "joined");
         deaf.signal(rustix::process::Signal::STOP);
         let (id, mut peer) = join(&mut host, &site, "polite").await;
-        // Far more than a window, which stays with us.
+        // The flood is far larger than a window. The rest stays in the host.
         let flood = 3_000;
         for number in 0..flood {
             host.send(deaf_id, &numbered_job(number, 1_000));
@@ -127,7 +127,7 @@ fn a_stopped_reader_costs_nobody_else() {
             }
         }
         assert!(host.backlog(deaf_id) > 2_000_000);
-        // It has missed nothing when it goes on.
+        // The helper has missed no message when it continues.
         deaf.signal(rustix::process::Signal::CONT);
         let mut next = 0;
         while next < flood {
@@ -185,7 +185,7 @@ fn disconnecting_a_silent_peer_gives_its_window_back() {
         assert!(host.backlog(id) > 9_000_000);
         host.disconnect(id);
         assert_eq!(host.backlog(id), 0);
-        // Its process lives, so it may come back, in a session of its own.
+        // The process is alive, so it may come back in a new session.
         let (again, event) = loop {
             tokio::select! {
                 event = host.next() => if let HostEvent::Hello { peer, .. } = event {
@@ -208,8 +208,8 @@ fn a_process_has_one_session_at_a_time() {
         let site = Site::new();
         let mut host = site.host();
         let (id, mut peer) = join(&mut host, &site, "returner").await;
-        // The peer loses its session without a word, while the broker still has it: the file that names
-        // the generation names a dead broker for as long as the peer takes to notice.
+        // The peer loses its session without a farewell, while the broker still has it. The file
+        // with the generation names a dead broker until the peer notices.
         let current = site.instance.dir().join("current");
         let text = std::fs::read_to_string(&current).unwrap();
         let dead = text.replace("\"pid_started\":", "\"pid_started\":1");
@@ -447,7 +447,7 @@ fn a_bus_that_expects_no_configuration_still_has_a_small_one() {
         let mut host = Host::start(&site.instance, options).unwrap();
         host.set_config(Digest([1; 32]), &[7; 60_000]);
         let (_, mut peer) = join(&mut host, &site, "peer").await;
-        // One that is too large is not published, and takes nothing away.
+        // A configuration that is too large is not published. The previous one stays.
         host.set_config(Digest([2; 32]), &[8; 100_000]);
         let config = tokio::select! {
             event = host.next() => panic!("{event:?}"),

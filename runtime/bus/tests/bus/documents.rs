@@ -1,4 +1,4 @@
-//! Documents are published once and read in site.
+//! Documents are published once and read in place.
 
 use std::collections::BTreeMap;
 use std::os::unix::process::ExitStatusExt;
@@ -39,7 +39,7 @@ fn check(mapped_image: &MappedImage, doc: u64, len: usize) {
     assert!(is_uniform(mapped_image, pattern(doc)));
 }
 
-/// The document, when it has arrived.
+/// Waits for a document and returns it.
 async fn arrival(host: &mut Host, peer: &mut Peer, doc: u64) -> MappedImage {
     loop {
         if let Some(mapped_image) = peer.document(DocId(doc)) {
@@ -186,7 +186,7 @@ fn what_was_lost_is_published_again() {
         let (_, mut peer) = join(&mut host, &site, "slow").await;
         let documents = host.documents();
         let first = publish(&documents, 1, 1_000);
-        // More than the slow reader's buffer takes while it does not read.
+        // These are more documents than the buffer of the slow reader takes while it does not read.
         for doc in 2..=100 {
             drop(publish(&documents, doc, 1_000));
         }
@@ -204,7 +204,8 @@ fn a_reader_never_runs_out_of_hands() {
         let mut host = site.host();
         let (_, mut peer) = join(&mut host, &site, "hoarder").await;
         let documents = host.documents();
-        // Reads everything, forgets nothing, holds on to a few: the newest is always there.
+        // The peer reads every document, forgets none and keeps a few. The newest one is always
+        // available.
         let mut kept = BTreeMap::new();
         for doc in 1..=400 {
             drop(publish(&documents, doc, 100));
@@ -229,7 +230,8 @@ fn what_a_job_needs_stays_until_it_is_finished_with() {
         drop(publish(&documents, 1, 100));
         arrival(&mut host, &mut peer, 1).await;
         host.send(id, &job_with(1, DocId(1)));
-        // Many that no job here is about, as of another kind; nobody has finished with any of them.
+        // No job of this peer needs these documents; they may be of another kind. No peer has
+        // finished with any of them.
         for doc in 2..=400 {
             drop(publish(&documents, doc, 100));
             arrival(&mut host, &mut peer, doc).await;
@@ -251,7 +253,7 @@ fn no_more_is_held_than_the_slowest_reader_takes() {
         let mut host = site.host();
         let (_, mut peer) = join(&mut host, &site, "slow").await;
         let documents = host.documents();
-        // Large ones: of these the fewest are carried at once.
+        // The documents are large, because the bus carries the fewest of these at once.
         let len = 600_000;
         let mut mapped_image = Vec::new();
         while let Ok(loan) = documents.loan(len) {
@@ -263,7 +265,7 @@ fn no_more_is_held_than_the_slowest_reader_takes() {
         for doc in &mapped_image {
             arrival(&mut host, &mut peer, doc.doc().0).await;
         }
-        // And if it had lost one all the same, there would be a place for it.
+        // A place is left for publishing a document again, in case the reader has lost one.
         documents.publish_again(&mapped_image[0]).unwrap();
     });
 }
@@ -290,7 +292,7 @@ fn no_more_is_lent_than_there_is() {
             ..HostOptions::default()
         };
         let host = Host::start(&site.instance, options).unwrap();
-        // The reserve is capped at a quarter, so what would leave less is refused.
+        // The reserve is capped at a quarter. A loan that would leave less is refused.
         let most = stat.f_bavail * stat.f_frsize - stat.f_blocks * stat.f_frsize / 4;
         let refused = host.documents().loan(most as usize + (64 << 20));
         if most < u64::from(u32::MAX) - (64 << 20) {
@@ -340,7 +342,7 @@ fn a_killed_holder_gives_everything_back() {
             };
             loop {
                 if let HostEvent::Message { message, .. } = host.next().await {
-                    // A late joiner gets the last two as well, and this one at the end.
+                    // A late joiner also gets the last two documents, and this one at the end.
                     let FromPeer::JobDone { job, .. } = message else {
                         panic!("{message:?}")
                     };

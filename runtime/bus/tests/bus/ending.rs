@@ -1,4 +1,4 @@
-//! Whatever others do while a broker ends, nothing of it stays in memory.
+//! The end of a broker leaves no shared memory behind, regardless of the actions of others.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -7,9 +7,9 @@ use qcbus_bus::{Documents, HostEvent, Peer, PeerOptions};
 
 use crate::support::{Site, files_of, hello, identity_of, run, run_forever, shared_memory_named};
 
-/// Every end meets the others at another point of what they do.
+/// Number of ends. Each end meets the other threads at another point of their work.
 const ENDS: u64 = 40;
-/// Three of them, so that somebody is always about to join.
+/// Number of joining threads. With three of them, one is always about to join.
 const JOINERS: usize = 3;
 
 fn join_again_and_again(site: &Site, over: &AtomicBool) {
@@ -20,13 +20,13 @@ fn join_again_and_again(site: &Site, over: &AtomicBool) {
     };
     run_forever(async {
         while !over.load(Ordering::Relaxed) {
-            // Most find no broker, or one that ends before it answers.
+            // Most attempts find no broker, or one that ends before it answers.
             let _ = Peer::join(&site.instance, hello("late"), options).await;
         }
     });
 }
 
-/// Images that grow, because each of another class of sizes makes a file.
+/// Borrows images of growing size, because each new size class creates a file.
 fn lend_more_and_more(documents: &Documents, over: &AtomicBool) {
     for power in (10..23).cycle() {
         if over.load(Ordering::Relaxed) {

@@ -1,9 +1,9 @@
-//! Peers that say anything: frames, lengths, orders, numbers, acknowledgements, farewells, hellos and
-//! catalogues at random, against the real broker's end. Beside them a polite peer is served all the
-//! time, and nothing that it or the broker says is lost, doubled or out of order.
+//! Peers that send anything: random frames, lengths, orders, numbers, acknowledgements, farewells,
+//! hellos and catalogues, against the real broker's end. A polite peer is served beside them all
+//! the time. Its messages and those of the broker are never lost, doubled or out of order.
 //!
-//! `QCBUS_BUS_FUZZ_SECONDS` makes it longer, `QCBUS_BUS_FUZZ_SEED` repeats what the rogues say (not
-//! when).
+//! `QCBUS_BUS_FUZZ_SECONDS` makes it longer, `QCBUS_BUS_FUZZ_SEED` repeats the messages of the
+//! rogues (not their times).
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -22,18 +22,18 @@ use crate::support::{
     Site, fresh_number, hello, join, numbered, numbered_job, run_forever, watched, welcome,
 };
 
-/// Rogues at once.
+/// Number of simultaneous rogues.
 const ROGUES: u64 = 4;
 
-/// Bytes of its own that the process may have beyond what it began with: of each rogue a message of
-/// the largest size, in a buffer that has grown by doubling, and what has been read ahead.
+/// Maximum growth of the process's own memory in bytes. For each rogue it covers a message of
+/// maximum size, in a buffer that has grown by doubling, and the data read ahead.
 const MOST_MEMORY: u64 = 1 << 30;
 
 fn from_environment(name: &str) -> Option<u64> {
     std::env::var(name).ok()?.parse().ok()
 }
 
-/// Memory of this process that is backed by nothing, in bytes (proc(5), `status`).
+/// Returns the anonymous memory of this process in bytes (proc(5), `status`).
 fn anonymous_memory() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let line = status.lines().find(|line| line.starts_with("RssAnon:"));
@@ -41,7 +41,7 @@ fn anonymous_memory() -> u64 {
     kibibytes.unwrap().parse::<u64>().unwrap() << 10
 }
 
-/// What rogues have done, all together.
+/// Statistics of all rogues together.
 #[derive(Default)]
 struct Deeds {
     stop: AtomicBool,
@@ -68,7 +68,7 @@ fn text(dice: &mut Rng) -> String {
     std::iter::repeat_n(letter, dice.usize(..len)).collect()
 }
 
-/// A message as a peer of some sense might say it.
+/// Creates a message that a sensible peer might send.
 fn message(dice: &mut Rng) -> FromPeer {
     let job = JobId(dice.u64(..5));
     match dice.u8(..7) {
@@ -123,7 +123,7 @@ fn catalogue(dice: &mut Rng) -> Catalogue {
     }
 }
 
-/// Spoils some bytes.
+/// Corrupts some bytes.
 fn spoil(bytes: &mut [u8], dice: &mut Rng) {
     for _ in 0..dice.usize(..4) {
         if let Some(byte) = dice.choice(bytes.iter_mut()) {
@@ -132,7 +132,7 @@ fn spoil(bytes: &mut [u8], dice: &mut Rng) {
     }
 }
 
-/// Bytes of a stream: messages, most of them sound, with lengths that mostly fit.
+/// Creates the bytes of a stream: messages, most of them sound, with lengths that mostly fit.
 fn stream(dice: &mut Rng) -> Vec<u8> {
     let mut bytes = Vec::new();
     for _ in 0..dice.usize(1..20) {
@@ -154,7 +154,7 @@ fn stream(dice: &mut Rng) -> Vec<u8> {
     bytes
 }
 
-/// A hello that is one, nearly one, or nothing of the sort.
+/// Creates a hello that is valid, nearly valid, or invalid.
 fn greeting(dice: &mut Rng, incarnation: u64) -> Vec<u8> {
     let sound = Hello {
         incarnation,
@@ -175,7 +175,7 @@ fn greeting(dice: &mut Rng, incarnation: u64) -> Vec<u8> {
     bytes
 }
 
-/// Spoils what goes before a frame.
+/// Corrupts a frame header.
 fn spoil_header(header: &mut Header, dice: &mut Rng) {
     match dice.u8(..9) {
         0 => header.seq = dice.u64(..),
@@ -190,7 +190,7 @@ fn spoil_header(header: &mut Header, dice: &mut Rng) {
     }
 }
 
-/// One session, from a hello to whatever end.
+/// Runs one session from its hello to any end.
 fn session(rogue: &mut Rogue, said: &[Vec<u8>], dice: &mut Rng, deeds: &Deeds) {
     let (incarnation, attempt) = (dice.u64(..), dice.u64(..5));
     let reads = dice.u8(..6) != 0;
@@ -214,7 +214,7 @@ fn session(rogue: &mut Rogue, said: &[Vec<u8>], dice: &mut Rng, deeds: &Deeds) {
     while Instant::now() < until && !deeds.stop.load(Ordering::Relaxed) {
         if waiting.is_empty() {
             waiting = match dice.u8(..200) {
-                // One message that takes thousands of frames.
+                // This message takes thousands of frames.
                 0 => [&(40_u32 << 20).to_le_bytes()[..], &vec![0; 40 << 20]].concat(),
                 1 => anything(dice, 4 * FRAME_BYTES),
                 _ => dice.choice(said).cloned().unwrap_or_default(),
@@ -260,7 +260,7 @@ fn start_rogue(instance: &Instance, seed: u64, deeds: &Arc<Deeds>) -> JoinHandle
         let mut dice = Rng::with_seed(seed);
         while !deeds.stop.load(Ordering::Relaxed) {
             let mut rogue = Rogue::new(&instance).unwrap();
-            // Made beforehand: what counts is that it is said quickly.
+            // The streams are created in advance, because they must be sent quickly.
             let said: Vec<Vec<u8>> = (0..20).map(|_| stream(&mut dice)).collect();
             for _ in 0..dice.usize(1..6) {
                 session(&mut rogue, &said, &mut dice, &deeds);
@@ -279,7 +279,7 @@ struct Table {
 }
 
 impl Table {
-    /// What a broker might do about anybody but the polite peer.
+    /// Handles an event of any peer other than the polite one, as a broker might do.
     fn deal_with(&mut self, event: &HostEvent) {
         match *event {
             HostEvent::Hello { peer, .. } => match self.dice.u8(..10) {
@@ -294,7 +294,7 @@ impl Table {
             },
             HostEvent::Garbage { peer, .. } => {
                 self.garbage += 1;
-                // As the broker does; sometimes it takes longer.
+                // The broker does the same, but sometimes it takes longer.
                 if self.dice.u8(..8) != 0 {
                     self.host.disconnect(peer);
                 }
@@ -309,7 +309,7 @@ impl Table {
         }
     }
 
-    /// Something there and something back.
+    /// Sends a message in each direction.
     async fn serve_the_polite_one(&mut self, number: u64) {
         let len = [1, 100, FRAME_BYTES, 3 * FRAME_BYTES][number as usize % 4];
         let id = self.polite.0;
@@ -359,7 +359,7 @@ fn whatever_rogues_say_a_polite_peer_is_served() {
             .collect();
         let (before, mut most, mut served) = (anonymous_memory(), 0, 0);
         let until = Instant::now() + Duration::from_secs(seconds);
-        // On a busy machine the rogues may take longer to say anything at all.
+        // On a busy machine the rogues may need longer to send any message.
         while Instant::now() < until || table.messages == 0 || table.garbage == 0 {
             watched(table.serve_the_polite_one(served)).await;
             served += 1;
@@ -373,7 +373,7 @@ fn whatever_rogues_say_a_polite_peer_is_served() {
             let ended = rogue.join();
             assert!(ended.is_ok(), "a rogue has failed by itself");
         }
-        // Whoever comes when all this is over finds a place.
+        // A peer that joins after all this finds a place.
         watched(join_among_the_late(&mut table, &site)).await;
         println!(
             "{} hellos, {} sessions, {} frames; {} messages and {} faults heard; the polite peer was served {served} times; {} MiB of memory at most",

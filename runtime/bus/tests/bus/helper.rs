@@ -1,4 +1,4 @@
-//! Other processes: this test binary, started again with a role in its environment.
+//! Helper processes: this test binary, started again with a role in its environment.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
@@ -17,10 +17,10 @@ use crate::support::{WATCHDOG, hello, is_uniform, run_forever, welcome};
 
 const ROLE: &str = "QCBUS_BUS_TEST_ROLE";
 const PLACE: &str = "QCBUS_BUS_TEST_PLACE";
-/// Lines that a helper prints for its test begin with this; the rest is the test harness'.
+/// Prefix of the lines that a helper prints for its test. Other lines come from the test harness.
 const MARK: &str = "@@ ";
 
-/// A process that is killed, and waited for, when the test is over.
+/// A process that is killed and waited for at the end of the test.
 pub struct Helper {
     child: Child,
     lines: Receiver<String>,
@@ -35,7 +35,7 @@ impl Helper {
         )
     }
 
-    /// With a /dev/shm of its own of 64 MB; `None` when that is not allowed here.
+    /// Starts a helper with its own /dev/shm of 64 MB. Returns `None` if that is not allowed here.
     pub fn start_in_small_memory(role: &str, instance: &Instance) -> Option<Helper> {
         const MOUNT: &str = "mount -t tmpfs -o size=64m tmpfs /dev/shm";
         let allowed = Command::new("unshare")
@@ -77,14 +77,14 @@ impl Helper {
         self.child.id()
     }
 
-    /// The next thing that the helper has to say.
+    /// Waits for the next line of the helper.
     pub fn line(&mut self) -> String {
         self.lines
             .recv_timeout(WATCHDOG)
             .expect("the helper has ended, or never said anything")
     }
 
-    /// What it has said meanwhile.
+    /// Returns the lines that the helper has printed meanwhile.
     pub fn lines_so_far(&mut self) -> Vec<String> {
         self.lines.try_iter().collect()
     }
@@ -99,7 +99,7 @@ impl Helper {
         self.child.wait().unwrap();
     }
 
-    /// Waits for its end.
+    /// Waits for the end of the helper.
     pub fn end(mut self) -> std::process::ExitStatus {
         self.child.wait().unwrap()
     }
@@ -116,7 +116,7 @@ fn say(text: &str) {
     println!("{MARK}{text}");
 }
 
-/// No test: what a helper process runs.
+/// Runs a helper process. This is not a real test.
 #[test]
 fn other_process() {
     let Ok(role) = std::env::var(ROLE) else {
@@ -149,7 +149,7 @@ async fn member(instance: &Instance, name: &str) -> Result<Peer, JoinError> {
     Peer::join(instance, hello(name), options).await
 }
 
-/// Holds every document that arrives, for ever, and says so to the broker.
+/// Holds every document that arrives for ever, and reports it to the broker.
 async fn holds_documents(instance: &Instance) {
     let mut peer = member(instance, "holder").await.unwrap();
     let mut mapped_image = Vec::new();
@@ -164,7 +164,7 @@ async fn holds_documents(instance: &Instance) {
     }
 }
 
-/// Reads every byte of a document, and tells the broker how much memory of its own it has, in KiB.
+/// Reads every byte of a document. Then it reports the size of its own memory in KiB to the broker.
 async fn reads_and_weighs_itself(instance: &Instance) {
     let mut peer = member(instance, "reader").await.unwrap();
     loop {
@@ -179,14 +179,15 @@ async fn reads_and_weighs_itself(instance: &Instance) {
     }
 }
 
-/// Broker and reader in one, in a /dev/shm that has no room for the history of large documents.
+/// Runs a broker and a reader in a /dev/shm without room for the history of large documents.
 async fn lives_in_a_small_memory(instance: &Instance) {
     let site = crate::support::Site::at(instance);
     let mut host = site.host();
     let (_, mut peer) = crate::support::join(&mut host, &site, "reader").await;
     let documents = host.documents();
     let mut refused = 0;
-    // Beyond what the library keeps by itself: what goes only when somebody is told to drop it.
+    // These images exceed the ones that the library keeps itself. They are dropped only when the
+    // peer is told to let them go.
     let mut kept = Vec::new();
     for doc in 1..=40 {
         let mut loan = loop {
@@ -221,7 +222,7 @@ async fn lives_in_a_small_memory(instance: &Instance) {
     say(&format!("40 documents, {} refusals", refused.min(1)));
 }
 
-/// Takes all that is left of the shared memory, to the last page, as somebody else may.
+/// Takes all remaining shared memory to the last page, as another program might.
 fn fill_memory() -> std::path::PathBuf {
     let path = std::path::PathBuf::from("/dev/shm/filler");
     let filler = std::fs::File::create(&path).unwrap();
@@ -235,7 +236,7 @@ fn fill_memory() -> std::path::PathBuf {
     path
 }
 
-/// Broker and peer in one: the shared memory is full while the peer has much to say.
+/// Runs a broker and a peer. The shared memory is full while the peer sends many messages.
 async fn speaks_in_a_full_memory(instance: &Instance) {
     let site = crate::support::Site::at(instance);
     let mut host = site.host();
@@ -244,7 +245,7 @@ async fn speaks_in_a_full_memory(instance: &Instance) {
     for number in 0..500 {
         peer.send(&crate::support::numbered(number, 15_000));
     }
-    // As long as they go around in the frames that there are, or wait for more.
+    // The messages go around in the existing frames, or wait for more.
     let mut heard = Vec::new();
     for _ in 0..50 {
         tokio::select! {
@@ -271,8 +272,8 @@ async fn speaks_in_a_full_memory(instance: &Instance) {
     say("500 messages, in order");
 }
 
-/// Says why there is no room for an image that is too large for the memory, and why for one that is
-/// too large for now.
+/// Reports the reasons for two refusals: an image is too large for the memory, and another one is
+/// too large at this time.
 fn asks_for_too_much(instance: &Instance) {
     let host = Host::start(instance, HostOptions::default()).unwrap();
     let documents = host.documents();
@@ -292,8 +293,8 @@ fn asks_for_too_much(instance: &Instance) {
     drop(others);
 }
 
-/// Several brokers want more at once than there is. Who loses is refused, and what stays free for
-/// the rest of the bus stays free.
+/// Lets several brokers request more memory at once than exists. The losers are refused, and the
+/// reserve for the rest of the bus stays free.
 fn many_take_at_once(instance: &Instance) {
     let memory = || qcbus_bus::SharedMemory::now().unwrap();
     let options = HostOptions {
@@ -328,7 +329,7 @@ fn many_take_at_once(instance: &Instance) {
         let takers: Vec<_> = takers.collect();
         takers.into_iter().map(|it| it.join().unwrap()).min()
     });
-    // A page or two go for what stands before a slot.
+    // The header before a slot takes a page or two.
     assert!(
         least.unwrap() + (64 << 10) >= reserve,
         "{least:?} of {reserve}"
@@ -336,7 +337,7 @@ fn many_take_at_once(instance: &Instance) {
     say("no page of the reserve was taken");
 }
 
-/// Memory of this process that it shares with nobody, in KiB (proc(5), `smaps_rollup`).
+/// Returns the unshared memory of this process in KiB (proc(5), `smaps_rollup`).
 fn private_memory() -> u64 {
     std::fs::read_to_string("/proc/self/smaps_rollup")
         .unwrap()
@@ -352,7 +353,7 @@ fn private_memory() -> u64 {
         .sum()
 }
 
-/// Answers every job, with the sum of its document's bytes when it has one.
+/// Answers every job with the sum of its document's bytes, if it has a document.
 async fn answers_jobs(instance: &Instance) {
     let mut peer = member(instance, "answerer").await.unwrap();
     say("joined");
@@ -379,7 +380,7 @@ async fn answers_jobs(instance: &Instance) {
     }
 }
 
-/// `false` when its document is not there.
+/// Answers a job. Returns `false` if its document is missing.
 fn answer(peer: &mut Peer, job: &Job) -> bool {
     let mut sum = 0;
     for document in &job.documents {
@@ -406,16 +407,16 @@ async fn writes_into_a_document(instance: &Instance) {
         if let PeerEvent::Document(doc) = peer.next().await {
             let mapped_image = peer.document(doc).unwrap();
             say("writes");
-            // SAFETY: there is none; the process dies here, and that is the point.
+            // SAFETY: there is none. The process dies here, and the test checks exactly that.
             unsafe { std::ptr::write_volatile(mapped_image.as_ptr().cast_mut(), 0) };
             say("has written");
         }
     }
 }
 
-/// Opens the segment in which the first image lies for writing, as any program of the same user may
-/// that nothing confines, and rewrites it at random until it is killed. What it writes is ASCII: a
-/// text that ceases to be UTF-8 while it is borrowed is beyond what any accessor can be asked for.
+/// Opens the segment with the first image for writing, and rewrites it at random until it is
+/// killed. Any unrestricted program of the same user may do so. It writes only ASCII, because no
+/// accessor can handle a text that stops being UTF-8 while it is borrowed.
 fn rewrite_images(instance: &Instance) {
     let (segment, at) = segments_of(instance)
         .into_iter()
@@ -439,7 +440,7 @@ fn rewrite_images(instance: &Instance) {
             for (byte, whole) in spoilt.iter_mut().zip(&sound) {
                 *byte = if byte == whole { *byte } else { *byte & 0x7F };
             }
-            // What says where the text is stays: it may not come to lie over numbers.
+            // The header stays, because it locates the text. The text must not overlap numbers.
             segment
                 .write_all_at(&spoilt[HEADER..], at + HEADER as u64)
                 .unwrap();
@@ -448,7 +449,7 @@ fn rewrite_images(instance: &Instance) {
     }
 }
 
-/// No image of a test that is rewritten is larger.
+/// Maximum size in bytes of an image that a test rewrites.
 const IMAGE_AT_MOST: usize = 4 << 10;
 
 /// Bytes of an image before its sections.
@@ -465,7 +466,7 @@ fn segments_of(instance: &Instance) -> Vec<std::path::PathBuf> {
     found
 }
 
-/// Where a segment has an image, if it has one.
+/// Returns the offset of an image in a segment, if there is one.
 fn find_image(segment: &std::fs::File) -> Option<u64> {
     const WINDOW: usize = 1 << 20;
     let mut from = rustix::fs::seek(segment, rustix::fs::SeekFrom::Data(0)).ok()?;
@@ -481,11 +482,11 @@ fn find_image(segment: &std::fs::File) -> Option<u64> {
     }
 }
 
-/// Jobs that a peer of [`serves`] has before it.
+/// Number of jobs that each peer of [`serves`] has at a time.
 const IN_FLIGHT: u64 = 8;
 
-/// A broker that keeps every peer busy without end, and says when an answer is missing, doubled or
-/// out of order.
+/// Runs a broker that keeps every peer busy without end. It reports missing, doubled and misordered
+/// answers.
 async fn serves(instance: &Instance) {
     let mut host = Host::start(instance, HostOptions::default()).unwrap();
     say(&format!("serves {}", host.generation()));

@@ -1,4 +1,4 @@
-//! Peers without manners: the others are served as if they were not there.
+//! Misbehaving peers: the other peers are served as if they did not exist.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,15 +15,15 @@ use crate::support::{
     Site, fresh_number, hello, join, numbered, numbered_job, run, watched, welcome,
 };
 
-/// A thread that floods until it is dropped.
+/// A thread that floods the bus until it is dropped.
 struct Flooder {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Flooder {
-    /// Joins under a session of its own, then sends what `frame` makes for each number, as fast as it
-    /// can, whether or not anything is acknowledged.
+    /// Joins in its own session. Then it sends the result of `frame` for each number as fast as
+    /// possible, and ignores acknowledgements.
     fn start(
         instance: &Instance,
         frame: impl Fn(Header, u64) -> (Header, Vec<u8>) + Send + 'static,
@@ -84,7 +84,7 @@ impl Drop for Flooder {
     }
 }
 
-/// A message that takes exactly this many bytes of a stream.
+/// Returns a message that takes exactly this many bytes of a stream.
 fn framed(bytes: usize) -> Vec<u8> {
     let empty = codec::encode(&numbered(1, 0)).unwrap().len();
     let message = codec::encode(&numbered(1, bytes - 4 - empty)).unwrap();
@@ -92,7 +92,7 @@ fn framed(bytes: usize) -> Vec<u8> {
     [&length.to_le_bytes()[..], &message].concat()
 }
 
-/// Serves until the rogue is there; welcomes it.
+/// Serves until the rogue has joined, and welcomes it.
 async fn admit(host: &mut Host) -> PeerId {
     loop {
         if let HostEvent::Hello { peer, hello, .. } = host.next().await {
@@ -109,14 +109,14 @@ fn frames_that_bring_nothing_are_read_in_turns_and_not_for_ever() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
-        // Always the same number, in full frames: each is read, none is taken.
+        // All frames are full and have the same number. The broker reads each and accepts none.
         let flooder = Flooder::start(&site.instance, |header, _| {
             (Header { seq: 7, ..header }, vec![0; FRAME_BYTES])
         });
         let rogue = admit(&mut host).await;
         let (_, mut polite) = join(&mut host, &site, "polite").await;
         let mut told = false;
-        // The flood is a broken stream after a while, and nothing of it is read any more.
+        // After a while the flood counts as a broken stream, and the broker stops reading it.
         while !told {
             tokio::select! {
                 event = host.next() => {
@@ -132,7 +132,7 @@ fn frames_that_bring_nothing_are_read_in_turns_and_not_for_ever() {
     });
 }
 
-/// A rogue in the test's own thread, welcomed.
+/// Creates a welcomed rogue in the test's own thread.
 async fn rogue(host: &mut Host, site: &Site) -> (Rogue, Header) {
     let mut rogue = Rogue::new(&site.instance).unwrap();
     let incarnation = fresh_number();
@@ -155,10 +155,10 @@ async fn rogue(host: &mut Host, site: &Site) -> (Rogue, Header) {
     (rogue, header)
 }
 
-/// Turns that are looked at: few enough that no rogue comes to the end of its message.
+/// Number of polls that are examined. It is so small that no rogue reaches the end of its message.
 const TURNS: usize = 18;
 
-/// Sends frames of one long message until the broker's buffer is full; how many those were.
+/// Sends frames of one long message until the broker's buffer is full. Returns their number.
 fn fill(rogue: &Rogue, header: &mut Header) -> u64 {
     let mut bytes = vec![0; FRAME_BYTES];
     let length = u32::try_from(codec::MAX_FROM_PEER).unwrap();
@@ -183,7 +183,7 @@ fn a_turn_reads_a_megabyte_and_the_next_begins_with_another_peer() {
         for _ in 0..6 {
             rogues.push(rogue(&mut host, &site).await);
         }
-        // Connections are made while the broker looks.
+        // The broker establishes connections while it polls.
         for (rogue, header) in &mut rogues {
             fill(rogue, header);
         }
@@ -202,7 +202,7 @@ fn a_turn_reads_a_megabyte_and_the_next_begins_with_another_peer() {
                 read[number] += sent;
                 receive_budget += sent;
             }
-            // A megabyte is 64 frames; a peer is read from to the end of its quota.
+            // A megabyte is 64 frames. The broker reads a peer to the end of its quota.
             assert!(
                 receive_budget <= 64 + 8,
                 "{receive_budget} frames in one turn"
@@ -291,7 +291,7 @@ fn what_waits_to_be_fetched_is_bounded_by_bytes() {
         for _ in 0..40 {
             assert!(matches!(host.next().await, HostEvent::Message { .. }));
             most = most.max(host.waiting_bytes());
-            // A broker that is busy with something else, longer than between two turns.
+            // The broker is busy with something else, for longer than between two polls.
             std::thread::sleep(Duration::from_millis(25));
         }
         println!("at most {most} bytes waited");

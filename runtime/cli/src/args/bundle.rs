@@ -1,4 +1,4 @@
-//! What is said to `qcbus bundle`.
+//! Arguments of `qcbus bundle`.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -10,19 +10,19 @@ use super::{InstanceArgs, StatusArgs, duration};
 /// `qcbus bundle …`.
 #[derive(Debug, Subcommand)]
 pub enum BundleCommand {
-    /// List the standard bundles and those that a broker has
+    /// List the standard bundles and those of a broker
     List(StatusArgs),
     /// Run a bundle: on the bus, on one FILE, or as an ASAM module with -c
     Run(BundleRunArgs),
-    /// Let a running broker start one more bundle, and say whether it is ready
+    /// Make a running broker start one more bundle, and report whether it is ready
     Add(BundleAddArgs),
-    /// Let a running broker go over to the newer program of a bundle that was added
+    /// Make a running broker switch to a newer program of an added bundle
     Upgrade(BundleUpgradeArgs),
-    /// Let a running broker drain a bundle that was added
+    /// Make a running broker drain an added bundle
     Remove(BundleRemoveArgs),
-    /// Show what a shadow has found, and which verdicts it would change
+    /// Show the findings of a shadow, and the verdicts that it would change
     Trials(BundleTrialsArgs),
-    /// Make a directory with a bundle of one's own, which runs and has a rule, its page and a test
+    /// Create a directory with a new bundle, which runs and has a rule, its page and a test
     New(BundleNewArgs),
 }
 
@@ -35,7 +35,7 @@ pub enum BundleCommand {
 -c CONFIG                               run as a module of ASAM's framework\n  \
 [--schema-dir DIR]                      with each of them: schemas to use instead of the known ones")]
 pub struct BundleRunArgs {
-    /// A standard bundle (xodr, xosc, modular) or a program that is a bundle
+    /// A standard bundle (xodr, xosc, modular) or the program of a bundle
     pub name: String,
     /// Arguments for the bundle; without any it joins the bus of the default instance
     #[arg(
@@ -46,16 +46,16 @@ pub struct BundleRunArgs {
     pub arguments: Vec<std::ffi::OsString>,
 }
 
-/// How a daemon joins the bus.
+/// Options with which a daemon joins the bus.
 #[derive(Debug, Clone, Default, ClapArgs)]
 pub struct BusArgs {
-    /// Which broker.
+    /// Selection of the broker.
     #[command(flatten)]
     pub instance: InstanceArgs,
-    /// Given by the broker that starts this process
+    /// Number given by the broker that starts this process
     #[arg(long, hide = true)]
     pub launch: Option<u64>,
-    /// Leave at once when the process that started this one dies
+    /// Exit at once when the parent process dies
     #[arg(long, hide = true)]
     pub die_with_parent: bool,
 }
@@ -69,25 +69,26 @@ qcbus bundle add mine /opt/mine/bundle -- --its-own-flag\n  \
 qcbus bundle add rules ./rules.py       with the python3 beside qcbus, or of PATH"
 )]
 pub struct BundleAddArgs {
-    /// The bundle's name, as it says it itself
+    /// Name of the bundle as the bundle itself reports it
     pub name: String,
     /// The program (or script.py) and its arguments; put `--` before arguments that begin with `-`
     #[arg(required_unless_present = "asam")]
     pub command: Vec<String>,
-    /// Instead: the command of a one-shot module of ASAM's framework, for a shell, such as
-    /// 'qc_opendrive -c $ASAM_QC_FRAMEWORK_CONFIG_FILE'
+    /// Shell command of an ASAM module, to be used instead of a program, such as 'qc_opendrive -c
+    /// $ASAM_QC_FRAMEWORK_CONFIG_FILE'
     #[arg(long, value_name = "COMMAND", conflicts_with = "command")]
     pub asam: Option<String>,
-    /// Let it look at every file without weight in any verdict; `qcbus bundle trials` shows what it would change
+    /// Let it check every file without effect on any verdict; `qcbus bundle trials` shows the
+    /// possible changes
     #[arg(long)]
     pub shadow: bool,
-    /// Leave it in when it does not become ready
+    /// Keep it even if it does not become ready
     #[arg(long)]
     pub keep: bool,
-    /// Wait this long until it is ready
+    /// Maximum time to wait until it is ready
     #[arg(long, value_name = "TIME", default_value = "30s", value_parser = duration)]
     pub timeout: Duration,
-    /// Which broker, and which directory.
+    /// Selection of the broker and of the manifest directory.
     #[command(flatten)]
     pub manifests: ManifestArgs,
 }
@@ -101,21 +102,21 @@ its path is noticed without this command, too; this one says what became of it."
 pub struct BundleUpgradeArgs {
     /// The bundle's name
     pub name: String,
-    /// Another program and its arguments; without, what lies at the path of the one before
+    /// New program and its arguments (default: the program at the previous path)
     pub command: Vec<String>,
-    /// Let a shadow judge from now on
+    /// Let a shadow decide verdicts from now on
     #[arg(long)]
     pub no_shadow: bool,
-    /// Let it look without weight in any verdict from now on
+    /// Let it check without effect on any verdict from now on
     #[arg(long, conflicts_with = "no_shadow")]
     pub shadow: bool,
-    /// Leave what was changed in the manifest when it does not become ready
+    /// Keep the changes to the manifest even if it does not become ready
     #[arg(long)]
     pub keep: bool,
-    /// Wait this long until it is ready
+    /// Maximum time to wait until it is ready
     #[arg(long, value_name = "TIME", default_value = "30s", value_parser = duration)]
     pub timeout: Duration,
-    /// Which broker.
+    /// Selection of the broker.
     #[command(flatten)]
     pub instance: InstanceArgs,
 }
@@ -128,12 +129,12 @@ judge.\n\nExit codes: 0 nothing would be rejected or undetermined because of it,
 would be undetermined, it has not tried everything yet, or nothing at all"
 )]
 pub struct BundleTrialsArgs {
-    /// The shadow's name
+    /// Name of the shadow
     pub name: String,
-    /// As JSON
+    /// Print JSON
     #[arg(long)]
     pub json: bool,
-    /// Which broker.
+    /// Selection of the broker.
     #[command(flatten)]
     pub instance: InstanceArgs,
 }
@@ -142,29 +143,29 @@ pub struct BundleTrialsArgs {
 #[derive(Debug, ClapArgs)]
 #[command(group = clap::ArgGroup::new("language").required(true))]
 pub struct BundleNewArgs {
-    /// The bundle's name; the directory is called so, too
+    /// Name of the bundle and of the directory
     pub name: String,
-    /// In Python, with the package `qcbus`
+    /// Use Python, with the package `qcbus`
     #[arg(long, group = "language")]
     pub python: bool,
-    /// In Rust, with the SDK of a checkout of qcbus
+    /// Use Rust, with the SDK of a checkout of qcbus
     #[arg(long, group = "language")]
     pub rust: bool,
-    /// The checkout of qcbus whose SDK it is built with (default: the one that this program was built from)
+    /// Checkout of qcbus with the SDK to use (default: the one from which this program was built)
     #[arg(long, value_name = "DIR", conflicts_with = "python")]
     pub sdk: Option<PathBuf>,
 }
 
-/// Where the manifest of a bundle lies.
+/// Location of the manifest of a bundle.
 #[derive(Debug, ClapArgs)]
 pub struct ManifestArgs {
-    /// Which broker.
+    /// Selection of the broker.
     #[command(flatten)]
     pub instance: InstanceArgs,
     /// Directory of bundle manifests (default: the one that the broker watches)
     #[arg(long, value_name = "DIR")]
     pub bundles_d: Option<PathBuf>,
-    /// For a broker that does not run now (default directory: qcbus-out/.qcbus/bundles.d)
+    /// For a broker that is not running (default directory: qcbus-out/.qcbus/bundles.d)
     #[arg(long)]
     pub offline: bool,
 }
@@ -174,7 +175,7 @@ pub struct ManifestArgs {
 pub struct BundleRemoveArgs {
     /// The bundle's name
     pub name: String,
-    /// Which broker, and which directory.
+    /// Selection of the broker and of the manifest directory.
     #[command(flatten)]
     pub manifests: ManifestArgs,
 }

@@ -1,4 +1,5 @@
-//! A report module of ASAM's framework on the bus: run for every result, and what it writes lies beside that.
+//! Report module of ASAM's framework on the bus: runs for every result and writes its output beside
+//! the result.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -29,7 +30,7 @@ pub fn run(arguments: impl Iterator<Item = OsString>) -> Exit {
 fn begin(
     arguments: impl Iterator<Item = OsString>,
 ) -> Result<(HostedReporter, Instance, Identity), (Exit, String)> {
-    // Before there is any thread: an office is forked from this process.
+    // This runs before any thread exists, because the runner is forked from this process.
     let (module, rest) = ReportModule::start(&[standard::ASAM_ADAPTER], arguments)?;
     let usage = |why: String| (Exit::Usage, why);
     let Mode::Bus(bus) = Mode::parse(rest).map_err(|error| usage(error.to_string()))? else {
@@ -53,7 +54,7 @@ struct HostedReporter {
 }
 
 impl HostedReporter {
-    /// Where what it writes of a result goes: `a.xodr.xqar` has `a.xodr.NAME/` beside it.
+    /// Returns the output directory for a result: `a.xodr.xqar` has `a.xodr.NAME/` beside it.
     fn place(&self, xqar: &str) -> PathBuf {
         let stem = xqar.strip_suffix(".xqar").unwrap_or(xqar);
         from_text(&format!("{stem}.{}", self.module.name()))
@@ -72,7 +73,7 @@ impl Reporter for HostedReporter {
             replace_file(&path, bytes)?;
             written.insert(path);
         }
-        // What it wrote of an earlier result and not of this one.
+        // Files of an earlier result that this one did not write again are removed.
         remove_others(&place, &written)
     }
 
@@ -81,7 +82,8 @@ impl Reporter for HostedReporter {
     }
 }
 
-/// Removes what lies in a directory but for `kept`, and directories that are empty then, itself among them.
+/// Removes all files of a directory except `kept`, and all directories that become empty, including
+/// the directory itself.
 fn remove_others(directory: &Path, kept: &BTreeSet<PathBuf>) -> Result<(), ReportError> {
     let failed = |path: &Path| {
         let path = path.to_owned();
@@ -101,7 +103,7 @@ fn remove_others(directory: &Path, kept: &BTreeSet<PathBuf>) -> Result<(), Repor
             std::fs::remove_file(&path).map_err(failed(&path))?;
         }
     }
-    // One with something in it stays.
+    // A directory that is not empty stays.
     let _ = std::fs::remove_dir(directory);
     Ok(())
 }

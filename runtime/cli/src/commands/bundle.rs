@@ -10,7 +10,7 @@ use qcbus_sdk::run::Mode;
 use crate::args::{BundleRunArgs, StatusArgs};
 use crate::{standard, talk};
 
-/// `qcbus bundle list`.
+/// Runs `qcbus bundle list`.
 pub fn list(args: &StatusArgs) -> Exit {
     let instance = match super::settings::instance(&args.instance) {
         Ok(instance) => instance,
@@ -19,7 +19,7 @@ pub fn list(args: &StatusArgs) -> Exit {
             return Exit::Usage;
         }
     };
-    // The list is of use without a broker, too.
+    // The list is useful without a broker too.
     let (running, absent) = match ask_broker(instance.dir(), &Request::Status) {
         Ok(Response::Status(status)) => (status.peers, "not running"),
         Err(AskError::NoBroker { .. }) => (Vec::new(), "not running"),
@@ -76,7 +76,7 @@ pub fn list(args: &StatusArgs) -> Exit {
     Exit::Accepted
 }
 
-/// `qcbus bundle run`.
+/// Runs `qcbus bundle run`.
 pub fn run(args: BundleRunArgs) -> Exit {
     talk::log("warn");
     let Some(bundle) = standard::bundle(&args.name) else {
@@ -92,7 +92,7 @@ pub fn run(args: BundleRunArgs) -> Exit {
     }
 }
 
-/// Becomes a program that is a bundle.
+/// Replaces this process by the program of a bundle.
 fn run_program(args: &BundleRunArgs) -> Exit {
     let is_path = args.name.contains('/');
     let error = std::process::Command::new(&args.name)

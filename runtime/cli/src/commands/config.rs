@@ -1,4 +1,4 @@
-//! `qcbus config check`.
+//! `qcbus config check`: validates a configuration.
 
 use std::path::Path;
 
@@ -22,7 +22,7 @@ pub fn check(file: &Path, bundles_d: Option<&Path>) -> Exit {
     }
 }
 
-/// As a broker loads it that is started with this configuration.
+/// Loads the configuration as a broker started with it does.
 fn load(file: &Path, bundles_d: Option<&Path>) -> Result<Loaded, String> {
     let sources = Sources {
         config: Some(file.to_path_buf()),
@@ -38,8 +38,8 @@ fn load(file: &Path, bundles_d: Option<&Path>) -> Result<Loaded, String> {
     sources.load().map_err(|error| error.to_string())
 }
 
-/// A configuration with warnings is not in order: what they are about is not done as it says, so
-/// whoever looks at it beforehand, perhaps a script, must hear of it.
+/// Prints notices and warnings. A configuration with warnings is an error: the broker does not do
+/// what the named settings say, and a script that checks it in advance must notice.
 fn tell(file: &Path, loaded: &Loaded) -> Exit {
     for line in &loaded.notices {
         talk::print(&format!("{}\n", shown::line(line)));

@@ -1,4 +1,4 @@
-//! `qcbus doctor`: looks for what may keep a broker from working, and says what to do.
+//! `qcbus doctor`: looks for conditions that may prevent a broker from working, and suggests fixes.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ use super::settings::{absolute, instance};
 use crate::args::DoctorArgs;
 use crate::{standard, talk};
 
-/// What is said of one thing that was looked at.
+/// Result of one check of the environment.
 struct Remark {
     ok: bool,
     what: &'static str,
@@ -84,7 +84,7 @@ fn bad(what: &'static str, text: String, advice: &'static str) -> Remark {
     }
 }
 
-/// Room that a broker with some large maps in flight wants.
+/// Shared memory that a broker needs with several large maps in work.
 const SHM_WANTED: u64 = 512 << 20;
 
 fn shared_memory() -> Remark {
@@ -114,7 +114,8 @@ fn shared_memory() -> Remark {
     }
 }
 
-/// Bytes that images may take now, beside what a broker with the standard bundles takes for the bus.
+/// Returns the bytes that are free for images after a broker with the standard bundles has
+/// allocated the bus.
 fn room_for_images(memory: &SharedMemory) -> u64 {
     let host = HostOptions {
         expected_peers: standard::BUNDLES.len() + 1,
@@ -123,7 +124,7 @@ fn room_for_images(memory: &SharedMemory) -> u64 {
     memory.free.saturating_sub(host.shared_memory_bytes())
 }
 
-/// Segments are mapped in full, whether they are used or not.
+/// Checks the limit on address space. Segments are mapped in full, whether they are used or not.
 fn addresses() -> Remark {
     let what = "address space";
     let limit = rustix::process::getrlimit(rustix::process::Resource::As).current;
@@ -196,7 +197,7 @@ fn runtime_directory(directory: &Path) -> Remark {
     let text = to_text(directory);
     match std::fs::create_dir_all(directory).and_then(|()| std::fs::write(&probe, b"")) {
         Ok(()) => {
-            // Only just made; if it stays, it harms nobody.
+            // The file was created a moment ago. It is harmless if it remains.
             let _ = std::fs::remove_file(probe);
             good(what, text)
         }
@@ -240,14 +241,14 @@ fn broker(asked: &Result<Response, AskError>) -> Remark {
 
 const UPGRADE: &str = "use the program that the broker was started from";
 
-/// Whether another program lies by now where the running broker was started from.
+/// Checks whether the program file of the running broker has been replaced since its start.
 fn replaced(status: &Status) -> Option<Remark> {
     let text = status.replaced.clone()?;
     Some(bad("program", text, "restart the broker"))
 }
 
-/// Where one-shot modules have their private directories: as the running broker sees it, which may have another
-/// `TMPDIR` and another view of the disk than this command.
+/// Checks the parent of the private directories of ASAM modules. It reports the view of the running
+/// broker, which may have another `TMPDIR` and another view of the disk than this command.
 fn temporary(status: Option<&Status>) -> Remark {
     let what = "temporary files";
     let own = |directory: PathBuf| ScratchStatus {
@@ -266,7 +267,7 @@ fn temporary(status: Option<&Status>) -> Remark {
     }
 }
 
-/// The directories of the running broker, else those that it would have here; what is named comes first.
+/// Checks the directories given as arguments, else those of the running broker, else the defaults.
 fn directories(args: &DoctorArgs, status: Option<&Status>) -> Vec<Remark> {
     let out = args.out.as_deref().map(absolute);
     let running = status.filter(|_| out.is_none());

@@ -1,4 +1,4 @@
-//! `qcbus expand`.
+//! `qcbus expand`: writes a modular scenario as one plain scenario.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -37,7 +37,7 @@ fn expanded(args: &ExpandArgs) -> Result<Exit, Failed> {
     let expansion = subject.expansion();
     let name = to_text(&args.file);
     if let Some(why) = in_the_way(&expansion) {
-        // What has just been said with its place is not said again.
+        // A reason that was already printed with its place is not repeated.
         let why = match said.contains(&why.text) {
             true => String::new(),
             false => format!(": {}: {}", why.place, why.text),
@@ -66,7 +66,8 @@ fn expanded(args: &ExpandArgs) -> Result<Exit, Failed> {
     Ok(Exit::Accepted)
 }
 
-/// A scenario that is lost on its way is no success; a reader that has left knows so itself.
+/// Writes the scenario to stdout. A failed write is an error; a closed pipe is not, because the
+/// reader closed it itself.
 fn written_out(text: &str) -> Result<Exit, Failed> {
     let mut out = std::io::stdout().lock();
     let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
@@ -78,7 +79,7 @@ fn written_out(text: &str) -> Result<Exit, Failed> {
     }
 }
 
-/// Reads a modular scenario and all that belongs to it.
+/// Reads a modular scenario and all files that belong to it.
 fn load(path: &Path) -> Result<Loaded, Failed> {
     let folder = path.parent().filter(|it| !it.as_os_str().is_empty());
     let boundary = folder.unwrap_or(Path::new("."));
@@ -94,8 +95,8 @@ fn load(path: &Path) -> Result<Loaded, Failed> {
     Err((Exit::Usage, text))
 }
 
-/// Says on stderr which errors and warnings the rules about modular scenarios find; gives them back,
-/// and what they come to.
+/// Prints the errors and warnings of the rules about modular scenarios on stderr. Returns the text
+/// and its verdict.
 pub(super) fn say_findings(loaded: &Loaded) -> Result<(String, Verdict), Failed> {
     let plan = Plan::by_default(&qcbus_modular::BUNDLE);
     let (text, verdict) =
@@ -110,7 +111,8 @@ fn internal(error: &qcbus_sdk::LoadError) -> Failed {
     (Exit::Internal, format!("failed to {error}"))
 }
 
-/// Paths in a scenario start where it lies: in another directory they lead elsewhere.
+/// Warns about relative paths in the scenario if the output is in another directory. Such paths
+/// start at the directory of the scenario.
 fn say_moved(expansion: &Expansion<'_>, args: &ExpandArgs) {
     let Some(output) = &args.output else { return };
     let directory = |path: &Path| {
@@ -139,7 +141,7 @@ fn say_moved(expansion: &Expansion<'_>, args: &ExpandArgs) {
     }
 }
 
-/// Why no plain scenario can be made.
+/// Reason why no plain scenario can be made, with its place.
 struct InTheWay {
     place: String,
     text: String,
@@ -164,11 +166,11 @@ fn in_the_way(expansion: &Expansion<'_>) -> Option<InTheWay> {
     })
 }
 
-/// The file that the scenario is made of and that would be overwritten.
+/// Returns the source file of the scenario that the output would overwrite.
 fn source_at(expansion: &Expansion<'_>, output: &Path) -> Option<String> {
     let output = output.canonicalize().ok()?;
     let files = expansion.pieces.iter().map(|piece| piece.document.path());
-    // Of a member the archive counts.
+    // The source file of an archive member is the archive.
     let mut files = files.map(|path| split_archive(path).map_or(path, |(archive, _)| archive));
     files
         .find(|file| {

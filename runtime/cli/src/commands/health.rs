@@ -1,17 +1,19 @@
-//! `qcbus status --health`: whether a broker needs a look, for scripts and service managers.
+//! `qcbus status --health`: reports to scripts and service managers whether a broker needs
+//! attention.
 
 use std::collections::BTreeMap;
 
 use qcbus_messages::control::{NoticeStatus, PeerStatus, Status};
 use qcbus_messages::{Exit, shown};
 
-/// What happened within this time may still be so. What lasts is told again more often.
+/// Time in seconds within which a failure may still persist. A persistent failure is reported more
+/// often.
 const RECENT_S: u64 = 60;
 
-/// Of things that cannot be looked at, so many are named.
+/// Maximum number of unreadable paths that are listed.
 const NAMED: usize = 5;
 
-/// One line that says whether the broker is healthy, then a line for each reason why not.
+/// Formats one line that says whether the broker is healthy, then one line for each reason why not.
 pub fn render(reasons: &[String]) -> String {
     if reasons.is_empty() {
         return "healthy\n".to_owned();
@@ -22,7 +24,7 @@ pub fn render(reasons: &[String]) -> String {
         .collect()
 }
 
-/// With what the command ends.
+/// Returns the exit code of the command.
 pub fn exit(reasons: &[String]) -> Exit {
     match reasons {
         [] => Exit::Accepted,
@@ -30,7 +32,7 @@ pub fn exit(reasons: &[String]) -> Exit {
     }
 }
 
-/// Why a broker needs a look; nothing when it does not.
+/// Returns the reasons why a broker needs attention. The list is empty for a healthy broker.
 pub fn reasons(status: &Status) -> Vec<String> {
     let mut reasons = status.troubles.clone();
     reasons.extend(status.peers.iter().filter_map(of_peer));
@@ -41,7 +43,7 @@ pub fn reasons(status: &Status) -> Vec<String> {
     }
     let mut told: BTreeMap<&str, u64> = BTreeMap::new();
     for notice in status.notices.iter().filter(|it| is_failure(it)) {
-        // What is tried again is told again.
+        // A repeated attempt repeats its notice; only the latest one counts.
         let ago_s = told.entry(&notice.text).or_insert(notice.ago_s);
         *ago_s = notice.ago_s.min(*ago_s);
     }
@@ -53,7 +55,8 @@ pub fn reasons(status: &Status) -> Vec<String> {
     reasons
 }
 
-/// A bundle that does not judge keeps files from being accepted, and a reporter that is not there keeps reports.
+/// Returns the problem of a peer. Without a working bundle no file is accepted; without a reporter
+/// its reports are missing.
 fn of_peer(peer: &PeerStatus) -> Option<String> {
     let PeerStatus {
         role, name, note, ..
@@ -73,11 +76,11 @@ fn of_peer(peer: &PeerStatus) -> Option<String> {
     Some(format!("{role} {name} {what}{why}"))
 }
 
-/// Whether a notice says that something cannot be read, written or given room. Of other trouble the status itself
-/// tells how it is now.
+/// Checks whether a notice says that something cannot be read, written or given room. For other
+/// failures the status itself shows the current state.
 fn is_failure(notice: &NoticeStatus) -> bool {
     match notice.kind.as_str() {
-        // Until the broker is started again.
+        // A loss remains until the broker is restarted.
         "lost" => true,
         "no-room" | "not-read" | "not-written" | "not-delivered" => notice.ago_s <= RECENT_S,
         _ => false,

@@ -1,6 +1,6 @@
-//! `qcbus bundle add` and `qcbus bundle remove`: the manifests that a broker watches for. Success
-//! means that the broker has taken it and, of what was added, that it is ready; or, with `--offline`, is said
-//! not to mean that.
+//! `qcbus bundle add` and `qcbus bundle remove`: change the manifests that a broker watches.
+//! Success means that the broker has loaded the change and that an added bundle is ready. With
+//! `--offline` the output says that this is not verified.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -15,14 +15,14 @@ use qcbus_messages::path_text::to_text;
 use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 
-use super::programs::{command_line, is_asam_module};
+use super::programs::{asam_module_command, command_line};
 use super::readiness;
 use super::remote::exit_of;
 use super::settings::{absolute, instance, real};
 use crate::args::{BundleAddArgs, BundleRemoveArgs, ManifestArgs};
 use crate::{standard, talk};
 
-/// Why nothing was done, and what to do.
+/// Exit code and message: why nothing was done, and what to do.
 pub(super) type Refusal = (Exit, String);
 
 pub(super) fn usage(why: impl Into<String>) -> Refusal {
@@ -55,11 +55,11 @@ pub(super) fn said(done: Result<String, Refusal>) -> Exit {
 fn try_add(args: &BundleAddArgs) -> Result<String, Refusal> {
     good_name(&args.name)?;
     let (name, command) = match &args.asam {
-        Some(command) => (&joined_as(&args.name), is_asam_module(command)?),
+        Some(command) => (&joined_as(&args.name), asam_module_command(command)?),
         None => (&args.name, command_line(&args.command)?),
     };
     let home = Home::find(&args.manifests)?;
-    // What cannot be made is said by whoever writes into it.
+    // The write below reports a missing directory.
     let _ = std::fs::create_dir_all(&home.directory);
     let _alone = home.alone()?;
     let path = home.manifest(name);
@@ -98,7 +98,7 @@ fn try_add(args: &BundleAddArgs) -> Result<String, Refusal> {
     }
 }
 
-/// A name that is that of a file, too.
+/// Checks that a bundle name is also a valid file name.
 pub(super) fn good_name(name: &str) -> Result<(), Refusal> {
     let good = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
     if !name.is_empty() && !name.starts_with('.') && name.chars().all(good) {
@@ -133,7 +133,7 @@ fn try_remove(args: &BundleRemoveArgs) -> Result<String, Refusal> {
     }
 }
 
-/// As it was before; what cannot be put back is said.
+/// Restores a manifest. Reports an error if that fails.
 fn put_back(path: &Path, before: Option<&[u8]>) {
     let done = match before {
         Some(bytes) => write_whole(path, bytes, true),
@@ -144,12 +144,12 @@ fn put_back(path: &Path, before: Option<&[u8]>) {
     }
 }
 
-/// The directory of manifests, and who looks at it.
+/// The directory of manifests and the broker that watches it.
 pub(super) struct Home {
     directory: PathBuf,
-    /// Where the broker that watches the directory listens; `None` when none does.
+    /// Instance directory of the broker that watches the manifests; `None` if no broker does.
     broker: Option<PathBuf>,
-    /// Why nobody watches it, to be put behind "but".
+    /// Reason why no broker watches the directory; printed after "but".
     unwatched: String,
 }
 
@@ -178,7 +178,7 @@ impl Home {
         Err((exit, format!("nothing was done: {why}; {advice}")))
     }
 
-    /// The directory that a running broker watches, if it is the one that is meant.
+    /// Returns the directory that a running broker watches, if it is the given one.
     fn watched(instance: &Instance, given: Option<&Path>) -> Result<Home, Refusal> {
         let name = instance.name();
         let status = match ask_broker(instance.dir(), &Request::Status) {
@@ -211,22 +211,23 @@ impl Home {
         })
     }
 
-    /// Where the broker listens that watches the directory.
+    /// Returns the instance directory of the broker that watches the manifests.
     pub fn broker(&self) -> Option<&Path> {
         self.broker.as_deref()
     }
 
-    /// Where the manifest of a bundle lies.
+    /// Returns the path of the manifest of a bundle.
     pub fn manifest(&self, name: &str) -> PathBuf {
         self.directory.join(format!("{name}.json"))
     }
 
-    /// Keeps other commands from changing manifests here until it is dropped: none may take for its own what another
-    /// has written, or take it back.
+    /// Locks the directory until the returned file is dropped. Otherwise a command could take a
+    /// manifest of another command for its own, or take it back.
     pub fn alone(&self) -> Result<Option<File>, Refusal> {
         let shown = to_text(&self.directory);
         let Ok(directory) = File::open(&self.directory) else {
-            // It is made by whoever writes the first; then there is nothing to take for one's own.
+            // The first writer creates the directory. Until then it contains no manifest that could
+            // be mistaken.
             return Ok(None);
         };
         let begin = Instant::now();
@@ -241,13 +242,13 @@ impl Home {
                     );
                     return Err((Exit::Undetermined, why));
                 }
-                // Where nobody can lock, nobody is kept out.
+                // A file system without locks excludes no other command.
                 Ok(()) | Err(_) => return Ok(Some(directory)),
             }
         }
     }
 
-    /// Puts a manifest back as it was before, and says what is in force then.
+    /// Restores a manifest and returns a text about the state that is now in force.
     pub fn take_back(&self, path: &Path, before: Option<&[u8]>) -> String {
         put_back(path, before);
         match self.reload() {
@@ -257,7 +258,7 @@ impl Home {
         }
     }
 
-    /// Whether a broker has taken what was done, and what it has to say then.
+    /// Asks the broker to load the change. Returns its notices, or `None` without a broker.
     pub fn reload(&self) -> Result<Option<Vec<String>>, Refusal> {
         let Some(broker) = &self.broker else {
             return Ok(None);
@@ -270,7 +271,7 @@ impl Home {
         }
     }
 
-    /// Removes a bundle that no manifest here names.
+    /// Removes a bundle that no manifest in this directory names.
     fn forget(&self, name: &str, path: &Path) -> Result<String, Refusal> {
         let missing = format!("there is no {}", to_text(path));
         let Some(broker) = &self.broker else {
@@ -291,15 +292,15 @@ impl Home {
     }
 }
 
-/// Where manifests lie for a broker with the default options.
+/// Directory of manifests of a broker with the default options.
 const OFFLINE: &str = "qcbus-out/.qcbus/bundles.d";
 
-/// How long the commands of others are waited for.
+/// Maximum time to wait for other commands.
 const OTHERS: Duration = Duration::from_secs(60);
 
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// The text of a manifest.
+/// Returns the text of a manifest.
 fn manifest(args: &BundleAddArgs, command: &str) -> String {
     let mut module = serde_json::json!({
         "name": args.name,
@@ -315,7 +316,8 @@ fn manifest(args: &BundleAddArgs, command: &str) -> String {
     format!("{manifest:#}\n")
 }
 
-/// The name under which a one-shot module joins: its own, unless a bundle that comes with qcbus has it.
+/// Returns the name under which an ASAM module joins the bus: its own name, unless a standard
+/// bundle has it.
 fn joined_as(name: &str) -> String {
     match standard::bundle(name) {
         Some(_) => format!("asam.{name}"),
@@ -323,8 +325,8 @@ fn joined_as(name: &str) -> String {
     }
 }
 
-/// The text of the manifest of a one-shot module, which looks for its section of a configuration by the name that it was
-/// given.
+/// Returns the text of the manifest of an ASAM module. The module finds its section of a
+/// configuration by the name given to it.
 fn asam_module_manifest(name: &str, args: &BundleAddArgs, command: &str) -> String {
     let mut module = serde_json::json!({
         "name": name,

@@ -1,4 +1,4 @@
-//! One command, one file.
+//! One module for each command.
 
 mod asam_report;
 mod bundle;
@@ -34,8 +34,9 @@ use crate::args::{
 };
 use crate::{standard, talk};
 
-/// What a broker starts a standard bundle with, `bundle run NAME … --launch N`: read by hand, for the tree of all
-/// commands takes as long to build as such a bundle may take to start. Everything else is for the parser.
+/// Parses the command with which a broker starts a standard bundle: `bundle run NAME … --launch N`.
+/// It is parsed by hand, because building the tree of all commands takes as long as the start of a
+/// bundle may take. The regular parser handles every other command.
 pub fn started_bundle(arguments: impl Iterator<Item = OsString>) -> Option<impl FnOnce() -> Exit> {
     let mut words = arguments;
     let is = |word: Option<OsString>, wanted: &str| word.is_some_and(|it| it == wanted);
@@ -50,7 +51,8 @@ pub fn started_bundle(arguments: impl Iterator<Item = OsString>) -> Option<impl 
     (is_standard && is_started).then_some(move || bundle::run(run))
 }
 
-/// What a broker starts for a one-shot module of ASAM's framework, `asam-adapter …`: read by hand as well.
+/// Parses the command with which a broker starts a module of ASAM's framework: `asam-adapter …`. It
+/// is parsed by hand, too.
 pub fn adapter(arguments: impl Iterator<Item = OsString>) -> Option<impl FnOnce() -> Exit> {
     let mut words = arguments;
     let is_it = words.next().is_some_and(|it| it == standard::ASAM_ADAPTER);
@@ -60,14 +62,15 @@ pub fn adapter(arguments: impl Iterator<Item = OsString>) -> Option<impl FnOnce(
     })
 }
 
-/// What a broker starts for a one-shot report module of ASAM's framework, `asam-reporter …`.
+/// Parses the command with which a broker starts a report module of ASAM's framework:
+/// `asam-reporter …`.
 pub fn asam_reporter(arguments: impl Iterator<Item = OsString>) -> Option<impl FnOnce() -> Exit> {
     let mut words = arguments;
     let is_it = words.next().is_some_and(|it| it == standard::ASAM_REPORTER);
     is_it.then_some(move || asam_report::run(words))
 }
 
-/// Does what the command line says.
+/// Runs the command of the command line.
 pub fn run(args: Args) -> Exit {
     match args.command {
         Command::Check(args) => check::run(&args),

@@ -1,4 +1,4 @@
-//! Rules of bundles that do not come with qcbus, as a broker knows them of those that are there.
+//! Rules of bundles that do not come with qcbus, as offered by the bundles of a running broker.
 
 use std::fmt::Write;
 
@@ -11,22 +11,22 @@ use super::settings;
 use crate::args::InstanceArgs;
 use crate::standard;
 
-/// What a broker knows, if there is one.
+/// Rules that a running broker knows, if there is one.
 pub struct Offered {
-    /// By name.
+    /// Bundles with their rules, sorted by name.
     offers: Vec<Offer>,
-    /// Why nothing is known, for a person.
+    /// Reason for the user why no rules are known.
     pub why_not: Option<String>,
 }
 
-/// A rule of a bundle, and who offers it.
+/// A rule and the bundle that offers it.
 pub type OfferedRule<'o> = (&'o Offer, &'o CheckerInfo);
 
 impl Offered {
     /// Asks the broker of an instance.
     ///
     /// # Errors
-    /// When that is no instance.
+    /// Returns an error if the instance is invalid.
     pub fn ask(args: &InstanceArgs) -> Result<Offered, String> {
         let instance = settings::instance(args)?;
         let without = standard::BUNDLES.iter().map(|it| it.name.to_owned());
@@ -46,13 +46,13 @@ impl Offered {
         Ok(Offered { offers, why_not })
     }
 
-    /// All rules.
+    /// Returns all rules.
     pub fn rules(&self) -> impl Iterator<Item = OfferedRule<'_>> {
         let offers = self.offers.iter();
         offers.flat_map(|offer| offer.catalogue.checkers.iter().map(move |it| (offer, it)))
     }
 
-    /// The rules that a name means: an id or UID, or else the end of one.
+    /// Returns the rules that match a name: an id or UID, else the end of one.
     pub fn find(&self, name: &str) -> Vec<OfferedRule<'_>> {
         let meant = |fits: &dyn Fn(&str) -> bool| -> Vec<OfferedRule<'_>> {
             let is_it = |it: &CheckerInfo| fits(&it.id) || it.rule_uids.iter().any(|it| fits(it));
@@ -69,13 +69,13 @@ impl Offered {
     }
 }
 
-/// A line for lists.
+/// Returns a line for lists.
 pub fn line((offer, rule): OfferedRule<'_>) -> String {
     let line = format!("{:<72} {} ({})", rule.id, rule.description, offer.name);
     shown::line(&line).to_string()
 }
 
-/// What is known of a rule. Its page stays with its bundle.
+/// Returns the known facts about a rule. Its page stays with its bundle.
 pub fn page((offer, rule): OfferedRule<'_>) -> String {
     let mut lines = vec![rule.id.to_string()];
     lines.extend(rule.rule_uids.iter().map(|uid| format!("  {uid}")));
@@ -109,7 +109,7 @@ pub fn page((offer, rule): OfferedRule<'_>) -> String {
     text
 }
 
-/// The same for programs.
+/// Returns the same facts as JSON.
 pub fn describe((offer, rule): OfferedRule<'_>) -> serde_json::Value {
     let params = rule.params.iter().map(|it| {
         serde_json::json!({"name": it.name, "default": it.default, "description": it.description})

@@ -1,4 +1,4 @@
-//! `qcbus pack`.
+//! `qcbus pack`: packs a scenario and its files into an archive.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use super::expand::{Failed, say_findings};
 use crate::args::PackArgs;
 use crate::talk;
 
-/// What the scenario is called that an archive starts from.
+/// Name of the main scenario in an archive.
 const MAIN: &str = "main.xosc";
 
 /// Runs the command.
@@ -65,7 +65,7 @@ fn packed(args: &PackArgs) -> Result<Exit, Failed> {
     })
 }
 
-/// A file that an archive can hold; what is no file has no end.
+/// Reads a file for an archive. Anything but a regular file is refused, because it may have no end.
 fn read(path: &Path) -> Result<Vec<u8>, String> {
     let most = Limits::default().max_archive;
     let failed = |error: std::io::Error| format!("cannot read {}: {error}", to_text(path));
@@ -82,7 +82,7 @@ fn read(path: &Path) -> Result<Vec<u8>, String> {
     std::fs::read(path).map_err(failed)
 }
 
-/// What the files are called in the archive.
+/// Returns the names of the files in the archive, with their paths.
 fn members(files: &[PathBuf]) -> Result<Vec<(String, PathBuf)>, String> {
     let Some((main, others)) = files.split_first() else {
         return Err("there is nothing to pack".to_owned());
@@ -116,7 +116,7 @@ fn members(files: &[PathBuf]) -> Result<Vec<(String, PathBuf)>, String> {
     Ok(members)
 }
 
-/// Links are followed, so that one file has one name.
+/// Returns the absolute path. Links are followed, so that each file has one name.
 fn absolute(path: &Path) -> PathBuf {
     let whole = path.canonicalize().or_else(|_| std::path::absolute(path));
     whole.unwrap_or_else(|_| path.to_path_buf())

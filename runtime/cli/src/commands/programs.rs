@@ -1,4 +1,4 @@
-//! The commands of manifests that `qcbus bundle add` and `qcbus bundle upgrade` write.
+//! Commands of the manifests that `qcbus bundle add` and `qcbus bundle upgrade` write.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -13,12 +13,12 @@ use super::settings::absolute;
 
 const PYTHON: &str = "python3";
 
-/// Most bytes of a script's first line, as for the kernel.
+/// Maximum length in bytes of a script's first line, as in the kernel.
 const FIRST_LINE: u64 = 256;
 
-/// The command of a one-shot module with the whole path of its program, as in [`command_line`]. The rest is the
-/// shell's.
-pub(super) fn is_asam_module(command: &str) -> Result<String, Refusal> {
+/// Returns the command of an ASAM module with the absolute path of its program, as in
+/// [`command_line`]. The shell interprets the rest.
+pub(super) fn asam_module_command(command: &str) -> Result<String, Refusal> {
     let command = qcbus_asam_adapter::goes_where_it_is(command).map_or(command, |(rest, _)| rest);
     let (program, rest) = first_word(command.trim())?;
     let found = find_program(&program).map_err(usage)?;
@@ -29,7 +29,8 @@ pub(super) fn is_asam_module(command: &str) -> Result<String, Refusal> {
     Ok(format!("{}{rest}", quote(path)))
 }
 
-/// The first word of a command as the shell takes it, without its quotes and escapes, and the rest as it was written.
+/// Returns the first word of a command as the shell reads it, without quotes and escapes, and the
+/// unchanged rest.
 fn first_word(command: &str) -> Result<(String, &str), Refusal> {
     if shlex::split(command).is_none() {
         let why = "a quote is not closed, or nothing follows a backslash at the end";
@@ -37,7 +38,7 @@ fn first_word(command: &str) -> Result<(String, &str), Refusal> {
     }
     let spaces = command.char_indices().filter(|(_, c)| c.is_whitespace());
     let ends = spaces.map(|(at, _)| at).chain([command.len()]);
-    // Within quotes and behind a backslash, a text that ends at a space is no whole word.
+    // A text that ends at a space inside quotes or after a backslash is not a whole word.
     let mut words = ends.filter_map(|end| Some((shlex::split(&command[..end])?, end)));
     let first = words.find_map(|(words, end)| Some((words.into_iter().next()?, end)));
     let Some((program, end)) = first.filter(|(program, _)| !program.is_empty()) else {
@@ -46,8 +47,9 @@ fn first_word(command: &str) -> Result<(String, &str), Refusal> {
     Ok((program, &command[end..]))
 }
 
-/// The command of a manifest. Programs are named by their whole path: the broker may run elsewhere and
-/// search elsewhere. So is the interpreter of a script in Python, which decides what it can import.
+/// Returns the command of a manifest. Programs have absolute paths, because the broker may have
+/// another directory and another `PATH`. The same is true for the interpreter of a Python script,
+/// which decides what the script can import.
 pub(super) fn command_line(words: &[String]) -> Result<String, Refusal> {
     let Some((program, arguments)) = words.split_first() else {
         return Err(usage("no program is named"));
@@ -83,7 +85,7 @@ fn script_at(script: &Path) -> Result<PathBuf, Refusal> {
     }
 }
 
-/// The words that a script in Python is started with: those of its first line, else the interpreter.
+/// Returns the words that start a Python script: those of its first line, else the interpreter.
 fn interpreter_of(script: &Path) -> Result<Vec<PathBuf>, String> {
     let Some(words) = shebang(script) else {
         return Ok(vec![find_program(PYTHON)?]);
@@ -97,11 +99,12 @@ fn interpreter_of(script: &Path) -> Result<Vec<PathBuf>, String> {
         .collect())
 }
 
-/// The words of a script's first line, where that names an interpreter. What `env` would look for is looked for here.
+/// Returns the words of a script's first line if it names an interpreter. A program for `env` is
+/// searched here.
 fn shebang(script: &Path) -> Option<Vec<String>> {
     let mut bytes = Vec::new();
     let opened = File::open(script).ok()?;
-    // A script that cannot be read is the interpreter's to complain about.
+    // The interpreter reports a script that cannot be read.
     opened.take(FIRST_LINE).read_to_end(&mut bytes).ok()?;
     let line = bytes.split(|byte| *byte == b'\n').next()?;
     let line = str::from_utf8(line).ok()?.strip_prefix("#!")?.trim();
@@ -117,7 +120,7 @@ fn shebang(script: &Path) -> Option<Vec<String>> {
     (!words.is_empty()).then_some(words)
 }
 
-/// Where a program lies that can be run: in the environment that this program is part of, or on the `PATH`.
+/// Returns the path of an executable program: in the environment of this program, or on the `PATH`.
 fn find_program(program: &str) -> Result<PathBuf, String> {
     if program.contains('/') {
         let path = absolute(Path::new(program));

@@ -1,5 +1,5 @@
-//! Whether a bundle that was added or changed is ready, and why not. The broker says it of the very command that is
-//! wanted, so that no process before is taken for it.
+//! Waits for an added or changed bundle and reports why it is not ready. The broker names the
+//! command of the process, so that an earlier process is not mistaken for it.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -11,10 +11,10 @@ use qcbus_messages::{Exit, shown};
 use super::manifests::{Home, Refusal};
 use crate::talk;
 
-/// How often the broker is asked.
+/// Pause between two requests to the broker.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// How a bundle stands; `None` when there is none of this name.
+/// Returns the state of a bundle; `None` if there is none of this name.
 pub fn readiness(broker: &Path, name: &str) -> Result<Option<Box<BundleReadiness>>, Refusal> {
     let request = Request::Bundle {
         name: name.to_owned(),
@@ -30,7 +30,7 @@ pub fn readiness(broker: &Path, name: &str) -> Result<Option<Box<BundleReadiness
 /// Waits until the process of this command is ready.
 ///
 /// # Errors
-/// Why it is not, for a person.
+/// Returns the reason why it is not ready, for the user.
 pub fn wait(home: &Home, name: &str, command: &str, limit: Duration) -> Result<Runs, Refusal> {
     let Some(broker) = home.broker() else {
         return Err((Exit::NoBroker, "no broker runs".to_owned()));
@@ -62,7 +62,7 @@ pub fn wait(home: &Home, name: &str, command: &str, limit: Duration) -> Result<R
     }
 }
 
-/// Why a bundle is not ready; the last lines that it has said itself are shown.
+/// Returns the reason why a bundle is not ready, and prints the last lines of its output.
 fn failing(name: &str, why: &str, said: &[String]) -> String {
     let why = shown::line(why);
     if said.is_empty() {
@@ -76,7 +76,7 @@ fn failing(name: &str, why: &str, said: &[String]) -> String {
     why.into_owned()
 }
 
-/// What is said of a bundle that is ready; `was` is put behind it.
+/// Returns the message for a bundle that is ready; `was` follows the list of kinds.
 pub fn ready(name: &str, runs: &Runs, was: &str, notices: &[String]) -> String {
     let kinds: Vec<&str> = runs.kinds.iter().map(|it| it.as_str()).collect();
     let mut text = format!(
@@ -102,7 +102,7 @@ pub fn ready(name: &str, runs: &Runs, was: &str, notices: &[String]) -> String {
     std::iter::once(text).chain(lines).collect()
 }
 
-/// So many checkers.
+/// Formats a number of checkers.
 pub fn counted(checkers: u64) -> String {
     match checkers {
         1 => "1 checker".to_owned(),
@@ -110,7 +110,7 @@ pub fn counted(checkers: u64) -> String {
     }
 }
 
-/// So many files.
+/// Formats a number of files.
 pub fn files(number: u64) -> String {
     match number {
         1 => "1 file".to_owned(),

@@ -10,7 +10,7 @@ use super::settings::{instance, named};
 use crate::args::{InstanceArgs, WaitArgs};
 use crate::talk;
 
-/// Asks the broker of an instance; a failure has been said already.
+/// Asks the broker of an instance. A failure has already been printed.
 pub fn ask(args: &InstanceArgs, request: &Request) -> Result<Response, Exit> {
     let instance = instance(args).map_err(|why| {
         talk::fail(&why);
@@ -22,7 +22,7 @@ pub fn ask(args: &InstanceArgs, request: &Request) -> Result<Response, Exit> {
     })
 }
 
-/// With what a command ends that has no answer.
+/// Returns the exit code of a command that gets no answer.
 pub fn exit_of(error: &AskError) -> Exit {
     match error {
         AskError::NoBroker { .. } | AskError::Forbidden { .. } | AskError::Left(_) => {
@@ -105,7 +105,8 @@ pub fn wait(args: &WaitArgs) -> Exit {
     }
 }
 
-/// What the broker knows of a file that it has no verdict on, or of a directory above it.
+/// Returns the reason why the broker has no verdict on a file. It comes from the status of the file
+/// or of a directory above it.
 fn why_no_verdict(args: &WaitArgs) -> String {
     let file = named(&args.file);
     if let Ok(Response::Status(status)) = ask(&args.instance, &Request::Status) {

@@ -1,4 +1,4 @@
-//! `qcbus report`: a reporter on results that are there already.
+//! `qcbus report`: runs a reporter on existing results.
 
 use std::collections::BTreeMap;
 
@@ -54,7 +54,7 @@ pub fn run(args: &ReportArgs) -> Exit {
     }
 }
 
-/// What the rules of the standard bundles are about, by UID.
+/// Returns the descriptions of the rules of the standard bundles, by UID.
 fn about() -> BTreeMap<String, String> {
     let checkers = standard::BUNDLES
         .iter()

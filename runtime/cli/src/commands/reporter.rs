@@ -20,7 +20,7 @@ pub fn run(which: &Registration, bus: &BusArgs) -> Exit {
     };
     let mut reporter = (which.make)(&Setting {
         color: talk::color(),
-        // A private run reports its own files and nothing of earlier ones.
+        // A private run reports its own files only, without those of earlier runs.
         keep: !bus.die_with_parent,
         is_run: false,
         pages: standard::page,
@@ -33,7 +33,7 @@ pub fn run(which: &Registration, bus: &BusArgs) -> Exit {
     serve(&instance, &identity, reporter.as_mut())
 }
 
-/// Reports on the bus of an instance until somebody wants it to go.
+/// Reports on the bus of an instance until it is asked to stop.
 pub fn serve(instance: &Instance, identity: &Identity, reporter: &mut dyn Reporter) -> Exit {
     let runtime = match tokio::runtime::Builder::new_current_thread()
         .enable_all()

@@ -1,4 +1,4 @@
-//! `qcbus rule`: the pages of the rules.
+//! `qcbus rule`: shows the pages of the rules.
 
 use std::fmt::Write;
 
@@ -80,7 +80,7 @@ fn show(id: &str, offered: &Offered, format: Format) -> Exit {
     }
 }
 
-/// A rule of a bundle that does not come with qcbus.
+/// Shows a rule of a bundle that does not come with qcbus.
 fn show_offered(id: &str, offered: &Offered, format: Format) -> Exit {
     match *offered.find(id) {
         [] => unknown(id, offered),
@@ -105,7 +105,7 @@ fn show_offered(id: &str, offered: &Offered, format: Format) -> Exit {
     }
 }
 
-/// Rules that a name may mean, each with what it is about.
+/// Prints the rules that a name may mean, each with its description.
 fn list_candidates(id: &str, checkers: &[(&Bundle, Checker)]) {
     let names = checkers.iter().map(|(_, it)| it.id.chars().count());
     let width = names.max().unwrap_or(0);
@@ -124,7 +124,7 @@ fn first_sentence(text: &str) -> &str {
     text.split(". ").next().unwrap_or(text)
 }
 
-/// All rules that a family or the beginning of a name stands for.
+/// Returns all rules that a family or the beginning of a name matches.
 fn family(id: &str) -> Vec<(&'static Bundle, Checker)> {
     let checkers = standard::checkers().filter(|(_, checker)| !checker.is_backport);
     checkers

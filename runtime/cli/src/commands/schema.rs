@@ -1,4 +1,4 @@
-//! `qcbus schema compile`.
+//! `qcbus schema compile`: compiles schemas into tables.
 
 use std::path::{Path, PathBuf};
 
@@ -31,7 +31,8 @@ pub fn compile(path: &Path, output: &Path) -> Exit {
     }
 }
 
-/// The schema itself, or every schema of a directory: the files of one schema lie together.
+/// Returns the schema itself, or every schema file of a directory. The files of one schema lie
+/// together.
 fn schema_files(path: &Path) -> std::io::Result<Vec<PathBuf>> {
     if path.is_file() {
         return Ok(vec![path.to_path_buf()]);
@@ -75,8 +76,8 @@ fn tables(path: &Path, files: &[PathBuf]) -> Result<String, String> {
         .map_err(|error| format!("failed to {error}"))
 }
 
-/// The name of the file without its ending, or of the directory as it is: the version in it
-/// (`xodr-1.7`) tells `--schema-dir` what the tables are for.
+/// Returns the name of the file without its ending, or the full name of the directory. The version
+/// in it (`xodr-1.7`) tells `--schema-dir` what the tables are for.
 fn title(path: &Path) -> String {
     let whole = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
     let name = if path.is_dir() {

@@ -24,7 +24,8 @@ pub fn run(args: &ServeArgs) -> Exit {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build();
-    // Before anything that takes time: a terminal that closes during the start must not end it.
+    // The handler is installed before any slow step. A terminal that closes during the start must
+    // not end the broker.
     let prepared = runtime.and_then(|runtime| {
         let hangup = runtime.block_on(async { Hangup::reloads() })?;
         Ok((runtime, hangup))
@@ -43,7 +44,7 @@ pub fn run(args: &ServeArgs) -> Exit {
             return Exit::Usage;
         }
     };
-    // What killed checks hold of the shared memory may be what is missing.
+    // Killed checks may still hold shared memory that this broker needs.
     qcbus_bus::sweep_private_instances();
     let exit = runtime.block_on(serve(options, hangup));
     runtime.shutdown_background();
@@ -107,7 +108,7 @@ fn banner(options: &Options) -> String {
     )
 }
 
-/// Log lines: one per verdict, each with the content hash.
+/// Writes log lines: one per verdict, each with the content hash.
 fn tell(told: Told) {
     match told {
         Told::Verdict(it) if it.fresh => tracing::info!(
@@ -124,7 +125,8 @@ fn tell(told: Told) {
     }
 }
 
-/// Refuses a gate whose files would be checked, or that would have checked files for its own.
+/// Refuses a gate inside a watched directory, because its files would be checked. Refuses a watched
+/// directory inside the gate, because published files could replace checked ones.
 fn keep_apart(gate: &Path, roots: &[PathBuf]) -> Result<(), String> {
     let shown = gate.display();
     if let Some(root) = roots.iter().find(|root| gate.starts_with(root)) {
@@ -144,8 +146,8 @@ fn keep_apart(gate: &Path, roots: &[PathBuf]) -> Result<(), String> {
     Ok(())
 }
 
-/// Refuses a gate that shares its directory with something else of the broker: whatever lies there
-/// and was not published is removed.
+/// Refuses a gate that shares its directory with another directory of the broker. The broker
+/// removes every unpublished file from a gate.
 fn of_its_own(gate: &Path, other: &Path, what: &str) -> Result<(), String> {
     if !gate.starts_with(other) && !other.starts_with(gate) {
         return Ok(());

@@ -1,4 +1,4 @@
-//! From the command line to what a broker is told.
+//! Conversion of command line arguments to settings of the broker.
 
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
@@ -13,7 +13,7 @@ use qcbus_sdk::Permits;
 
 use crate::args::{DialectArg, InstanceArgs, LimitArgs};
 
-/// The instance that is meant.
+/// Returns the instance that the arguments name.
 pub fn instance(args: &InstanceArgs) -> Result<Instance, String> {
     match &args.instance_dir {
         Some(dir) => Ok(Instance::at(absolute(dir))),
@@ -21,12 +21,12 @@ pub fn instance(args: &InstanceArgs) -> Result<Instance, String> {
     }
 }
 
-/// A path from the root, as far as possible without looking at the disk.
+/// Returns the absolute path, as far as possible without disk access.
 pub fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())
 }
 
-/// A path as a person here would write it.
+/// Returns the path relative to the current directory, if it lies below it.
 pub fn relative(path: &Path) -> &Path {
     let here = std::env::current_dir().ok();
     let below = here
@@ -37,7 +37,7 @@ pub fn relative(path: &Path) -> &Path {
         .unwrap_or(path)
 }
 
-/// Where a path leads, through links as far as it is there already.
+/// Resolves a path. Links are followed as far as the path exists.
 pub fn real(path: &Path) -> PathBuf {
     let mut real = PathBuf::new();
     for part in absolute(path).components() {
@@ -53,8 +53,8 @@ pub fn real(path: &Path) -> PathBuf {
     real
 }
 
-/// A file as a broker knows it, also one that is still to come: through links to directories, but
-/// under its own name where it is a link itself.
+/// Returns the path under which a broker knows a file, even before the file exists. Links to
+/// directories are followed; a file that is a link itself keeps its own name.
 pub fn named(file: &Path) -> PathBuf {
     let file = absolute(file);
     let (Some(above), Some(name)) = (file.parent(), file.file_name()) else {
@@ -63,16 +63,16 @@ pub fn named(file: &Path) -> PathBuf {
     real(above).join(name)
 }
 
-/// Whether a look through the roots comes to a directory. It passes over hidden ones.
+/// Checks whether a scan of the roots reaches a directory. A scan skips hidden directories.
 pub fn looks_into(roots: &[PathBuf], directory: &Path) -> bool {
     let is_inside = roots.iter().any(|root| directory.starts_with(root));
     is_inside && hidden_above(roots, directory).is_none()
 }
 
-/// Leaves out directories to which a look through the others comes anyway.
+/// Removes directories that a scan of the others reaches anyway.
 pub fn outermost(named: BTreeSet<PathBuf>) -> Vec<PathBuf> {
     let mut roots: Vec<PathBuf> = Vec::new();
-    // Each after those in which it lies.
+    // A directory comes after those that contain it.
     for directory in named {
         if !looks_into(&roots, &directory) {
             roots.push(directory);
@@ -81,8 +81,8 @@ pub fn outermost(named: BTreeSet<PathBuf>) -> Vec<PathBuf> {
     roots
 }
 
-/// A directory of manifests that somebody names must be there: a misspelt one has no bundles, and
-/// what they would have found is missed without a word.
+/// Returns a directory of manifests that must exist. A misspelt one contains no bundles, and their
+/// findings would be missing without any message.
 pub fn manifest_directory(named: &Path) -> Result<PathBuf, String> {
     let path = absolute(named);
     match std::fs::read_dir(&path) {
@@ -94,7 +94,7 @@ pub fn manifest_directory(named: &Path) -> Result<PathBuf, String> {
     }
 }
 
-/// The form of results.
+/// Returns the dialect of results.
 pub fn dialect(arg: DialectArg) -> Dialect {
     match arg {
         DialectArg::Current => Dialect::Current,
@@ -104,7 +104,7 @@ pub fn dialect(arg: DialectArg) -> Dialect {
 
 const MIB: u64 = 1 << 20;
 
-/// The caps on what is read.
+/// Returns the limits on input files.
 pub fn limits(args: &LimitArgs) -> Limits {
     let mut limits = Limits::default();
     if let Some(mib) = args.max_file {
@@ -119,12 +119,12 @@ pub fn limits(args: &LimitArgs) -> Limits {
     limits
 }
 
-/// Most private memory of a child, in bytes.
+/// Returns the maximum private memory of a child in bytes.
 pub fn memory_limit(args: &LimitArgs) -> Option<u64> {
     args.memory_limit.map(|mib| mib.saturating_mul(MIB))
 }
 
-/// The shape of the state machine.
+/// Returns the settings of the state machine.
 pub fn settings(args: &LimitArgs) -> Settings {
     let mut settings = Settings::default();
     settings.job_deadline = args.job_deadline.unwrap_or(settings.job_deadline);
@@ -132,15 +132,16 @@ pub fn settings(args: &LimitArgs) -> Settings {
     settings.absence_limit = args.absence_limit.unwrap_or(settings.absence_limit);
     settings.room_limit = args.room_limit.unwrap_or(settings.room_limit);
     settings.max_restarts = args.max_restarts.unwrap_or(settings.max_restarts);
-    // A third of the work on a file is the broker's: what it reads, and what it has under way, keep many
-    // processors busy. The bounds are those of memory, and of documents on the bus.
+    // The broker does a third of the work on a file. Its reading and its active jobs keep many
+    // processors busy. The upper bounds come from memory and from the number of documents on the
+    // bus.
     let cores = args.threads.unwrap_or_else(Permits::available);
     settings.max_preparing = cores.clamp(settings.max_preparing, 8);
     settings.max_active = (2 * cores + 8).clamp(settings.max_active, 40);
     settings
 }
 
-/// This program's own file, to start children from.
+/// Returns the path of this program, to start children from it.
 pub fn program() -> &'static Path {
     OwnProgram::this().path()
 }

@@ -19,7 +19,7 @@ pub fn run(args: &StatusArgs) -> Exit {
             talk::fail(&format!("the broker answered something else: {other:?}"));
             return Exit::Internal;
         }
-        // It is there and does not answer, which has been said.
+        // The broker runs but does not answer. The error has already been printed.
         Err(Exit::Internal) if args.health => return Exit::Rejected,
         Err(exit) => return exit,
     };
@@ -42,7 +42,7 @@ pub fn run(args: &StatusArgs) -> Exit {
     Exit::Accepted
 }
 
-/// The status as a person reads it.
+/// Formats the status for people.
 pub fn render(status: &Status) -> String {
     let mut text = String::new();
     let files = &status.files;
@@ -109,7 +109,7 @@ pub fn render(status: &Status) -> String {
     if let Some(more) = status.unfinished.len().checked_sub(5).filter(|it| *it > 0) {
         line("note", format!("and {more} more that are being written to"));
     }
-    // What is still unseen has been named, and the rest no longer is.
+    // Current unseen files are listed above; older notices about them are outdated.
     let notices = status.notices.iter().filter(|it| it.kind != "unseen");
     for notice in notices.rev().take(5).collect::<Vec<_>>().into_iter().rev() {
         line(

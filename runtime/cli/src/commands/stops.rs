@@ -1,4 +1,5 @@
-//! Signals: the first asks politely, the second does not. SIGHUP has a broker that stays read its configuration again.
+//! Signals: the first one asks for a drain, the second one ends the process at once. SIGHUP makes a
+//! long-running broker read its configuration again.
 
 use std::io;
 
@@ -6,22 +7,24 @@ use qcbus_broker::OperatorSignal;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::mpsc;
 
-/// SIGHUP, which a closed terminal sends, too.
+/// Handler of SIGHUP, which a closed terminal sends, too.
 pub struct Hangup {
-    /// `None`: it is ignored.
+    /// `None` if the signal is ignored.
     signal: Option<Signal>,
     reloads: bool,
 }
 
 impl Hangup {
-    /// For what goes on without a terminal. Must be called within a tokio runtime.
+    /// Returns the handler of a process that runs without a terminal. Must be called within a tokio
+    /// runtime.
     pub fn reloads() -> io::Result<Hangup> {
         let signal = Some(signal(SignalKind::hangup())?);
         let reloads = true;
         Ok(Hangup { signal, reloads })
     }
 
-    /// For what ends with its terminal, unless `nohup` has started it. Must be called within a tokio runtime.
+    /// Returns the handler of a process that ends with its terminal, unless `nohup` has started it.
+    /// Must be called within a tokio runtime.
     pub fn stops() -> io::Result<Hangup> {
         let is_ignored = std::fs::read_to_string("/proc/self/status")
             .is_ok_and(|status| ignores(&status, SignalKind::hangup()));
@@ -41,7 +44,8 @@ impl Hangup {
     }
 }
 
-/// Whether a process ignores a signal, by what `/proc` says of it: bit 0 is signal 1.
+/// Checks whether a process ignores a signal, according to its status in `/proc`: bit 0 is signal
+/// 1.
 fn ignores(status: &str, kind: SignalKind) -> bool {
     let mut lines = status.lines();
     let mask = lines.find_map(|line| line.strip_prefix("SigIgn:"));
@@ -49,7 +53,7 @@ fn ignores(status: &str, kind: SignalKind) -> bool {
     mask.is_some_and(|mask| mask >> (kind.as_raw_value() - 1) & 1 == 1)
 }
 
-/// Passes on what SIGINT, SIGTERM and SIGHUP ask for. Must be called within a tokio runtime.
+/// Forwards the requests of SIGINT, SIGTERM and SIGHUP. Must be called within a tokio runtime.
 pub fn listen(mut hangup: Hangup) -> io::Result<mpsc::Receiver<OperatorSignal>> {
     let (sender, receiver) = mpsc::channel(4);
     let mut interrupt = signal(SignalKind::interrupt())?;

@@ -1,4 +1,4 @@
-//! `qcbus bundle trials`: what a shadow has found, and what would be otherwise if it judged.
+//! `qcbus bundle trials`: shows the findings of a shadow and the verdicts that it would change.
 
 use std::fmt::Write;
 
@@ -49,7 +49,7 @@ fn exit(counts: &TrialCounts) -> Exit {
     }
 }
 
-/// How far a shadow is, in a few words.
+/// Formats the progress of a shadow in a few words.
 pub fn counted(counts: &TrialCounts) -> String {
     let all = counts.tried + counts.waiting;
     let mut text = format!("{} of {} tried", counts.tried, files(all));
@@ -70,7 +70,7 @@ fn render(name: &str, counts: &TrialCounts, trials: &[Trial]) -> String {
     let mut text = String::new();
     for trial in trials {
         let _ = writeln!(text, "{}", shown::line(&line(trial)));
-        // Beside an error it goes without saying that others could not look.
+        // Beside an error, the reasons why other checkers could not run are of no interest.
         let why = trial
             .why
             .iter()

@@ -1,4 +1,4 @@
-//! `qcbus bundle upgrade`: the newer program of a bundle that was added.
+//! `qcbus bundle upgrade`: starts the newer program of an added bundle.
 
 use std::path::Path;
 
@@ -61,7 +61,7 @@ fn upgrade(args: &BundleUpgradeArgs) -> Result<String, Refusal> {
     }
 }
 
-/// How the bundle stands whose program is to be another.
+/// Returns the state of the bundle before the upgrade.
 fn before(home: &Home, name: &str) -> Result<BundleReadiness, Refusal> {
     let Some(broker) = home.broker() else {
         return Err((Exit::NoBroker, "no broker runs".to_owned()));
@@ -76,7 +76,8 @@ fn before(home: &Home, name: &str) -> Result<BundleReadiness, Refusal> {
     })
 }
 
-/// Gives a manifest another command, and says whether it is of a shadow; returns what it was before.
+/// Sets the command of a manifest and, if given, its shadow flag. Returns the bytes of the manifest
+/// before the change.
 fn change(
     path: &Path,
     name: &str,
@@ -137,7 +138,7 @@ fn done(home: &Home, name: &str, was: &BundleReadiness, runs: &Runs, notices: &[
     readiness::ready(name, runs, &was, notices)
 }
 
-/// Who judges now.
+/// Returns a text about the process that judges now.
 fn goes_on(home: &Home, name: &str) -> String {
     let broker = home.broker();
     let readiness = broker.and_then(|it| readiness::readiness(it, name).ok());

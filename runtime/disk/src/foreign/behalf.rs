@@ -1,5 +1,5 @@
-//! Who may read a file for whom: what a file of one user leads to is read with the rights of this process, and
-//! what was found in it is told to everybody who reads results.
+//! Access checks on behalf of file owners. This process reads referenced files with its own rights,
+//! and their content becomes visible to everybody who reads results.
 
 use std::cell::Cell;
 use std::fs::Metadata;
@@ -9,11 +9,12 @@ use std::path::Path;
 
 use nix::unistd::{Gid, Uid, User, getgrouplist};
 
-/// Somebody for whom files are read.
+/// A user on behalf of whom files are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Reader {
     user: u32,
-    /// The group of his file, which he need not be in: whoever shared the one shared the other.
+    /// Group of the user's file. The user need not be in it: files of the group are shared
+    /// together.
     group: u32,
 }
 
@@ -21,7 +22,7 @@ thread_local! {
     static READER: Cell<Option<Reader>> = const { Cell::new(None) };
 }
 
-/// As long as it lives this thread reads on behalf of somebody.
+/// While this exists, the thread reads on behalf of another user.
 #[must_use]
 #[derive(Debug)]
 pub struct Behalf(Option<Reader>);
@@ -32,8 +33,8 @@ impl Drop for Behalf {
     }
 }
 
-/// From now on this thread opens and lists, for its content, only what the owner of this file may read: where it is
-/// a symbolic link, the owner of the link. Files of this user or of root lead anywhere.
+/// Restricts this thread to opening and listing what the owner of this file may read. For a
+/// symbolic link, the owner of the link counts. Files of this user or of root are not restricted.
 pub fn on_behalf_of(path: &Path) -> Behalf {
     let before = READER.get();
     let data = std::fs::symlink_metadata(path).ok();
@@ -46,13 +47,13 @@ pub fn on_behalf_of(path: &Path) -> Behalf {
     Behalf(before)
 }
 
-/// For whom this thread reads, if it is not for itself.
+/// Returns the user on behalf of whom this thread reads, if any.
 pub fn reader() -> Option<Reader> {
     READER.get()
 }
 
 /// # Errors
-/// [`io::ErrorKind::PermissionDenied`] with the reason.
+/// Returns [`io::ErrorKind::PermissionDenied`] with the reason.
 pub(super) fn may_read(data: &Metadata) -> io::Result<()> {
     match READER.get() {
         Some(reader) if !reader.may_read(data) => {

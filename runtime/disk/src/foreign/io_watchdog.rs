@@ -1,4 +1,4 @@
-//! Who is waiting for which file, and since when.
+//! I/O watchdog: records which thread waits for which file, and since when.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -10,36 +10,37 @@ use std::time::{Duration, Instant};
 
 use super::mounts;
 
-/// Files of one directory that threads may wait for in vain before nobody goes there any more.
+/// Number of hanging files in one directory from which the directory is no longer accessed.
 pub(super) const PER_DIRECTORY: usize = 4;
-/// The same of one file system that is mounted.
+/// The same limit for one mounted file system.
 pub(super) const PER_MOUNT: usize = 4;
-/// And in total.
+/// The same limit in total.
 const IN_TOTAL: usize = 256;
 
-/// Sees which of its threads wait for a file for too long. Such a thread is lost until the system answers,
-/// and nothing can end it: so its work is given up, and nobody else goes where it hangs.
+/// Detects which of its threads wait for a file for too long. Such a thread is lost until the
+/// system answers, and it cannot be stopped. So its work is given up, and other threads avoid the
+/// file.
 #[derive(Debug, Default)]
 pub struct IoWatchdog {
     posts: Mutex<Vec<Arc<Post>>>,
-    /// By path, threads that were found overdue and have not come back.
+    /// Overdue threads that have not returned, by path.
     lost: Mutex<HashMap<PathBuf, Lost>>,
-    /// How many those are, to be looked at without the lock.
+    /// Number of these threads, readable without the lock.
     losses: AtomicUsize,
 }
 
-/// The threads that wait in vain for one file.
+/// The threads that hang on one file.
 #[derive(Debug)]
 struct Lost {
     threads: usize,
-    /// Where its file system is mounted.
+    /// Mount point of its file system.
     mount: Option<PathBuf>,
 }
 
-/// What one thread does.
+/// The activity of one thread.
 #[derive(Debug)]
 struct Post {
-    /// None: its work is nobody else's, so nobody can give it up.
+    /// `None` if the work of the thread cannot be given up.
     owner: Option<u64>,
     state: Mutex<State>,
 }
@@ -47,9 +48,9 @@ struct Post {
 #[derive(Debug, Default)]
 struct State {
     at: Option<Waiting>,
-    /// Its work was given up.
+    /// Whether its work was given up.
     lost: bool,
-    /// The first error of the moment, and where.
+    /// The first temporary error and its path.
     moment: Option<(PathBuf, String)>,
 }
 
@@ -57,30 +58,31 @@ struct State {
 struct Waiting {
     path: PathBuf,
     since: Instant,
-    /// It stands among the lost until it is over.
+    /// Whether it counts as lost until the access ends.
     overdue: bool,
 }
 
 /// A thread that has waited for too long.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Overdue {
-    /// Whose work it does, as given to [`IoWatchdog::attend`]. None: it waits on, see [`IoWatchdog::attend_for_good`].
+    /// Owner of its work, as given to [`IoWatchdog::attend`]. `None` if it continues to wait, see
+    /// [`IoWatchdog::attend_for_good`].
     pub owner: Option<u64>,
-    /// What it waits for.
+    /// The path it waits for.
     pub path: PathBuf,
-    /// For how long.
+    /// Time it has waited.
     pub waited: Duration,
 }
 
 impl IoWatchdog {
-    /// From now on everything that this thread does with files of others is seen, until the attendance
-    /// is dropped on the same thread.
+    /// Watches every access of this thread to foreign files. It ends when the result is dropped on
+    /// the same thread.
     pub fn attend(self: &Arc<IoWatchdog>, owner: u64) -> Attendance {
         self.post(Some(owner))
     }
 
-    /// As [`IoWatchdog::attend`] for a thread that nobody can replace: when it waits for too long that is seen, others
-    /// do not go there, and it goes on once the system answers.
+    /// Works like [`IoWatchdog::attend`] for a thread that cannot be replaced. If it waits for too
+    /// long, other threads avoid the file, and it continues once the system answers.
     pub fn attend_for_good(self: &Arc<IoWatchdog>) -> Attendance {
         self.post(None)
     }
@@ -103,8 +105,8 @@ impl IoWatchdog {
         }
     }
 
-    /// The threads that have waited for one file for longer than `limit`, each of them once. From now on
-    /// their work counts as given up, unless they were attended for good.
+    /// Returns the threads that have waited for one file for longer than `limit`, each of them
+    /// once. Their work counts as given up from now on, unless they are watched for good.
     pub fn overdue(&self, limit: Duration) -> Vec<Overdue> {
         let posts = lock(&self.posts);
         posts
@@ -113,7 +115,7 @@ impl IoWatchdog {
             .collect()
     }
 
-    /// As [`IoWatchdog::overdue`] for the threads of one owner.
+    /// Checks as [`IoWatchdog::overdue`] whether the work of a thread of this owner is given up.
     pub fn is_given_up(&self, owner: u64, limit: Duration) -> bool {
         let posts = lock(&self.posts);
         let mut own = posts.iter().filter(|post| post.owner == Some(owner));
@@ -145,14 +147,14 @@ impl IoWatchdog {
         })
     }
 
-    /// What threads wait for in vain at the moment.
+    /// Returns the paths on which threads currently hang.
     pub fn hanging(&self) -> Vec<PathBuf> {
         let mut paths: Vec<PathBuf> = lock(&self.lost).keys().cloned().collect();
         paths.sort();
         paths
     }
 
-    /// Whether a thread may go there.
+    /// Returns the reason why a thread must not access the path, if any.
     fn refuses(&self, path: &Path) -> Option<String> {
         if self.losses.load(Ordering::Acquire) == 0 {
             return None;
@@ -173,7 +175,7 @@ impl IoWatchdog {
             .then(|| format!("{IN_TOTAL} files have not answered for too long"))
     }
 
-    /// The system has answered, be it late.
+    /// Records that the system has answered, even if late.
     fn answered(&self, waiting: &mut Waiting) {
         if !std::mem::take(&mut waiting.overdue) {
             return;
@@ -189,7 +191,7 @@ impl IoWatchdog {
     }
 }
 
-/// A thread is attended as long as this lives.
+/// Guard: the thread is watched as long as this exists.
 #[must_use]
 #[derive(Debug)]
 pub struct Attendance {
@@ -199,7 +201,8 @@ pub struct Attendance {
 }
 
 impl Attendance {
-    /// The first error of the moment that the thread has met, and where: what it read does not count then.
+    /// Returns the first temporary error of the thread and its path. The data read then does not
+    /// count.
     pub fn moment(&self) -> Option<(PathBuf, String)> {
         lock(&self.post.state).moment.clone()
     }
@@ -209,7 +212,7 @@ impl Attendance {
         lock(&self.post.state).at.as_ref().map(|it| it.since)
     }
 
-    /// Whether the thread was found overdue: its work was given up, and nobody waits for it.
+    /// Checks whether the thread was overdue, so that its work was given up.
     pub fn was_given_up(&self) -> bool {
         lock(&self.post.state).lost
     }
@@ -237,7 +240,7 @@ fn attended() -> Option<Attended> {
     ATTENDED.with(|it| it.borrow().clone())
 }
 
-/// Writes down what went wrong for now.
+/// Records a temporary error.
 pub(super) fn note(path: &Path, error: &io::Error) {
     if let Some(attended) = attended() {
         let mut state = lock(&attended.post.state);
@@ -246,18 +249,18 @@ pub(super) fn note(path: &Path, error: &io::Error) {
     }
 }
 
-/// One thing that the system is asked about a file, perhaps while something else is done with another one.
+/// One file access of a thread, possibly within another one.
 pub(super) struct Access(Option<Begun>);
 
 struct Begun {
     attended: Attended,
-    /// What is gone on with afterwards.
+    /// The outer access, which continues afterwards.
     outer: Option<Waiting>,
 }
 
 impl Access {
     /// # Errors
-    /// [`io::ErrorKind::TimedOut`] where others wait in vain.
+    /// Returns [`io::ErrorKind::TimedOut`] if other threads hang there.
     pub(super) fn begin(path: &Path) -> io::Result<Access> {
         let Some(attended) = attended() else {
             return Ok(Access(None));
@@ -281,7 +284,7 @@ impl Access {
         Ok(Access(Some(Begun { attended, outer })))
     }
 
-    /// Something has come: whoever waits does not wait in vain.
+    /// Restarts the waiting time, because data has arrived.
     pub(super) fn goes_on(&self) {
         if let Some(Begun { attended, .. }) = &self.0
             && let Some(waiting) = &mut lock(&attended.post.state).at

@@ -1,8 +1,8 @@
-//! Files that others may write: whoever puts one there may put a pipe, a device or a file of the kernel
-//! there instead, may swap it while it is opened, and may have it on a disk that does not answer.
+//! Files that others may write. Another user may put a pipe, a device or a kernel file there. The
+//! file may be replaced while it is opened, or lie on a disk that does not answer.
 //!
-//! Everything here opens regular files only, never waits for a writer or a lease, and reads no more than
-//! it was told to. What it waits for is written down where a [`IoWatchdog`] sees it.
+//! Everything here opens regular files only and never waits for a writer or a lease. It reads no
+//! more than the given limit. A [`IoWatchdog`] sees every file that it waits for.
 
 mod behalf;
 mod io_watchdog;
@@ -21,16 +21,16 @@ pub use behalf::{Behalf, Reader, on_behalf_of, reader};
 use io_watchdog::{Access, note};
 pub use io_watchdog::{Attendance, IoWatchdog, Overdue};
 
-/// Why a path was not opened.
+/// Reason why a path was not opened.
 #[derive(Debug, thiserror::Error)]
 pub enum Refused {
     /// It is a directory.
     #[error("it is a directory, not a file")]
     Directory,
-    /// It is a device, a pipe, a socket, or a file that the kernel makes up.
+    /// It is a device, a pipe, a socket, or a virtual file of the kernel.
     #[error("it is {0}, not a file")]
     Special(&'static str),
-    /// The system says so.
+    /// The operating system returns an error.
     #[error(transparent)]
     System(#[from] io::Error),
 }
@@ -40,25 +40,25 @@ impl From<Refused> for io::Error {
         match refused {
             Refused::System(error) => error,
             Refused::Directory => io::Error::new(io::ErrorKind::IsADirectory, refused),
-            // Of the path itself, as [`crate::is_for_good`] has it: no waiting makes it a file.
+            // The error is permanent (see [`crate::is_for_good`]): waiting does not help.
             Refused::Special(_) => io::Error::new(io::ErrorKind::InvalidInput, refused),
         }
     }
 }
 
-/// Opens a regular file for reading, through links, and says what was opened.
+/// Opens a regular file for reading, through links, and returns the file and its metadata.
 ///
-/// What lies there is looked at before it is opened, and the very thing that was looked at is opened: a
-/// device that comes there meanwhile is not touched.
+/// The entry is checked before it is opened, and exactly the checked entry is opened. A device that
+/// appears there meanwhile is not touched.
 ///
 /// # Errors
-/// See [`Refused`]. While somebody has a lease on the file, the system says that it would block.
+/// See [`Refused`]. If another process has a lease on the file, the error says that it would block.
 pub fn open(path: &Path) -> Result<(File, Metadata), Refused> {
     let _access = Access::begin(path)?;
     noted(path, open_regular(path))
 }
 
-/// The whole content of a regular file, if it has no more than `most` bytes.
+/// Reads the whole content of a regular file, if it has no more than `most` bytes.
 ///
 /// # Errors
 /// As [`open`], and [`io::ErrorKind::FileTooLarge`].
@@ -67,37 +67,37 @@ pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     noted(path, read_regular(path, most, &access))
 }
 
-/// Reads what is left of a file, but no more than `most` bytes. `path` is its own, for the lookout.
+/// Reads the rest of a file, but no more than `most` bytes. The I/O watchdog uses `path`.
 ///
 /// # Errors
-/// Whatever the system says.
+/// Returns the error of the operating system.
 pub fn read_on(path: &Path, file: &mut File, most: u64, bytes: &mut Vec<u8>) -> io::Result<()> {
     let access = Access::begin(path)?;
     noted(path, read_pieces(file, most, bytes, &access))
 }
 
-/// What [`std::fs::metadata`] says.
+/// Works like [`std::fs::metadata`].
 ///
 /// # Errors
-/// Whatever the system says.
+/// Returns the error of the operating system.
 pub fn metadata(path: &Path) -> io::Result<Metadata> {
     let _access = Access::begin(path)?;
     noted(path, std::fs::metadata(path))
 }
 
-/// What [`std::fs::symlink_metadata`] says.
+/// Works like [`std::fs::symlink_metadata`].
 ///
 /// # Errors
-/// Whatever the system says.
+/// Returns the error of the operating system.
 pub fn symlink_metadata(path: &Path) -> io::Result<Metadata> {
     let _access = Access::begin(path)?;
     noted(path, std::fs::symlink_metadata(path))
 }
 
-/// Whether this is a symbolic link. What is not there is none.
+/// Checks whether this is a symbolic link. A missing entry is not.
 ///
 /// # Errors
-/// Whatever the system says, other than that there is nothing.
+/// Returns the error of the operating system, except for a missing entry.
 pub fn is_symlink(path: &Path) -> io::Result<bool> {
     match symlink_metadata(path) {
         Ok(data) => Ok(data.is_symlink()),
@@ -106,19 +106,19 @@ pub fn is_symlink(path: &Path) -> io::Result<bool> {
     }
 }
 
-/// What [`std::fs::canonicalize`] says.
+/// Works like [`std::fs::canonicalize`].
 ///
 /// # Errors
-/// Whatever the system says.
+/// Returns the error of the operating system.
 pub fn canonicalize(path: &Path) -> io::Result<PathBuf> {
     let _access = Access::begin(path)?;
     noted(path, std::fs::canonicalize(path))
 }
 
-/// The entries of a directory, those left out that cannot be had.
+/// Returns the entries of a directory, without those that cannot be read.
 ///
 /// # Errors
-/// Whatever the system says.
+/// Returns the error of the operating system.
 pub fn list(directory: &Path) -> io::Result<Vec<DirEntry>> {
     let _access = Access::begin(directory)?;
     let data = noted(directory, std::fs::metadata(directory))?;
@@ -129,17 +129,17 @@ pub fn list(directory: &Path) -> io::Result<Vec<DirEntry>> {
         .collect())
 }
 
-/// Does something else with a file of others that the system may not answer.
+/// Performs another operation on a foreign file that may hang.
 ///
 /// # Errors
-/// Whatever `work` says.
+/// Returns the error of `work`.
 pub fn access<T>(path: &Path, work: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
     let _access = Access::begin(path)?;
     noted(path, work())
 }
 
-/// Whether an error is of the moment and not of the file: there are no descriptors or no memory, a disk
-/// or a server did not answer. The same may be done again later.
+/// Checks whether an error is temporary: there are no descriptors or no memory, or a disk or server
+/// did not answer. The operation may succeed later.
 pub fn is_of_the_moment(error: &io::Error) -> bool {
     const OF_THE_MOMENT: &[Errno] = &[
         Errno::AGAIN,
@@ -174,7 +174,7 @@ pub fn is_of_the_moment(error: &io::Error) -> bool {
     }
 }
 
-/// Writes an error of the moment down for who attends this thread.
+/// Records a temporary error for the guard of this thread.
 fn noted<T, E: OfTheSystem>(path: &Path, result: Result<T, E>) -> Result<T, E> {
     if let Some(error) = result.as_ref().err().and_then(OfTheSystem::of_the_system)
         && is_of_the_moment(error)
@@ -209,7 +209,7 @@ fn open_regular(path: &Path) -> Result<(File, Metadata), Refused> {
     let handle = File::from(handle.map_err(io::Error::from)?);
     behalf::may_read(&regular(&handle)?)?;
     let file = match reopen(&format!("/proc/self/fd/{}", handle.as_raw_fd())) {
-        // Without /proc it is opened by its name once more.
+        // Without /proc the file is opened again by its name.
         Err(error) if error.kind() == io::ErrorKind::NotFound => reopen(path)?,
         file => file?,
     };
@@ -219,7 +219,7 @@ fn open_regular(path: &Path) -> Result<(File, Metadata), Refused> {
 }
 
 fn reopen(path: impl rustix::path::Arg + Copy) -> io::Result<File> {
-    // Without waiting: not for the holder of a lease either.
+    // This does not block, not even for the holder of a lease.
     let flags = OFlags::RDONLY | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
     let file = retry_on_intr(|| rustix::fs::open(path, flags, Mode::empty()))?;
     Ok(File::from(file))
@@ -233,10 +233,10 @@ fn regular(file: &File) -> Result<Metadata, Refused> {
     if !data.is_file() {
         return Err(Refused::Special("a device, pipe or socket"));
     }
-    // File systems without a disk have no major number. Only there the kernel makes files up.
+    // File systems without a disk have the major number 0. Only those may contain virtual files.
     if rustix::fs::major(data.dev()) == 0 {
         let system = retry_on_intr(|| rustix::fs::fstatfs(file)).map_err(io::Error::from)?;
-        // Its type differs between machines; the numbers all fit.
+        // The type of this field differs between machines, but all the numbers fit.
         if u32::try_from(system.f_type).is_ok_and(|kind| MADE_UP.contains(&kind)) {
             return Err(Refused::Special("a file that the kernel makes up"));
         }
@@ -244,8 +244,8 @@ fn regular(file: &File) -> Result<Metadata, Refused> {
     Ok(data)
 }
 
-/// File systems on which reading a file asks the kernel something, may take away what it says, and may
-/// wait for it to happen (`linux/magic.h`): proc, sysfs, debugfs, tracefs, securityfs, cgroup and cgroup2,
+/// File systems with virtual files. Reading one queries the kernel, may consume the data and may
+/// block (`linux/magic.h`): proc, sysfs, debugfs, tracefs, securityfs, cgroup and cgroup2,
 /// configfs, bpf, pstore, efivarfs, binfmt_misc, devpts, mqueue, selinuxfs, smackfs, nsfs, fusectl,
 /// resctrl.
 const MADE_UP: &[u32] = &[
@@ -281,7 +281,7 @@ fn read_regular(path: &Path, most: u64, access: &Access) -> io::Result<Vec<u8>> 
     Ok(bytes)
 }
 
-/// In one go a slow disk would look like one that hangs.
+/// Bytes per read. With one large read, a slow disk would look like one that hangs.
 const PIECE: u64 = 4 << 20;
 
 fn read_pieces(file: &mut File, most: u64, bytes: &mut Vec<u8>, access: &Access) -> io::Result<()> {

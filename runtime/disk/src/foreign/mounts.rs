@@ -1,16 +1,16 @@
-//! Which file system a path lies on, without asking that file system.
+//! Determines the file system of a path without accessing that file system.
 
 use std::ffi::OsString;
 use std::os::unix::ffi::OsStringExt;
 use std::path::{Path, PathBuf};
 
-/// Where the file system of a path is mounted. `None`: it is that of everything, or is not known.
+/// Returns the mount point of a path. Returns `None` for the root file system or if it is unknown.
 pub(super) fn mount_of(path: &Path) -> Option<PathBuf> {
     let table = std::fs::read("/proc/self/mountinfo").ok()?;
     nearest(&table, path)
 }
 
-/// The format is that of proc_pid_mountinfo(5): the fifth field is where it is mounted.
+/// Finds the mount point, the fifth field of a table in the format of proc_pid_mountinfo(5).
 fn nearest(table: &[u8], path: &Path) -> Option<PathBuf> {
     let lines = table.split(|byte| *byte == b'\n');
     let places = lines.filter_map(|line| Some(plain(line.split(|byte| *byte == b' ').nth(4)?)));
@@ -18,7 +18,7 @@ fn nearest(table: &[u8], path: &Path) -> Option<PathBuf> {
     around.max_by_key(|place| place.as_os_str().len())
 }
 
-/// Spaces, line ends and backslashes are written as three octal digits.
+/// Decodes spaces, line ends and backslashes, which are written as three octal digits.
 fn plain(field: &[u8]) -> PathBuf {
     let (mut bytes, mut rest) = (Vec::new(), field);
     while let Some((&first, after)) = rest.split_first() {

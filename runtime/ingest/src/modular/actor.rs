@@ -1,11 +1,11 @@
-//! For whom the maneuvers of a group are.
+//! Finds and replaces the actors of a maneuver group.
 
 use qcbus_document::{Attribute, Node};
 
 use super::copy::{Copy, Value};
 use super::problem::{Problem, Problems, Spot, What};
 
-/// The actors of a group.
+/// Returns the actors of a group.
 pub(super) fn actors<'d>(group: Node<'d>) -> impl Iterator<Item = Node<'d>> {
     let all = group.children_named("Actors").collect::<Vec<_>>();
     all.into_iter()
@@ -16,7 +16,7 @@ fn entity<'d>(group: Node<'d>) -> Option<Attribute<'d>> {
     actors(group).next()?.attribute("entityRef")
 }
 
-/// Puts the first actor of the referring group in the place of the first actor of the copied one.
+/// Replaces the first actor of the copied group by the first actor of the referring group.
 pub(super) fn replace<'d>(
     copy: &mut Copy<'d>,
     piece: usize,

@@ -1,25 +1,25 @@
-//! A maneuver group on its way into the expanded scenario.
+//! A copy of a maneuver group for the expanded scenario.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use qcbus_document::{Attribute, Node};
 
-/// A value that replaces another one, and where it is written.
+/// A replacement value and the place where it is written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Value {
-    /// The value, entities resolved.
+    /// The value with resolved entities.
     pub text: Arc<str>,
-    /// The piece whose text has it.
+    /// Index of the piece that contains the value.
     pub piece: usize,
-    /// Where it is written in the text of the piece.
+    /// Offset of the value in the text of the piece.
     pub offset: u32,
-    /// Bytes of it there.
+    /// Length of the raw value in bytes.
     pub raw_len: u32,
 }
 
 impl Value {
-    /// The value of an attribute of a piece.
+    /// Returns the value of an attribute of a piece.
     pub(super) fn of(piece: usize, attribute: Attribute<'_>) -> Value {
         Value {
             text: attribute.value().into(),
@@ -29,7 +29,7 @@ impl Value {
         }
     }
 
-    /// Another value that comes from the same place.
+    /// Returns another value with the same place.
     pub(super) fn saying(&self, text: &str) -> Value {
         Value {
             text: text.into(),
@@ -38,21 +38,21 @@ impl Value {
     }
 }
 
-/// A maneuver group of a piece, with what is replaced in it.
+/// A maneuver group of a piece with its replacements.
 #[derive(Debug, Clone)]
 pub struct Copy<'d> {
-    /// The piece that it is from.
+    /// Index of the piece that contains the group.
     pub piece: usize,
-    /// The group there.
+    /// The group in that piece.
     pub group: Node<'d>,
-    /// Its new name; `None` where it keeps its own.
+    /// New name of the group, or `None` if it keeps its own.
     pub name: Option<Value>,
     /// New values of attributes, by the offset of the attribute's name.
     pub edits: BTreeMap<u32, Value>,
 }
 
 impl<'d> Copy<'d> {
-    /// A group as it is.
+    /// Returns an unchanged copy of a group.
     pub(super) fn as_is(piece: usize, group: Node<'d>) -> Copy<'d> {
         Copy {
             piece,
@@ -62,7 +62,7 @@ impl<'d> Copy<'d> {
         }
     }
 
-    /// What it is called.
+    /// Returns the name of the copy.
     pub fn name(&self) -> &str {
         match &self.name {
             Some(value) => &value.text,
@@ -70,7 +70,7 @@ impl<'d> Copy<'d> {
         }
     }
 
-    /// What replaces the value of an attribute of the group or of an element in it.
+    /// Returns the new value for an attribute of the group or of an element in it, or `None`.
     pub fn edit(&self, attribute: Attribute<'_>) -> Option<&Value> {
         let of_group = attribute.node() == self.group && attribute.is("name");
         match &self.name {

@@ -1,4 +1,4 @@
-//! What lies in a reference and does not belong there: mostly a name that is misspelt.
+//! Reports content of a reference that is not allowed there. Most cases are misspelt names.
 
 use qcbus_document::Node;
 use qcbus_formats::distance::did_you_mean;
@@ -6,7 +6,7 @@ use qcbus_formats::distance::did_you_mean;
 use super::OFFERS;
 use super::problem::{Problem, Problems, Spot, What};
 
-/// What may be in the elements of a reference: its name, its attributes, its children.
+/// Allowed content of the elements of a reference: name, attributes, children.
 const KNOWN: [(&str, &[&str], &[&str]); 2] = [
     (
         "ScenarioReference",
@@ -20,14 +20,15 @@ const KNOWN: [(&str, &[&str], &[&str]); 2] = [
     ),
 ];
 
-/// Says what nobody reads in a reference. What an unknown element was to say is not known, so there is
-/// no expansion with one, and `true` is returned.
+/// Reports the parts of a reference that are never read. The intent of an unknown element is
+/// unknown, so it prevents the expansion. In this case `true` is returned.
 pub(super) fn say<'d>(reference: Node<'d>, problems: &mut Problems<'d>) -> bool {
     let before = problems.0.len();
     for element in std::iter::once(reference).chain(reference.descendants()) {
         let known = KNOWN.iter().find(|(name, ..)| element.is(name));
         let Some((_, attributes, children)) = known else {
-            // What is in an unknown element is as unknown; a `ParameterReference` has its own rule.
+            // The content of an unknown element is also unknown. A `ParameterReference` has its own
+            // rule.
             if element.is("ParameterReference") {
                 say_children(element, &[], problems);
             }

@@ -1,4 +1,4 @@
-//! The expanded scenario as a document image.
+//! Builds a document image of the expanded scenario.
 
 use qcbus_document::{Attribute, BuildError, Capacities, ImageBuilder, Node};
 use sha2::{Digest, Sha256};
@@ -9,22 +9,22 @@ use super::plan::Expansion;
 use super::text::text_of;
 use crate::xml::{Counter, Halt, Sink};
 
-/// An expanded scenario of which an image can be built. Its text is that of the files it is made of,
-/// the root first, so that an offset in the root is the same offset here; its tree is the expanded one.
-/// An attribute whose value was replaced stands where the library has it, and its value where the
-/// referring file has that: [`Attribute::value_offset`] leads there.
+/// An expanded scenario from which an image can be built. Its text consists of the texts of its
+/// files. The root comes first, so that offsets in the root stay the same. Its tree is the expanded
+/// one. The name of a replaced attribute is located in the library. Its value is located in the
+/// referring file: [`Attribute::value_offset`] leads there.
 #[derive(Debug)]
 pub struct ExpandedImage<'e, 'd> {
     expansion: &'e Expansion<'d>,
     texts: Vec<&'d str>,
-    /// Where the text of each piece begins in the image's.
+    /// Start of each piece's text in the text of the image.
     starts: Vec<u32>,
     capacities: Capacities,
 }
 
 impl<'d> Expansion<'d> {
-    /// The expanded scenario on its way to an image of at most `max_image` bytes; `None` when the
-    /// expansion is not complete or the image would be larger.
+    /// Prepares the expanded scenario for an image of at most `max_image` bytes. Returns `None`
+    /// when the expansion is not complete or the image would be larger.
     pub fn image(&self, max_image: u64) -> Option<ExpandedImage<'_, 'd>> {
         if !self.is_complete() {
             return None;
@@ -54,12 +54,12 @@ impl<'d> Expansion<'d> {
 }
 
 impl ExpandedImage<'_, '_> {
-    /// Bytes that [`ExpandedImage::build_into`] needs.
+    /// Returns the number of bytes that [`ExpandedImage::build_into`] needs.
     pub fn upper_bound(&self) -> usize {
         self.capacities.image_len()
     }
 
-    /// Digest over the files that the scenario is made of.
+    /// Returns the digest over the files that the scenario consists of.
     pub fn digest(&self) -> [u8; 32] {
         let mut hash = Sha256::new();
         for piece in &self.expansion.pieces {
@@ -70,7 +70,7 @@ impl ExpandedImage<'_, '_> {
         hash.finalize().into()
     }
 
-    /// Builds the image into the first bytes of `out` and gives its length.
+    /// Builds the image into the first bytes of `out` and returns its length.
     ///
     /// # Errors
     /// [`BuildError::SmallBuffer`] when `out` is shorter than [`ExpandedImage::upper_bound`].
@@ -97,7 +97,8 @@ impl ExpandedImage<'_, '_> {
         builder.finish(self.digest())
     }
 
-    /// Builds the image into memory of its own; empty when that fails, which an image refuses to open.
+    /// Builds the image into a new buffer. If that fails, the buffer is empty and cannot be opened
+    /// as an image.
     pub fn build(&self) -> Vec<u8> {
         let mut image = vec![0; self.upper_bound()];
         let len = self.build_into(&mut image).unwrap_or(0);
@@ -198,7 +199,7 @@ impl ExpandedImage<'_, '_> {
         Ok(())
     }
 
-    /// The value of an attribute where it differs from what is written.
+    /// Returns the value of an attribute if it differs from the written text.
     fn resolved<'a>(&self, piece: usize, attribute: Attribute<'a>) -> Option<&'a str> {
         let at = attribute.value_offset() as usize;
         let written = self.texts[piece].get(at..at + attribute.raw_len() as usize);

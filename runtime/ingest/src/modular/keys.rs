@@ -1,4 +1,4 @@
-//! Keys and the attributes that they fit.
+//! Applies the keys of a reference to the attributes that they fit.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -14,13 +14,13 @@ use super::problem::{Problem, Problems, Spot, What};
 pub struct Key<'d> {
     /// The element.
     pub node: Node<'d>,
-    /// Its `key`: an attribute, before it the element that bears it, before that the elements around.
+    /// Its `key`: an attribute name, optionally preceded by its element and by further ancestors.
     pub key: &'d str,
     /// Its `value`.
     pub value: Attribute<'d>,
-    /// How many attributes it fits.
+    /// Number of attributes that the key fits.
     pub fits: AtomicU32,
-    /// How many attributes have its value now.
+    /// Number of attributes that have taken its value.
     pub wins: AtomicU32,
 }
 
@@ -38,7 +38,7 @@ pub(super) fn read<'d>(within: Node<'d>, problems: &mut Problems<'d>) -> Vec<Key
             });
             continue;
         };
-        // That empty ones are for nothing is said of each.
+        // Each empty key is reported separately as unmatched, so it is not reported as a duplicate.
         let before = first.get(key).filter(|_| !key.trim().is_empty());
         if let Some(&before) = before {
             let text = match before.attr("value") == Some(value.value()) {
@@ -72,15 +72,15 @@ pub(super) fn read<'d>(within: Node<'d>, problems: &mut Problems<'d>) -> Vec<Key
     keys
 }
 
-/// The attributes that an element offers for replacement and has.
+/// Returns the attributes that an element offers for replacement and has.
 pub fn offered<'d>(element: Node<'d>) -> impl Iterator<Item = Attribute<'d>> {
     let listed = element.attr(OFFERS).unwrap_or("");
     let names = listed.split(',').map(str::trim);
     names.filter_map(move |name| element.attribute(name).filter(|_| name != OFFERS))
 }
 
-/// Puts the values of keys into a copy. Of the keys that fit an attribute the most specific wins: the
-/// one that names most elements around it.
+/// Puts the values of keys into a copy. If several keys fit an attribute, the most specific one
+/// wins. It names the most elements around the attribute.
 pub(super) fn apply<'d>(
     copy: &mut Copy<'d>,
     piece: usize,
@@ -104,7 +104,7 @@ pub(super) fn apply<'d>(
             for &index in fitting.iter().copied().flatten() {
                 keys[index].fits.fetch_add(1, Ordering::Relaxed);
             }
-            // Of equal keys the last one, where they agree.
+            // If equal keys agree, the last one is used.
             let Some(&winner) = best.last() else { continue };
             let winner = &keys[winner];
             let different = |&&index: &&usize| keys[index].value.value() != winner.value.value();
@@ -119,7 +119,7 @@ pub(super) fn apply<'d>(
     }
 }
 
-/// Says which keys fit nothing in any of the copies of a use, of which `group` is the first.
+/// Reports the keys that fit no attribute in any copy of a use. `group` is the first copied group.
 pub(super) fn say_unmatched<'d>(keys: &[Key<'d>], group: Node<'d>, problems: &mut Problems<'d>) {
     let lost = keys
         .iter()
@@ -127,10 +127,10 @@ pub(super) fn say_unmatched<'d>(keys: &[Key<'d>], group: Node<'d>, problems: &mu
     lost.for_each(|key| problems.push(unmatched(key, group)));
 }
 
-/// Keys by what they say.
+/// Keys by their text.
 struct Table<'k> {
     by_text: HashMap<&'k str, Vec<usize>>,
-    /// Most parts that a key has.
+    /// Maximum number of parts of a key.
     longest: usize,
 }
 
@@ -147,7 +147,7 @@ impl<'k> Table<'k> {
         }
     }
 
-    /// The keys that fit an attribute, the most specific last; equal ones together.
+    /// Returns the keys that fit an attribute, the most specific last. Equal keys are grouped.
     fn fitting(&self, attribute: Attribute<'_>) -> Vec<&[usize]> {
         let element = attribute.node();
         let mut path = attribute.name().to_owned();
@@ -186,7 +186,7 @@ fn overlap<'d>(
         best.value.value(),
         other.value.value()
     );
-    // Once for two keys, however many attributes they share.
+    // An overlap of two keys is reported once, however many attributes they share.
     let is_said = |problem: &Problem<'d>| {
         problem.what == What::KeyOverlap
             && problem.at.node() == other.node
@@ -205,7 +205,7 @@ fn overlap<'d>(
 }
 
 fn tie<'d>(one: &Key<'d>, other: &Key<'d>, attribute: Attribute<'d>, problems: &mut Problems<'d>) {
-    // Once for two keys, however many attributes they fit.
+    // A tie of two keys is reported once, however many attributes they fit.
     let is_said =
         |problem: &Problem<'d>| problem.what == What::KeyTie && problem.at.node() == one.node;
     if problems.lately(is_said) {

@@ -1,10 +1,10 @@
-//! Modular scenarios: an OpenSCENARIO file whose maneuver groups are taken from other files by
-//! `ScenarioReference`, with some of their attributes replaced.
+//! Expands modular scenarios: OpenSCENARIO files whose maneuver groups are taken from other files
+//! by `ScenarioReference`, with some attributes replaced.
 //!
-//! [`expand`] makes one plain scenario of the documents of a set, in memory and without looking
-//! anywhere else. What it makes is written as text ([`Expansion::text`]), with the formatting of the
-//! files, or as a document image ([`Expansion::image`]), whose text *is* that of the files: so each
-//! element and each value of it knows where it comes from.
+//! [`expand`] makes one plain scenario from the documents of a set, in memory and without reading
+//! other files. The result can be written as text ([`Expansion::text`]), with the formatting of the
+//! files. It can also become a document image ([`Expansion::image`]). The text of the image *is*
+//! the text of the files, so the origin of each element and value is known.
 
 mod actor;
 mod copy;
@@ -36,27 +36,28 @@ use qcbus_messages::Link;
 
 use crate::archive::MAIN_MEMBER;
 
-/// How deeply scenarios may refer to scenarios.
+/// Maximum depth of references from scenario to scenario.
 pub const MAX_DEPTH: u32 = 32;
 
-/// The attribute that lists the attributes of its element for which a reference may give values.
+/// Attribute that lists the attributes of its element for which a reference may give values.
 pub const OFFERS: &str = "parameterAttributes";
 
-/// A document of a set, with where its references lead within the set.
+/// A document of a set and the targets of its references within the set.
 #[derive(Debug, Clone)]
 pub struct Piece<'d> {
     /// The document.
     pub document: Document<'d>,
-    /// Its references that were followed; [`Link::to`] counts the pieces.
+    /// Its references that were followed. [`Link::to`] is an index of a piece.
     pub links: Vec<Link>,
 }
 
-/// The archive that a document lies in; of one within another, `archive!member`.
+/// Returns the archive that contains a document. For an archive within another one it is
+/// `archive!member`.
 pub fn archive_of(path: &str) -> Option<&str> {
     archive_and_member(path).map(|(archive, _)| archive)
 }
 
-/// Whether a document is the scenario that an archive starts from, where that was referred to.
+/// Checks whether a document is the main scenario of an archive that was referred to.
 pub fn is_archive(document: Document<'_>) -> bool {
     archive_and_member(document.path()).is_some_and(|(_, member)| member == MAIN_MEMBER)
 }

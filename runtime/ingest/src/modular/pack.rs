@@ -1,4 +1,4 @@
-//! Archives of modular scenarios.
+//! Packs modular scenarios into archives.
 
 use std::collections::HashSet;
 use std::io::{Cursor, Write as _};
@@ -6,10 +6,10 @@ use std::io::{Cursor, Write as _};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-/// Why there is no archive.
+/// Reason why no archive was made.
 #[derive(Debug, thiserror::Error)]
 pub enum PackError {
-    /// Two files would have one name.
+    /// Two files have the same name in the archive.
     #[error("pack {0}: two of the files have this name in the archive")]
     Twice(String),
     /// The archive could not be written.
@@ -17,13 +17,13 @@ pub enum PackError {
     Unwritten {
         /// The member.
         name: String,
-        /// What was said.
+        /// Error text.
         why: String,
     },
 }
 
-/// Packs files into an archive, in their order. The same files make the same bytes: nothing of when and
-/// where they were packed is kept.
+/// Packs files into an archive, in their order. The same files give the same bytes, because the
+/// time and place of packing are not stored.
 ///
 /// # Errors
 /// [`PackError`].

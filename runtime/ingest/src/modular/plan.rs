@@ -1,4 +1,4 @@
-//! Which groups take the place of which references.
+//! Decides which groups replace which references.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
@@ -13,81 +13,83 @@ use super::problem::{Problem, Problems, Spot, What};
 use super::refusal::{catalog_of, not_found, trouble};
 use super::{MAX_DEPTH, Piece, actor, foreign, is_archive};
 
-/// What becomes of a modular scenario.
+/// Result of expanding a modular scenario.
 #[derive(Debug)]
 pub struct Expansion<'d> {
     /// The documents, the root first.
     pub pieces: Vec<Piece<'d>>,
-    /// The references that were followed, those of inner scenarios before those that lead there.
+    /// The followed references. Those of inner scenarios come before the references that lead
+    /// there.
     pub references: Vec<Followed<'d>>,
-    /// What is wrong.
+    /// All problems found.
     pub problems: Vec<Problem<'d>>,
-    /// What takes the place of groups of the root, by the index of their node.
+    /// Replacements for groups of the root, by the index of their node.
     pub(super) replaced: BTreeMap<u32, Vec<Arc<Copy<'d>>>>,
-    /// The pieces whose text is in the expanded scenario, the root first.
+    /// Indices of the pieces whose text is in the expanded scenario, the root first.
     pub(super) used: BTreeSet<usize>,
 }
 
 /// A `ScenarioReference` that was followed.
 #[derive(Debug)]
 pub struct Followed<'d> {
-    /// The piece that has it.
+    /// Index of the piece that contains it.
     pub piece: usize,
     /// The element.
     pub node: Node<'d>,
-    /// The group that it is in.
+    /// The group that contains it.
     pub group: Node<'d>,
-    /// The piece that it leads to.
+    /// Index of the piece that it leads to.
     pub target: Option<usize>,
-    /// How it says what it takes.
+    /// Form in which the reference names its groups.
     pub form: Form,
-    /// How many references lead here from the root, itself included.
+    /// Number of references from the root up to and including this one.
     pub depth: u32,
-    /// What it takes, as far as it is there.
+    /// The groups that the reference takes, if they exist.
     pub uses: Vec<Use<'d>>,
 }
 
-/// How a `ScenarioReference` says what it takes.
+/// Form in which a `ScenarioReference` names its groups.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     /// `ManeuverGroupReference` elements name groups, each with keys of its own.
     Named,
-    /// `ParameterReference` elements directly in it: all groups of the file are taken. The documented
-    /// form, which later versions of the reference tool do not know.
+    /// `ParameterReference` elements are direct children: all groups of the file are taken. This is
+    /// the documented form, but later versions of the reference tool do not support it.
     Direct,
 }
 
-/// What a reference takes from another file.
+/// Groups that a reference takes from another file.
 #[derive(Debug)]
 pub struct Use<'d> {
     /// The `ManeuverGroupReference`, or the `ScenarioReference` of the direct form.
     pub node: Node<'d>,
-    /// The keys that it gives.
+    /// Keys of this use.
     pub keys: Vec<Key<'d>>,
-    /// The copies that take the place of the referring group.
+    /// Copies that replace the referring group.
     pub copies: Vec<Arc<Copy<'d>>>,
 }
 
 impl<'d> Expansion<'d> {
-    /// Whether the expanded scenario is whole: each reference leads somewhere, and each value is known.
+    /// Checks whether the expanded scenario is complete: each reference leads to a scenario, and
+    /// each value is known.
     pub fn is_complete(&self) -> bool {
         self.obstacles().next().is_none()
     }
 
-    /// The problems that are in the way of an expanded scenario.
+    /// Returns the problems that prevent the expansion.
     pub fn obstacles(&self) -> impl Iterator<Item = &Problem<'d>> {
         self.problems.iter().filter(|problem| problem.what.stops())
     }
 }
 
-/// Most groups that are copied, those of inner scenarios counted each time.
+/// Maximum number of copied groups. Groups of inner scenarios count each time.
 const MOST_COPIES: usize = 1 << 16;
 
-/// Puts the groups that a modular scenario refers to in the place of the references. `pieces` has the
-/// root first; `max_text` bounds the bytes of what is copied.
+/// Replaces the references of a modular scenario by the groups that they refer to. The first of
+/// `pieces` is the root. `max_text` is the maximum number of copied bytes.
 ///
 /// # Panics
-/// When there is no piece at all.
+/// If `pieces` is empty.
 pub fn expand(pieces: Vec<Piece<'_>>, max_text: u64) -> Expansion<'_> {
     let mut expander = Expander {
         expanded: vec![None; pieces.len()],
@@ -110,20 +112,20 @@ pub fn expand(pieces: Vec<Piece<'_>>, max_text: u64) -> Expansion<'_> {
 }
 
 struct Expander<'d> {
-    /// The groups of each piece after its own expansion, once they have been asked for.
+    /// Groups of each piece after its own expansion. Each entry is computed on first use.
     expanded: Vec<Option<Arc<Vec<Expanded<'d>>>>>,
-    /// The pieces that are being expanded, the root first.
+    /// Pieces that are being expanded, the root first.
     chain: Vec<usize>,
-    /// Bytes and groups that may still be copied.
+    /// Number of bytes that may still be copied.
     left: u64,
     copies: usize,
-    /// The groups of a piece by the names that are written there: the first, and another one.
+    /// Groups of a piece by their written names: the first, and a second one with the same name.
     written: HashMap<usize, HashMap<&'d str, (Node<'d>, Option<Node<'d>>)>>,
     problems: Problems<'d>,
     out: Expansion<'d>,
 }
 
-/// A group of a piece with what takes its place: itself, where it refers to nothing.
+/// A group of a piece with its replacement. A group without references is its own replacement.
 struct Expanded<'d> {
     group: Node<'d>,
     copies: Vec<Arc<Copy<'d>>>,
@@ -177,7 +179,7 @@ impl<'d> Expander<'d> {
         }
     }
 
-    /// What takes the place of a group; `None` for one without references.
+    /// Returns the replacement for a group, or `None` for a group without references.
     fn group(&mut self, piece: usize, group: Node<'d>) -> Option<Vec<Arc<Copy<'d>>>> {
         let references: Vec<Node<'d>> = group.children_named("ScenarioReference").collect();
         let first = *references.first()?;
@@ -237,7 +239,7 @@ impl<'d> Expander<'d> {
         let is_open = foreign::say(node, &mut self.problems);
         let direct = node.child("ParameterReference");
         match (form, direct) {
-            // Which form was meant is not known.
+            // An unknown element hides which form was intended.
             (Form::Direct, _) if is_open => {}
             (Form::Direct, _) => {
                 let text = "without a `ManeuverGroupReference` all groups of the file are taken; this form is documented, \
@@ -256,12 +258,12 @@ impl<'d> Expander<'d> {
         }
     }
 
-    /// The piece that a reference leads to, when its groups can be had.
+    /// Returns the piece that a reference leads to, if its groups are available.
     fn target(&mut self, piece: usize, node: Node<'d>) -> Option<usize> {
         let at = Spot::of(node, "scenarioFileName");
         let links = &self.out.pieces[piece].links;
         let link = links.iter().find(|link| link.at == node.offset());
-        // Whoever gathers the documents follows references no deeper either.
+        // The collection of the documents does not follow references any deeper either.
         let is_too_deep = self.chain.len() > MAX_DEPTH as usize;
         let Some(target) = link.map(|link| link.to as usize) else {
             let (what, text) = match is_too_deep {
@@ -314,7 +316,7 @@ impl<'d> Expander<'d> {
         )
     }
 
-    /// The groups of a piece after its own expansion.
+    /// Returns the groups of a piece after its own expansion.
     fn expanded(&mut self, piece: usize) -> Arc<Vec<Expanded<'d>>> {
         if let Some(groups) = &self.expanded[piece] {
             return groups.clone();
@@ -335,15 +337,15 @@ impl<'d> Expander<'d> {
         groups
     }
 
-    /// All groups of a piece.
+    /// Returns all groups of a piece after its own expansion.
     fn all_copies(&mut self, piece: usize) -> Vec<Arc<Copy<'d>>> {
         let groups = self.expanded(piece);
         groups.iter().flat_map(|it| it.copies.clone()).collect()
     }
 
-    /// The group of a name, the first one as the reference tool takes it, and another of that name if
-    /// there is one. An archive offers the groups that it is expanded to. A plain file offers those that
-    /// are written in it, and what is wrong with others of its groups does not matter here.
+    /// Finds a group by name: the first one, like the reference tool, and a second one with the
+    /// same name if it exists. An archive offers its groups after expansion. A plain file offers
+    /// the groups written in it, and faults of its other groups do not matter here.
     fn find(&mut self, target: usize, name: &str) -> (Vec<Arc<Copy<'d>>>, Option<Node<'d>>) {
         let document = self.document(target);
         let is_archive = is_archive(document);
@@ -422,7 +424,8 @@ impl<'d> Expander<'d> {
         Some(Use { node, keys, copies })
     }
 
-    /// All groups: the first is called as the referring group, the next `name_2` and so on.
+    /// Takes all groups. The first gets the name of the referring group, the next ones are called
+    /// `name_2` and so on.
     fn direct(&mut self, referring: Referring<'d>, node: Node<'d>, target: usize) -> Use<'d> {
         let keys = keys::read(node, &mut self.problems);
         let groups = self.all_copies(target);
@@ -457,7 +460,7 @@ impl<'d> Expander<'d> {
         Use { node, keys, copies }
     }
 
-    /// Copies a group; `None` when that is too much.
+    /// Copies a group. Returns `None` if a limit is exceeded.
     fn copy(
         &mut self,
         referring: Referring<'d>,
@@ -520,7 +523,7 @@ impl<'d> Expander<'d> {
         let mut names: Vec<&str> = groups.iter().map(|copy| copy.name()).collect();
         names.dedup();
         let file = self.short_name(target);
-        // There as written, but another name by the time it could be taken.
+        // The group is written in the file, but it is replaced by groups with other names.
         let inner = |copy: &&Arc<Copy<'d>>| {
             let rest = copy.name().strip_prefix(name);
             rest.is_some_and(|rest| rest.starts_with('.'))
@@ -545,13 +548,13 @@ impl<'d> Expander<'d> {
         format!("`{file}` has no maneuver group `{name}`{known}")
     }
 
-    /// What people call a piece: the name of the file, or of the member after its archive.
+    /// Returns the short name of a piece: the name of the file, or of the member after its archive.
     fn short_name(&self, piece: usize) -> String {
         name_of(self.document(piece).path()).to_owned()
     }
 }
 
-/// The group that a reference is in.
+/// The group that contains a reference.
 #[derive(Clone, Copy)]
 struct Referring<'d> {
     piece: usize,

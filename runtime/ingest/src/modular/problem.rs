@@ -1,29 +1,30 @@
-//! What an expansion stumbles over.
+//! Problems found during an expansion.
 
 use qcbus_document::{Attribute, Node};
 
-/// Something that is wrong with how a modular scenario is put together.
+/// An error in the structure of a modular scenario.
 #[derive(Debug, Clone)]
 pub struct Problem<'d> {
-    /// What sort.
+    /// Kind of problem.
     pub what: What,
-    /// Where it is to be mended.
+    /// Place that must be fixed.
     pub at: Spot<'d>,
-    /// What it is about in another place: mostly in the file that is referred to.
+    /// Related place, usually in the referenced file.
     pub target: Option<Spot<'d>>,
-    /// For people: what was found, what is expected.
+    /// Message for people: the found and the expected content.
     pub text: String,
 }
 
-/// Most problems that are listed.
+/// Maximum number of listed problems.
 const MOST: usize = 1000;
 
-/// The problems of an expansion, as many as anybody may want to read.
+/// The problems of an expansion, up to a maximum number.
 #[derive(Debug, Default)]
 pub(super) struct Problems<'d>(pub Vec<Problem<'d>>);
 
 impl<'d> Problems<'d> {
-    /// Adds one. One that stops the expansion is never left out for those that do not.
+    /// Adds a problem. The first problem of each kind that stops the expansion is always added,
+    /// even above the maximum.
     pub fn push(&mut self, problem: Problem<'d>) {
         let is_first = |what| !self.0.iter().any(|other| other.what == what);
         if self.0.len() < MOST || (problem.what.stops() && is_first(problem.what)) {
@@ -31,7 +32,7 @@ impl<'d> Problems<'d> {
         }
     }
 
-    /// Whether one of the last few is such.
+    /// Checks whether one of the last 64 problems matches.
     pub fn lately(&self, is_it: impl Fn(&Problem<'d>) -> bool) -> bool {
         self.0.iter().rev().take(64).any(is_it)
     }
@@ -47,13 +48,13 @@ pub enum Spot<'d> {
 }
 
 impl<'d> Spot<'d> {
-    /// The attribute of this name, or the element that lacks it.
+    /// Returns the attribute of this name, or the element if the attribute is missing.
     pub fn of(node: Node<'d>, attribute: &str) -> Spot<'d> {
         node.attribute(attribute)
             .map_or(Spot::Node(node), Spot::Attribute)
     }
 
-    /// The element.
+    /// Returns the element.
     pub fn node(&self) -> Node<'d> {
         match self {
             Spot::Node(node) => *node,
@@ -61,7 +62,7 @@ impl<'d> Spot<'d> {
         }
     }
 
-    /// Offset in the text of its document.
+    /// Returns the offset in the text of its document.
     pub fn offset(&self) -> u32 {
         match self {
             Spot::Node(node) => node.offset(),
@@ -82,57 +83,57 @@ impl<'d> From<Attribute<'d>> for Spot<'d> {
     }
 }
 
-/// The sorts of problems.
+/// Kinds of problems.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum What {
-    /// A `ScenarioReference` without a file name, or with one that leads nowhere.
+    /// A `ScenarioReference` has no file name, or the file does not exist.
     FileNotFound,
-    /// The name of the file ends in neither `.xosc` nor `.mosc`.
+    /// The file name ends in neither `.xosc` nor `.mosc`.
     Extension,
-    /// The name of the file leads out of the archive.
+    /// The file name leads out of the archive.
     Escapes,
-    /// The file is there, and not whole or no scenario.
+    /// The file exists, but it is damaged or not a scenario.
     Unreadable,
-    /// A reference that leads back to a scenario that refers to it.
+    /// A reference leads back to a scenario that refers to it.
     Cycle,
-    /// Scenarios refer to scenarios too deeply.
+    /// References from scenario to scenario are nested too deeply.
     Depth,
-    /// The expanded scenario grows beyond what is allowed.
+    /// The expanded scenario exceeds a size limit.
     Size,
-    /// A `ScenarioReference` that lies in no `ManeuverGroup`.
+    /// A `ScenarioReference` is not in a `ManeuverGroup`.
     Placement,
-    /// More than one `ScenarioReference` in a group.
+    /// A group has more than one `ScenarioReference`.
     SecondReference,
-    /// `ParameterReference` directly in a `ScenarioReference`.
+    /// A `ParameterReference` is directly in a `ScenarioReference`.
     DirectForm,
-    /// Both forms in one `ScenarioReference`.
+    /// One `ScenarioReference` uses both forms.
     MixedForm,
-    /// An element in a reference that nobody knows.
+    /// A reference contains an unknown element.
     ForeignElement,
-    /// An attribute or a text in a reference that nobody knows.
+    /// A reference contains an unknown attribute or a text.
     ForeignAttribute,
-    /// A `ManeuverGroupReference` without a name, or with one that the file does not have.
+    /// A `ManeuverGroupReference` has no name, or the file has no group of this name.
     GroupUnknown,
-    /// The file has several groups of the name.
+    /// The file has several groups of this name.
     GroupAmbiguous,
-    /// One group is referred to twice.
+    /// One group is referenced twice.
     GroupTwice,
-    /// A `ParameterReference` that lacks its key or value.
+    /// A `ParameterReference` has no key or no value.
     KeyMalformed,
-    /// A key that fits no attribute.
+    /// A key fits no attribute.
     KeyUnmatched,
-    /// One key twice.
+    /// One key occurs twice.
     KeyTwice,
-    /// Two keys, equally specific, give one attribute different values.
+    /// Two equally specific keys give one attribute different values.
     KeyTie,
     /// Several keys fit one attribute.
     KeyOverlap,
-    /// The referring group has no actor whom the maneuvers could be for, or the other one none.
+    /// The referring group or the referenced group has no actor for the maneuvers.
     Actor,
 }
 
 impl What {
-    /// Whether nothing can be made of the scenario.
+    /// Checks whether this kind of problem prevents the expansion.
     pub fn stops(self) -> bool {
         matches!(
             self,

@@ -1,4 +1,4 @@
-//! Why a reference leads nowhere, or to nothing that groups can be taken from.
+//! Explains why a reference has no target, or has a target without usable groups.
 
 use qcbus_document::{Document, FaultCode, Node};
 use qcbus_messages::path_text::split_archive;
@@ -7,7 +7,7 @@ use super::SEARCH_PATH_VARIABLE;
 use super::problem::What;
 use crate::archive::{has_only_backslashes, stays_inside};
 
-/// Why a reference leads nowhere.
+/// Returns the reason why a reference has no target.
 pub(super) fn not_found(node: Node<'_>) -> (What, String) {
     let Some(name) = node.attr("scenarioFileName") else {
         let text = "`ScenarioReference` needs the attribute `scenarioFileName`".to_owned();
@@ -56,16 +56,16 @@ pub(super) fn not_found(node: Node<'_>) -> (What, String) {
     (What::FileNotFound, text)
 }
 
-/// The catalog that a document is instead of a scenario.
+/// Returns the catalog if a document is a catalog instead of a scenario.
 pub(super) fn catalog_of(document: Document<'_>) -> Option<Node<'_>> {
     let root = document.root()?;
     let catalog = root.child("Catalog")?;
     root.child("Storyboard").is_none().then_some(catalog)
 }
 
-/// What keeps a scenario from being taken as it is.
+/// Returns the reason why a scenario cannot be used, or `None`.
 pub(super) fn trouble(document: Document<'_>) -> Option<String> {
-    // Of an archive with other faults the scenario itself is whole.
+    // Other faults of an archive leave the scenario itself intact.
     let whole = |code: FaultCode| {
         !code.makes_partial()
             || matches!(

@@ -1,4 +1,4 @@
-//! Where the scenarios lie that a modular scenario is made of.
+//! Finds the scenarios that a modular scenario consists of.
 
 use std::collections::HashSet;
 use std::ffi::OsStr;
@@ -11,21 +11,22 @@ use qcbus_messages::{Absence, DocumentRole};
 use crate::prepare::{absolute, split_members};
 use crate::references::Reference;
 
-/// The variable that names the directories of a search path.
+/// Environment variable with the directories of a search path.
 pub const SEARCH_PATH_VARIABLE: &str = "SCENARIO_PATH";
 
-/// Directories in which referenced scenarios are looked for after the places around the scenario
-/// that refers to them.
+/// Directories in which referenced scenarios are looked for, after the places around the referring
+/// scenario.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct SearchPath(Vec<PathBuf>);
 
 impl SearchPath {
-    /// Reads a list of directories: they are parted by `;` everywhere, because the reference tool
-    /// does so, and by the platform's own separator. Relative ones start at `base`.
+    /// Reads a list of directories. They are separated by the platform's own separator. `;` is a
+    /// separator on every platform, because the reference tool uses it. Relative directories start
+    /// at `base`.
     pub fn parse(text: &OsStr, base: &Path) -> SearchPath {
         let mut directories = Vec::new();
         for part in std::env::split_paths(text) {
-            // One that is no UTF-8 has no `;` that could be told from a part of a character.
+            // In a path that is not UTF-8, a `;` cannot be distinguished from part of a character.
             let parts = match part.to_str() {
                 Some(text) => text.split(';').map(PathBuf::from).collect(),
                 None => vec![part],
@@ -41,15 +42,15 @@ impl SearchPath {
         SearchPath(directories.collect())
     }
 
-    /// What [`SEARCH_PATH_VARIABLE`] says in this process; relative directories start at its
-    /// working directory.
+    /// Returns the search path in [`SEARCH_PATH_VARIABLE`] of this process. Relative directories
+    /// start at its working directory.
     pub fn of_environment() -> SearchPath {
         let base = std::env::current_dir().unwrap_or_default();
         std::env::var_os(SEARCH_PATH_VARIABLE)
             .map_or_else(SearchPath::default, |text| SearchPath::parse(&text, &base))
     }
 
-    /// These directories, and then those of another search path.
+    /// Appends the directories of another search path.
     #[must_use]
     pub fn then(mut self, other: &SearchPath) -> SearchPath {
         let more = other.0.iter().filter(|it| !self.0.contains(it)).cloned();
@@ -58,13 +59,13 @@ impl SearchPath {
         self
     }
 
-    /// The directories, the first to be looked into first.
+    /// Returns the directories in search order.
     pub fn directories(&self) -> &[PathBuf] {
         &self.0
     }
 }
 
-/// What the `ScenarioReference` elements of a document refer to, in document order.
+/// Returns the references in the `ScenarioReference` elements of a document, in document order.
 pub(crate) fn libraries(document: &Document<'_>, search: &SearchPath) -> Vec<Reference> {
     let names: HashSet<&str> = document
         .elements("ScenarioReference")
@@ -94,7 +95,7 @@ pub(crate) fn libraries(document: &Document<'_>, search: &SearchPath) -> Vec<Ref
     found
 }
 
-/// Whether the text can name a scenario that may be read.
+/// Checks whether the text can name a scenario that may be read.
 fn check(from: &Path, text: &str) -> Result<(), Absence> {
     if text.trim().is_empty() {
         return Err(Absence::EmptyPath);
@@ -105,7 +106,7 @@ fn check(from: &Path, text: &str) -> Result<(), Absence> {
     if !text.ends_with(".xosc") && !text.ends_with(".mosc") {
         return Err(Absence::NotAScenario);
     }
-    // To lead into an archive is not for a reference: it names the archive.
+    // A reference must not lead into an archive; it names the archive itself.
     let into_archive = split_archive(text).is_some();
     let in_archive = !split_members(from).1.is_empty();
     if into_archive || in_archive && !crate::archive::stays_inside(text) {
@@ -114,12 +115,12 @@ fn check(from: &Path, text: &str) -> Result<(), Absence> {
     Ok(())
 }
 
-/// A scenario that lies in an archive looks there first, then in those around it, and never beside
-/// them: an archive means the same wherever it lies. Any other looks beside itself. Then comes the
-/// search path.
+/// Returns the candidate paths. For a scenario in an archive they are in this archive, then in the
+/// archives around it, but never beside them. An archive therefore means the same in every place.
+/// For other scenarios they are beside the file. The search path comes last.
 ///
-/// The reference tool leaves what it makes of `name.mosc` as `name.xosc`, where later references find
-/// it; so that name leads to the archive where nothing else has it and the document refers to both.
+/// The reference tool stores its result for `name.mosc` as `name.xosc`, and later references find
+/// it. If the document refers to both and `name.xosc` is not found, this name leads to the archive.
 fn candidates(from: &Path, text: &str, names: &HashSet<&str>, search: &SearchPath) -> Vec<PathBuf> {
     let mut found = places(from, text, search);
     let archive = text
@@ -145,7 +146,7 @@ fn places(from: &Path, text: &str, search: &SearchPath) -> Vec<PathBuf> {
         PathBuf::from(place)
     };
     if let Some((own, around)) = members.split_last() {
-        // Beside the member that refers, where that is not at the archive's root.
+        // This place is beside the referring member, if that is not at the root of the archive.
         if let Some((folder, _)) = own.rsplit_once('/') {
             places.push(in_file(around, &format!("{folder}/{text}")));
         }
@@ -166,7 +167,7 @@ fn places(from: &Path, text: &str, search: &SearchPath) -> Vec<PathBuf> {
     places
 }
 
-/// As written first; then as someone on Windows means it.
+/// Returns the spellings to try: first as written, then with the backslashes of Windows replaced.
 fn spellings(text: &str) -> Vec<String> {
     let mut spellings = vec![text.to_owned()];
     if text.contains('\\') {

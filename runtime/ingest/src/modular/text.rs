@@ -1,4 +1,4 @@
-//! The expanded scenario as a file.
+//! Writes the expanded scenario as a file.
 
 use std::ops::Range;
 
@@ -10,11 +10,11 @@ use super::plan::Expansion;
 use crate::xml::escape_into;
 
 impl Expansion<'_> {
-    /// The expanded scenario as a file of UTF-8. What is not replaced is, byte by byte, as it is in the
-    /// files: order of attributes, white space, comments, CDATA. Only `parameterAttributes`, which
-    /// belongs to no plain scenario, is left out.
+    /// Returns the expanded scenario as a file in UTF-8. Parts that are not replaced stay identical
+    /// byte by byte: order of attributes, white space, comments, CDATA. Only `parameterAttributes`
+    /// is left out, because it does not belong to a plain scenario.
     ///
-    /// Of an expansion that is not complete this is of no use.
+    /// The text is not usable if the expansion is not complete.
     pub fn text(&self) -> String {
         let root = self.pieces[0].document;
         let text = text_of(root);
@@ -38,7 +38,7 @@ impl Expansion<'_> {
         applied(text, 0..text.len(), edits.into_iter().flatten())
     }
 
-    /// A copy as it is written in the expanded file.
+    /// Returns the text of a copy in the expanded file.
     fn written(&self, copy: &Copy<'_>) -> String {
         let document = self.pieces[copy.piece].document;
         let text = text_of(document);
@@ -56,7 +56,8 @@ impl Expansion<'_> {
         applied(text, place, edits.into_iter().flatten())
     }
 
-    /// Declarations of the prefixes that a copy needs and would lack in its new place.
+    /// Returns declarations of the prefixes that a copy needs and that are missing in its new
+    /// place.
     fn namespaces(&self, copy: &Copy<'_>, written: &str) -> Option<(Range<usize>, String)> {
         const PREFIX: &str = "xmlns:";
         let root = self.pieces[0].document.root();
@@ -86,14 +87,14 @@ impl Expansion<'_> {
     }
 }
 
-/// The name in a start tag, with its prefix.
+/// Returns the name in a start tag, with its prefix.
 fn tag_name(written: &str) -> &str {
     let name = written.get(1..).unwrap_or("");
     let end = name.find(|c: char| c.is_ascii_whitespace() || c == '/' || c == '>');
     &name[..end.unwrap_or(name.len())]
 }
 
-/// The text of a document that has one source, as scenarios do.
+/// Returns the text of a document with one source. Every scenario has one source.
 pub(super) fn text_of<'d>(document: Document<'d>) -> &'d str {
     let mut sources = document.sources();
     sources
@@ -105,7 +106,7 @@ fn range(start: u32, stop: u32) -> Range<usize> {
     start as usize..stop as usize
 }
 
-/// A value in the place of another one, between the quotes that are there.
+/// Replaces a value between its existing quotes.
 fn rewritten(text: &str, attribute: Attribute<'_>, value: &str) -> (Range<usize>, String) {
     let start = attribute.value_offset() as usize;
     let quote = match start.checked_sub(1).and_then(|at| text.as_bytes().get(at)) {
@@ -117,7 +118,7 @@ fn rewritten(text: &str, attribute: Attribute<'_>, value: &str) -> (Range<usize>
     (start..start + attribute.raw_len() as usize, written)
 }
 
-/// An attribute with the white space before it.
+/// Removes an attribute with the white space before it.
 fn left_out(text: &str, attribute: Attribute<'_>) -> Option<(Range<usize>, String)> {
     let before = text.get(..attribute.offset() as usize)?;
     let start = before.trim_end_matches([' ', '\t', '\r', '\n']).len();
@@ -125,7 +126,7 @@ fn left_out(text: &str, attribute: Attribute<'_>) -> Option<(Range<usize>, Strin
     Some((start..stop, String::new()))
 }
 
-/// What an XML declaration says of the encoding, where the file had another one than it gets.
+/// Replaces the encoding in the XML declaration if the file had another encoding than UTF-8.
 fn encoding(text: &str) -> Option<(Range<usize>, String)> {
     let start = text
         .find("<?xml")
@@ -140,7 +141,8 @@ fn encoding(text: &str) -> Option<(Range<usize>, String)> {
     (!name.eq_ignore_ascii_case("utf-8")).then(|| (at..at + name.len(), "UTF-8".to_owned()))
 }
 
-/// What stands between two groups in one place: a line break and what the first is indented by.
+/// Returns the separator between two groups in one place: a line break and the indentation of the
+/// first one.
 fn indentation(text: &str, at: usize) -> String {
     let before = text.get(..at).unwrap_or("");
     let line = before.rsplit_once('\n').map_or("", |(_, line)| line);
@@ -151,7 +153,7 @@ fn indentation(text: &str, at: usize) -> String {
     }
 }
 
-/// A stretch of a text with edits in it.
+/// Returns a section of a text with edits applied.
 fn applied(
     text: &str,
     within: Range<usize>,
@@ -162,7 +164,8 @@ fn applied(
     let mut out = String::with_capacity(within.len());
     let mut at = within.start;
     for (range, new) in edits {
-        // Edits lie in order and apart; in a damaged image they may not.
+        // Edits are sorted and do not overlap. In a damaged image they may overlap, so the range is
+        // checked.
         out.push_str(text.get(at..range.start).unwrap_or(""));
         out.push_str(&new);
         at = range.end.max(at);

@@ -1,19 +1,20 @@
-//! Which characters XML 1.0 (fifth edition) allows where.
+//! Character classes of XML 1.0 (fifth edition).
 
 /// Bits of [`CLASS`].
 pub(crate) const NAME_START: u8 = 1;
 pub(crate) const NAME: u8 = 2;
 pub(crate) const BLANK: u8 = 4;
-/// In an attribute value: `&`, `<` and white space other than a blank, which all need a closer look.
+/// Characters in an attribute value that need further processing: `&`, `<` and white space other
+/// than a blank.
 pub(crate) const SPECIAL: u8 = 8;
 pub(crate) const DOUBLE_QUOTE: u8 = 16;
 pub(crate) const SINGLE_QUOTE: u8 = 32;
 pub(crate) const COLON: u8 = 64;
-/// Beyond ASCII.
+/// Bytes beyond ASCII.
 pub(crate) const WIDE: u8 = 128;
 
-/// What each byte may be. Bytes from 0x80 on count as name characters here; names that have any
-/// are looked at again, character by character.
+/// Classes of each byte. Bytes from 0x80 on count as name characters here. Names with such bytes
+/// are checked again, character by character.
 pub(crate) static CLASS: [u8; 256] = classes();
 
 const fn classes() -> [u8; 256] {
@@ -37,13 +38,13 @@ const fn classes() -> [u8; 256] {
     table
 }
 
-/// Whether a byte has one of the properties.
+/// Checks whether a byte has one of the classes.
 #[inline]
 pub(crate) fn is(byte: u8, class: u8) -> bool {
     CLASS[byte as usize] & class != 0
 }
 
-/// Whether a whole string is a `Name` of XML, and if so whether it has a colon.
+/// Checks whether a whole string is an XML `Name`. If so, returns whether it has a colon.
 #[inline]
 pub(crate) fn name_with_colon(name: &str) -> Option<bool> {
     let bytes = name.as_bytes();
@@ -57,7 +58,7 @@ pub(crate) fn name_with_colon(name: &str) -> Option<bool> {
     sound.then_some(any & COLON != 0)
 }
 
-/// `NameStartChar` and `NameChar` beyond ASCII.
+/// Checks `NameStartChar` and `NameChar` beyond ASCII.
 pub(crate) fn is_wide_name(name: &str) -> bool {
     let start = |c: char| {
         c.is_ascii()
@@ -74,12 +75,12 @@ pub(crate) fn is_wide_name(name: &str) -> bool {
     characters.next().is_some_and(start) && characters.all(inner)
 }
 
-/// Whether XML 1.0 allows the character at all (`Char`).
+/// Checks whether XML 1.0 allows the character (`Char`).
 pub(crate) fn is_char(c: char) -> bool {
     matches!(c, '\t' | '\n' | '\r' | ' '..='\u{D7FF}' | '\u{E000}'..='\u{FFFD}' | '\u{10000}'..)
 }
 
-/// The places of characters that XML forbids, in order.
+/// Returns the places of characters that XML forbids, in order.
 pub(crate) fn forbidden(text: &str) -> impl Iterator<Item = (usize, char)> + '_ {
     const BLOCK: usize = 4096;
     let bytes = text.as_bytes();
@@ -91,8 +92,9 @@ pub(crate) fn forbidden(text: &str) -> impl Iterator<Item = (usize, char)> + '_ 
         .flat_map(move |number| forbidden_in(text, number * BLOCK, (number + 1) * BLOCK))
 }
 
-/// Without an early exit and in single bytes, so that the compiler makes vector code of it. 0xEF begins
-/// U+FFFE and U+FFFF, among others.
+/// Checks whether a block may contain forbidden characters. It checks single bytes without an early
+/// exit, so that the compiler generates vector code. Among others, U+FFFE and U+FFFF begin with
+/// 0xEF.
 fn is_suspicious(block: &[u8]) -> bool {
     let suspects = block.iter().fold(0u8, |any, &byte| {
         let blank = (byte == b'\t') | (byte == b'\n') | (byte == b'\r');

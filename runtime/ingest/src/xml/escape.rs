@@ -1,11 +1,11 @@
-//! From a value to its spelling in XML.
+//! Escapes values for XML.
 
 use std::fmt::Write as _;
 
 use super::chars::is_char;
 
-/// Appends a value as it is written between two quotes of this kind, so that every reader gets the
-/// same value back. What XML cannot hold becomes U+FFFD.
+/// Appends a value in the form needed between two quotes of this kind, so that every reader gets
+/// the same value back. Characters that XML forbids become U+FFFD.
 pub(crate) fn escape_into(out: &mut String, value: &str, quote: char) {
     for c in value.chars() {
         match c {
@@ -13,7 +13,7 @@ pub(crate) fn escape_into(out: &mut String, value: &str, quote: char) {
             '<' => out.push_str("&lt;"),
             '"' if quote == '"' => out.push_str("&quot;"),
             '\'' if quote == '\'' => out.push_str("&apos;"),
-            // Written out, white space would be read as blanks.
+            // Without a character reference, readers would turn this white space into blanks.
             '\t' | '\n' | '\r' => {
                 let _ = write!(out, "&#{};", u32::from(c));
             }

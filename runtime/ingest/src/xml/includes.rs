@@ -1,4 +1,4 @@
-//! A look ahead for `<include>` elements, so that their files can be read before the parse.
+//! Finds `<include>` elements in advance, so that their files can be read before the parse.
 
 use quick_xml::events::Event;
 
@@ -15,8 +15,8 @@ pub(crate) struct Include {
     pub file: Option<String>,
 }
 
-/// The includes of a text in order, as far as quick-xml can read it. Comments and CDATA sections
-/// have none.
+/// Returns the includes of a text in order, up to the point where quick-xml fails. Comments and
+/// CDATA sections are ignored.
 pub(crate) fn includes_of(text: &str) -> Vec<Include> {
     if !text.contains("<include") {
         return Vec::new();
@@ -34,7 +34,7 @@ pub(crate) fn includes_of(text: &str) -> Vec<Include> {
     found
 }
 
-/// The name of the first element of a text.
+/// Returns the name of the first element of a text.
 pub(crate) fn first_element(text: &str) -> Option<&str> {
     let mut first = None;
     visit_tags(text, |name, _, _| {
@@ -44,8 +44,8 @@ pub(crate) fn first_element(text: &str) -> Option<&str> {
     first
 }
 
-/// Calls back for each start tag with name, offset and the range of its attributes, until told to
-/// stop.
+/// Calls `visit` for each start tag with its name, its offset and the range of its attributes.
+/// Stops when `visit` returns `false`.
 fn visit_tags<'t>(
     text: &'t str,
     mut visit: impl FnMut(&'t str, usize, std::ops::Range<usize>) -> bool,

@@ -1,5 +1,5 @@
-//! From text to the events of a tree: quick-xml finds the markup that is not spelt as nearly all is, the
-//! checks that it leaves out are made here.
+//! Turns text into the events of a tree. quick-xml finds the markup with unusual spelling. This
+//! module makes the checks that quick-xml omits.
 
 pub(crate) mod chars;
 mod escape;

@@ -1,9 +1,9 @@
-//! Which prefixes are bound where. Rules match local names and never look; but a prefix that
-//! nothing binds is an error to every other reader of the file.
+//! Tracks which namespace prefixes are bound. Rules match local names and ignore prefixes. An
+//! unbound prefix is an error for every other reader of the file.
 
 use std::collections::HashMap;
 
-/// The prefixes in force, with how many open elements bind each.
+/// Bound prefixes, with the number of open elements that bind each.
 #[derive(Default)]
 pub(crate) struct Prefixes<'t> {
     bound: HashMap<&'t str, u32>,
@@ -11,7 +11,7 @@ pub(crate) struct Prefixes<'t> {
 }
 
 impl<'t> Prefixes<'t> {
-    /// Takes note of an attribute when it is `xmlns:prefix`; says whether it is one.
+    /// Records an attribute if it is `xmlns:prefix`. Returns whether it is one.
     pub fn declare(&mut self, attribute: &'t str) -> bool {
         let Some(prefix) = attribute.strip_prefix("xmlns:") else {
             return false;
@@ -21,12 +21,12 @@ impl<'t> Prefixes<'t> {
         true
     }
 
-    /// How many bindings are in force; given back to [`Prefixes::forget`] at the element's end.
+    /// Returns the number of active bindings, for [`Prefixes::forget`] at the end of the element.
     pub fn mark(&self) -> usize {
         self.order.len()
     }
 
-    /// Ends every binding made after `mark`.
+    /// Removes every binding made after `mark`.
     #[inline]
     pub fn forget(&mut self, mark: usize) {
         while self.order.len() > mark {
@@ -39,7 +39,7 @@ impl<'t> Prefixes<'t> {
         }
     }
 
-    /// The prefix of a name when nothing binds it.
+    /// Returns the prefix of a name if it is not bound.
     pub fn unbound<'n>(&self, name: &'n str) -> Option<&'n str> {
         let (prefix, _) = name.split_once(':')?;
         let known = matches!(prefix, "xml" | "xmlns")

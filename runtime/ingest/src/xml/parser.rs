@@ -1,4 +1,4 @@
-//! The one pass over a document and its includes.
+//! Parses a document and its includes in one pass.
 
 mod character_data;
 mod misc;
@@ -19,14 +19,14 @@ use super::value::{BadReference, attribute_value};
 use crate::limits::Limits;
 use crate::text_fault::TextFault;
 
-/// The texts of a document, the root file first, and what its includes lead to.
+/// The texts of a document, the root file first, and the targets of its includes.
 pub(crate) struct Input<'t> {
     pub texts: Vec<SourceText<'t>>,
     pub splices: &'t HashMap<SpliceKey, Splice>,
     pub limits: &'t Limits,
 }
 
-/// One file's text and its place in the image's text.
+/// One file's text and its start in the text of the image.
 #[derive(Clone, Copy)]
 pub(crate) struct SourceText<'t> {
     pub path: &'t str,
@@ -34,20 +34,21 @@ pub(crate) struct SourceText<'t> {
     pub start: u32,
 }
 
-/// An `<include>`: the number of its file, and the offset of its `<` in that file's text.
+/// Key of an `<include>`: the number of its file, and the offset of its `<` in that file's text.
 pub(crate) type SpliceKey = (usize, usize);
 
-/// What an `<include>` leads to.
+/// Target of an `<include>`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Splice {
-    /// The number of a file.
+    /// Number of the included file.
     File(usize),
-    /// Nowhere, and why.
+    /// The include has no target, and this is the reason.
     Fault(FaultCode, String),
 }
 
-/// Parses a whole document into `sink`; gives the faults in the order of their discovery, with
-/// offsets of the image's text. However faulty the text is, what could be read reaches the sink.
+/// Parses a whole document into `sink`. Returns the faults in the order of their discovery, with
+/// offsets in the image's text. The sink also receives everything that can be read of a faulty
+/// text.
 pub(crate) fn parse<S: Sink>(input: &Input<'_>, sink: &mut S) -> Result<Vec<TextFault>, Halt> {
     parse_by(Parser::new(input, sink))
 }
@@ -69,13 +70,13 @@ fn parse_by<S: Sink>(mut parser: Parser<'_, '_, S>) -> Result<Vec<TextFault>, Ha
     }
 }
 
-/// Why parsing ends before the end of the text.
+/// Reason why parsing ends before the end of the text.
 enum Stop {
-    /// Of a fault after which nothing sensible can follow in this file.
+    /// A fault after which the rest of this file is meaningless.
     File,
-    /// Of a cap: nothing more is read at all.
+    /// An exceeded cap. Reading stops completely.
     All,
-    /// The sink takes no more.
+    /// The sink accepts no further events.
     Sink(Halt),
 }
 
@@ -85,16 +86,16 @@ impl From<Halt> for Stop {
     }
 }
 
-/// An element that has been opened.
+/// An open element.
 struct Open<'t> {
     name: &'t str,
     /// Offset of its `<` in the text of its file.
     at: usize,
-    /// No node: the root of an included file, which its parent stands for.
+    /// Whether the element has no node: the root of an included file is represented by its parent.
     transparent: bool,
-    /// Prefix bindings in force before it.
+    /// Number of prefix bindings before this element.
     prefixes: usize,
-    /// The include that ends with this element.
+    /// The include that is spliced when this element ends.
     include: Option<SpliceKey>,
 }
 
@@ -104,7 +105,7 @@ struct Run {
     active: bool,
     start: usize,
     stop: usize,
-    /// The value so far, once it differs from the text.
+    /// Value so far, if it differs from the text.
     value: String,
     resolved: bool,
 }
@@ -115,9 +116,9 @@ struct File<'t> {
     number: usize,
     text: &'t str,
     start: u32,
-    /// Length of the stack when the file began.
+    /// Length of the stack at the start of the file.
     floor: usize,
-    /// The element that an included file's root must be.
+    /// Required name of the root element of an included file.
     parent: Option<&'t str>,
 }
 
@@ -129,17 +130,17 @@ struct Parser<'p, 't, S> {
     /// Files being read, outermost first.
     chain: Vec<usize>,
     included: u32,
-    /// Includes are spliced in OpenDRIVE only.
+    /// Whether includes are spliced. This is the case in OpenDRIVE only.
     splices: bool,
     seen_doctype: bool,
     refused_doctype: bool,
     run: Run,
     prefixes: Prefixes<'t>,
-    /// Attributes of the current tag.
+    /// Names of the attributes of the current tag.
     names: Vec<&'t str>,
-    /// The same, where the tag is spelt plainly.
+    /// Attributes of the current tag, if it has plain spelling.
     attributes: Vec<RawAttribute>,
-    /// Plain tags are read without quick-xml; the same comes of it with them.
+    /// Whether plain tags are read without quick-xml. The result is the same.
     plainly: bool,
     scratch: String,
     bad: Vec<BadReference>,
@@ -167,7 +168,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         }
     }
 
-    /// Reads one file; `parent` is the element that an included file's root must be.
+    /// Reads one file. `parent` is the required root element of an included file.
     fn file(&mut self, number: usize, parent: Option<&'t str>) -> Result<(), Stop> {
         let source = self.input.texts[number];
         let file = File {
@@ -209,7 +210,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
             let event = reader.read_event();
             let to = body + offset(reader.buffer_position());
             let outside = self.stack.len() == file.floor;
-            // Behind text quick-xml already knows what comes.
+            // After text, quick-xml has already looked ahead at the next markup.
             let markup = !matches!(event, Ok(Event::Text(_) | Event::GeneralRef(_)));
             match event {
                 Ok(Event::Start(tag)) => {
@@ -290,7 +291,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         Ok(())
     }
 
-    /// The first element of a file, or one element too many.
+    /// Handles the first element of a file, or reports a second root element.
     fn root(
         &mut self,
         file: File<'t>,
@@ -330,7 +331,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         self.fault(file, FaultCode::BadName, from, &text)
     }
 
-    /// An element without a usable name is no node, but its end tag is awaited.
+    /// Handles an element without a valid name. It gets no node, but its end tag is expected.
     fn open_nameless(
         &mut self,
         file: File<'t>,
@@ -413,7 +414,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         Ok(())
     }
 
-    /// Leaves the value of a raw attribute in `scratch`.
+    /// Stores the value of a raw attribute in `scratch`.
     #[cold]
     fn resolve(&mut self, file: File<'t>, at: usize, raw: &str) -> Result<(), Stop> {
         self.scratch.clear();
@@ -431,7 +432,8 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         }
     }
 
-    /// Few attributes are compared each with each, many are sorted: never quadratic.
+    /// Checks for duplicate attributes. Few attributes are compared pairwise and many are put into
+    /// a hash set, so the time is never quadratic.
     fn check_duplicates(&mut self, file: File<'t>) -> Result<(), Stop> {
         const FEW: usize = 24;
         let names = &self.names;
@@ -489,7 +491,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         }
     }
 
-    /// An element ends, and with it what it included.
+    /// Ends an element and splices its include, if it has one.
     #[inline]
     fn end(&mut self, file: File<'t>, open: &Open<'t>, to: usize) -> Result<(), Stop> {
         self.prefixes.forget(open.prefixes);
@@ -499,8 +501,8 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         open.include.map_or(Ok(()), |key| self.splice(file, key))
     }
 
-    /// An end tag that does not belong here. When it belongs to an outer element, the inner ones
-    /// are taken for closed; else it is skipped.
+    /// Handles an end tag that does not match. If it belongs to an outer element, the inner
+    /// elements are closed. Otherwise it is skipped.
     #[cold]
     fn mismatch(&mut self, file: File<'t>, from: usize, to: usize, name: &str) -> Result<(), Stop> {
         let text = match self.stack[file.floor..].last() {
@@ -554,7 +556,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         Ok(())
     }
 
-    /// quick-xml gave up: markup that never ends, or is none.
+    /// Handles an error of quick-xml: unterminated or invalid markup.
     #[cold]
     fn broken(
         &mut self,
@@ -563,7 +565,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         error: &quick_xml::Error,
     ) -> Result<(), Stop> {
         self.flush(file)?;
-        // Text may lie between the last event and the markup that is to blame.
+        // There may be text between the last event and the faulty markup.
         let at = file.text[from..].find('<').map_or(from, |skip| from + skip);
         let code = match error {
             quick_xml::Error::Syntax(quick_xml::errors::SyntaxError::InvalidBangMarkup) => {
@@ -586,7 +588,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         Err(Stop::File)
     }
 
-    /// Puts the children of an included file's root here.
+    /// Inserts the children of an included file's root at the current position.
     #[cold]
     fn splice(&mut self, file: File<'t>, key: SpliceKey) -> Result<(), Stop> {
         let target = match self.input.splices.get(&key) {
@@ -630,7 +632,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         }
         let floor = self.stack.len();
         match self.file(target, Some(parent)) {
-            // The faulty file ends here; the one that includes it goes on.
+            // A faulty included file ends here, and the including file continues.
             Err(Stop::File) => {
                 self.run.active = false;
                 let end = self.input.texts[target];
@@ -668,14 +670,15 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
     }
 }
 
-/// Length of the byte-order mark, and of all that wrongly follow it. (quick-xml would skip one
-/// without counting it.)
+/// Returns the length of the byte-order mark, and the length of all consecutive byte-order marks
+/// together. (quick-xml would skip one without counting it.)
 pub(super) fn marks(text: &str) -> (usize, usize) {
     let body = text.len() - text.trim_start_matches('\u{FEFF}').len();
     (body.min('\u{FEFF}'.len_utf8()), body)
 }
 
-/// quick-xml with its checks off: those made here recover, and say where and why.
+/// Creates a quick-xml reader without its checks. The checks here recover, and they report the
+/// place and the reason.
 pub(super) fn lenient(text: &str) -> Reader<&[u8]> {
     let mut reader = Reader::from_str(text);
     let config = reader.config_mut();
@@ -685,20 +688,20 @@ pub(super) fn lenient(text: &str) -> Reader<&[u8]> {
     reader
 }
 
-/// Equality that mostly ends at the first letter, before any call.
+/// Compares two strings. Most comparisons end at the first letter, before any call.
 #[inline]
 fn same(one: &str, other: &str) -> bool {
     one.len() == other.len() && one.as_bytes().first() == other.as_bytes().first() && one == other
 }
 
-/// A name or text as messages show it: bounded, whatever the file holds.
+/// Truncates a name or text for messages, so that their length is limited for every file.
 fn shown(text: &str) -> &str {
     text.char_indices()
         .nth(60)
         .map_or(text, |(at, _)| &text[..at])
 }
 
-/// The row of an offset; for messages only, it counts from the start.
+/// Returns the row of an offset. It counts from the start of the text, so it is for messages only.
 fn row(text: &str, at: usize) -> usize {
     text.as_bytes()[..at]
         .iter()
@@ -707,24 +710,24 @@ fn row(text: &str, at: usize) -> usize {
         + 1
 }
 
-/// Where `part`, a slice of `text`, lies in it.
+/// Returns the offset of `part`, which must be a slice of `text`.
 fn offset_in(text: &str, part: &str) -> usize {
     (part.as_ptr() as usize).saturating_sub(text.as_ptr() as usize)
 }
 
-/// Positions of a text in memory fit.
+/// Converts a position. Positions of a text in memory always fit.
 pub(super) fn offset(position: u64) -> usize {
     usize::try_from(position).unwrap_or(usize::MAX)
 }
 
-/// Texts above 4 GiB are refused before they are parsed.
+/// Converts an offset to 32 bits. Texts above 4 GiB are refused before they are parsed.
 #[inline]
 fn narrow(at: usize) -> u32 {
     u32::try_from(at).unwrap_or(u32::MAX)
 }
 
-/// Where the value begins in a tag that has no closing quote: the first whose text up to the next quote
-/// has a `<`, which no value may have, or that goes on to the end.
+/// Finds the opening quote of the value without a closing quote in a tag. It is the first quote
+/// whose value contains a `<`, which is not allowed there, or extends to the end.
 fn open_quote(tag: &str) -> Option<usize> {
     let mut at = 0;
     loop {

@@ -1,5 +1,5 @@
-//! Tags as nearly all are spelt, read in one go: `<name a="1" b='2'/>` and `</name>`. Whatever is spelt
-//! in any other way is nothing for this module, and is left to quick-xml and [`AttributeScanner`].
+//! Reads tags in plain spelling in one step: `<name a="1" b='2'/>` and `</name>`. Nearly all tags
+//! are plain. Tags in any other spelling are left to quick-xml and [`AttributeScanner`].
 //!
 //! [`AttributeScanner`]: super::tag::AttributeScanner
 
@@ -8,21 +8,21 @@ use super::chars::{
 };
 use super::tag::RawAttribute;
 
-/// A start tag in plain spelling; offsets are those of the text.
+/// A start tag in plain spelling. Offsets refer to the text.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct PlainTag {
-    /// One past the last letter of its name.
+    /// Offset after the last letter of its name.
     pub name_end: usize,
     /// The name has a colon.
     pub colon: bool,
-    /// One past its `>`.
+    /// Offset after its `>`.
     pub end: usize,
-    /// It is an end tag as well.
+    /// Whether it is also an end tag.
     pub empty: bool,
 }
 
-/// Reads the start tag whose `<` is at `from`, and puts its attributes into `attributes`. `None`
-/// when it is not spelt plainly, or is none.
+/// Reads the start tag whose `<` is at `from`, and puts its attributes into `attributes`. Returns
+/// `None` if it is not a start tag in plain spelling.
 #[inline]
 pub(crate) fn start_tag(
     text: &[u8],
@@ -53,7 +53,7 @@ pub(crate) fn start_tag(
                     empty,
                 });
             }
-            // No space before it, which is a fault.
+            // The missing space is a fault, which the slow path reports.
             _ if start == at => return None,
             _ => {}
         }
@@ -63,7 +63,8 @@ pub(crate) fn start_tag(
     }
 }
 
-/// Whether the text has at `from` the plain end tag of an element of this name; if so, one past its `>`.
+/// Checks for the plain end tag of an element of this name at `from`. If found, returns the offset
+/// after its `>`.
 #[inline]
 pub(crate) fn end_tag(text: &[u8], from: usize, name: &str) -> Option<usize> {
     let end = from + 2 + name.len();
@@ -71,7 +72,8 @@ pub(crate) fn end_tag(text: &[u8], from: usize, name: &str) -> Option<usize> {
     (text.get(end) == Some(&b'>') && written == name.as_bytes()).then_some(end + 1)
 }
 
-/// The first byte from `at` on that is no white space, or the end; where a row of blanks is likely.
+/// Returns the offset of the first byte from `at` on that is not white space, or the end. It is
+/// fast for long runs of blanks.
 #[inline]
 pub(crate) fn skip_indent(text: &[u8], mut at: usize) -> usize {
     const BLANKS: [u8; 8] = [b' '; 8];
@@ -113,7 +115,7 @@ fn attribute(text: &[u8], start: usize) -> Option<RawAttribute> {
     })
 }
 
-/// The end of a name of ASCII letters, and whether it has a colon.
+/// Returns the end of a name of ASCII letters, and whether it has a colon.
 #[inline]
 fn name(text: &[u8], start: usize) -> Option<(usize, bool)> {
     let first = CLASS[usize::from(*text.get(start)?)];
@@ -132,7 +134,7 @@ fn name(text: &[u8], start: usize) -> Option<(usize, bool)> {
     (seen & WIDE == 0).then_some((end, seen & COLON != 0))
 }
 
-/// The closing quote of a value that begins at `start`, and whether the value is special.
+/// Returns the closing quote of a value that begins at `start`, and whether the value is special.
 #[inline]
 fn value<const QUOTE: u8>(text: &[u8], start: usize) -> Option<(usize, bool)> {
     let mut at = start;
@@ -163,8 +165,8 @@ fn value<const QUOTE: u8>(text: &[u8], start: usize) -> Option<(usize, bool)> {
     None
 }
 
-/// Marks the bytes of a word that end a value or may be special: the quote, `&`, `<` and all below the
-/// blank. The lowest mark is right; those above it may be there without a reason.
+/// Marks the bytes of a word that end a value or may be special: the quote, `&`, `<` and all bytes
+/// below the blank. The lowest mark is exact. Marks above it may be false.
 #[inline]
 fn suspects<const QUOTE: u8>(word: u64) -> u64 {
     const ONES: u64 = u64::from_le_bytes([0x01; 8]);

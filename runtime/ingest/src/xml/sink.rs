@@ -1,13 +1,13 @@
-//! Who takes the events of a parse: the image, or a counter that finds out how large it will be.
+//! Receives the events of a parse: either in the image, or in a counter that computes its size.
 
 use qcbus_document::{BuildError, Capacities, ImageBuilder};
 
-/// Why a sink takes no more.
+/// Reason why a sink accepts no further events.
 #[derive(Debug)]
 pub(crate) enum Halt {
-    /// The builder refused.
+    /// The builder returned an error.
     Build(BuildError),
-    /// A counted image became larger than allowed; its size so far.
+    /// The counted image became larger than allowed. The value is its size so far.
     TooLarge(usize),
 }
 
@@ -17,10 +17,10 @@ impl From<BuildError> for Halt {
     }
 }
 
-/// Takes the events of a parse; offsets are those of the image's text.
+/// Receives the events of a parse. Offsets refer to the image's text.
 pub(crate) trait Sink {
     fn open(&mut self, name: &str, offset: u32) -> Result<(), Halt>;
-    /// `resolved` is the value where it differs from the raw text.
+    /// Adds an attribute. `resolved` is the value if it differs from the raw text.
     fn attribute(
         &mut self,
         name: &str,
@@ -54,7 +54,7 @@ impl Sink for ImageBuilder<'_> {
     }
 
     fn text(&mut self, start: u32, stop: u32, resolved: Option<&str>) -> Result<(), Halt> {
-        // Ingest has dropped what is blank; what is left is wanted, be it `&#32;`.
+        // Blank text has already been dropped. The remaining text must stay, even `&#32;`.
         Ok(self.cdata(start, stop, resolved)?)
     }
 
@@ -64,14 +64,14 @@ impl Sink for ImageBuilder<'_> {
     }
 }
 
-/// Counts what an image will hold, and stops when that is too much.
+/// Counts the content of an image, and stops at the maximum size.
 pub(crate) struct Counter {
     pub counted: Capacities,
     max_image: usize,
 }
 
 impl Counter {
-    /// Starts from what is known before the parse: text, sources, faults and their heap.
+    /// Starts with the values known before the parse: text, sources, faults and their heap.
     pub fn new(known: Capacities, max_image: usize) -> Counter {
         Counter {
             counted: known,
@@ -80,7 +80,7 @@ impl Counter {
     }
 
     fn check(&self) -> Result<(), Halt> {
-        // Adding up is dear; every 4096th event is often enough for a cap.
+        // The sum is expensive, and a check at every 4096th event is enough for a cap.
         if !(self.counted.nodes + self.counted.attributes).is_multiple_of(4096) {
             return Ok(());
         }
@@ -120,7 +120,8 @@ impl Sink for Counter {
         self.name();
         match resolved {
             Some(value) => self.heap(value.len()),
-            // Too far from its name for a short distance: the builder copies it.
+            // The distance between name and value is too large for 16 bits, so the builder copies
+            // the value.
             None if value_at - name_at > u32::from(u16::MAX) => self.heap(value_len as usize),
             None => {}
         }

@@ -1,5 +1,5 @@
-//! The inside of a start tag, read attribute by attribute with the checks that quick-xml's own
-//! iterator does not make.
+//! Reads the attributes of a start tag one by one, with the checks that quick-xml's own iterator
+//! omits.
 
 use std::ops::Range;
 
@@ -10,20 +10,20 @@ use super::chars::{
     is_wide_name,
 };
 
-/// One attribute; ranges are offsets of the text that the scanner was made for.
+/// One attribute. The ranges are offsets in the scanned text.
 pub(crate) struct RawAttribute {
     pub name: Range<usize>,
-    /// Without the quotes, entities unresolved.
+    /// Value without the quotes, with unresolved entities.
     pub value: Range<usize>,
-    /// The value holds `&`, `<`, a tab or a line end.
+    /// Whether the value contains `&`, `<`, a tab or a line end.
     pub special: bool,
-    /// The name has a colon.
+    /// Whether the name has a colon.
     pub colon: bool,
-    /// Nothing separates this attribute from what stands before it.
+    /// Whether no white space separates this attribute from the text before it.
     pub missing_space: bool,
 }
 
-/// Why the rest of a tag cannot be read.
+/// Reason why the rest of a tag cannot be read.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct TagFault {
     pub code: FaultCode,
@@ -36,12 +36,12 @@ pub(crate) struct AttributeScanner<'t> {
     text: &'t str,
     at: usize,
     end: usize,
-    /// The tag has nothing that makes a value special, so that only quotes are looked for.
+    /// Whether the tag has no special characters, so that the scanner looks only for quotes.
     plain: bool,
 }
 
 impl<'t> AttributeScanner<'t> {
-    /// Scans `inside`: what follows the element's name, up to and without `>` or `/>`.
+    /// Scans `inside`: the text after the element's name, up to but without `>` or `/>`.
     pub fn new(text: &'t str, inside: Range<usize>) -> AttributeScanner<'t> {
         let end = inside.end.min(text.len());
         let at = inside.start.min(end);
@@ -198,14 +198,15 @@ impl<'t> AttributeScanner<'t> {
     }
 }
 
-/// Whether none of the bytes is [`SPECIAL`]; without an early exit, for vector code.
+/// Checks whether none of the bytes is [`SPECIAL`]. It has no early exit, so that the compiler can
+/// generate vector code.
 #[inline]
 fn is_plain(bytes: &[u8]) -> bool {
     let special = |byte: u8| (byte < b' ') | (byte == b'&') | (byte == b'<');
     !bytes.iter().fold(false, |any, &byte| any | special(byte))
 }
 
-/// The first quote, eight bytes at a time: values are too short for a call of `memchr`.
+/// Finds the first quote, eight bytes at a time. Values are too short for a call of `memchr`.
 #[inline]
 fn find_quote(bytes: &[u8], quote: u8) -> Option<usize> {
     const ONES: u64 = u64::from_le_bytes([0x01; 8]);
@@ -213,7 +214,7 @@ fn find_quote(bytes: &[u8], quote: u8) -> Option<usize> {
     let wanted = ONES * u64::from(quote);
     let (words, rest) = bytes.as_chunks::<8>();
     for (number, word) in words.iter().enumerate() {
-        // The lowest marked byte is the first that equals the quote.
+        // The lowest marked byte is the first one that equals the quote.
         let differing = u64::from_le_bytes(*word) ^ wanted;
         let marked = differing.wrapping_sub(ONES) & !differing & HIGHS;
         if marked != 0 {

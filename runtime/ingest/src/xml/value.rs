@@ -1,16 +1,16 @@
-//! References and line ends: from the text as written to the value that is meant.
+//! Resolves references and line ends, from the raw text to the value.
 
 use super::chars::is_char;
 
-/// A reference that cannot be resolved: its place within the raw value, and why.
+/// An unresolvable reference: its offset within the raw value, and the reason.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct BadReference {
     pub offset: usize,
     pub text: String,
 }
 
-/// The character that `&name;` stands for. Only XML's own five entities and references to
-/// characters are known: a document cannot define others, because a DOCTYPE is refused.
+/// Returns the character for `&name;`. Only the five entities of XML and character references are
+/// known. A document cannot define others, because a DOCTYPE is refused.
 pub(crate) fn resolve_reference(name: &str) -> Result<char, String> {
     match name {
         "lt" => return Ok('<'),
@@ -38,8 +38,8 @@ pub(crate) fn resolve_reference(name: &str) -> Result<char, String> {
     }
 }
 
-/// Appends the value that an attribute's raw text means: references resolved, every tab and line
-/// end a blank (XML 1.0, section 3.3.3). What cannot be resolved stays as it is written.
+/// Appends the value of an attribute's raw text. References are resolved, and every tab and line
+/// end becomes a blank (XML 1.0, section 3.3.3). Unresolvable references stay as written.
 pub(crate) fn attribute_value(raw: &str, out: &mut String, bad: &mut Vec<BadReference>) {
     let mut rest = raw;
     while let Some(at) = rest.find(['&', '\t', '\n', '\r']) {
@@ -74,9 +74,10 @@ pub(crate) fn line_ends(raw: &str, out: &mut String) {
     out.push_str(rest);
 }
 
-/// Resolves the reference that `rest` begins with; gives the bytes used.
+/// Resolves the reference at the start of `rest`. Returns the number of bytes used.
 fn reference(rest: &str, offset: usize, out: &mut String, bad: &mut Vec<BadReference>) -> usize {
-    // The end is looked for only as far as a name goes: a value of nothing but `&` stays linear.
+    // The search for the end stops where a name ends, so a value that contains only `&` takes
+    // linear time.
     let stops = |c: char| matches!(c, ';' | '&' | '<' | ' ' | '\t' | '\n' | '\r');
     let body = &rest[1..];
     let outcome = match body.find(stops) {

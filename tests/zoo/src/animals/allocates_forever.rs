@@ -1,4 +1,4 @@
-//! Takes ever more memory for a job, until the system refuses.
+//! Allocates more and more memory for a job, until the system refuses.
 
 use qcbus_bus::Peer;
 use qcbus_messages::Job;
@@ -14,15 +14,15 @@ pub(super) const ANIMAL: Animal = Animal {
     ..GOOD
 };
 
-/// Bytes taken at once.
+/// Bytes allocated at once.
 const BITE: usize = 8 << 20;
-/// Where it stops by itself, so that a machine survives a broker without a memory limit.
+/// Total at which it stops by itself, so that a machine survives a broker without a memory limit.
 const FED: usize = 4 << 30;
 
 fn job(_: &mut Peer, _: &Job) -> Mood {
     let mut eaten: Vec<Vec<u8>> = Vec::new();
     while eaten.len() * BITE < FED {
-        // Written to, because memory that nobody touches costs nothing.
+        // The memory is written to, because untouched memory is not really allocated.
         eaten.push(vec![0xEE; BITE]);
     }
     drop(eaten);

@@ -1,4 +1,4 @@
-//! Crashes on whatever it is given.
+//! Crashes on every job.
 
 use qcbus_bus::Peer;
 use qcbus_messages::Job;

@@ -1,12 +1,12 @@
-//! Crashes on files that have the word [`POISON`] in their name or in their text, and is polite to
-//! all others.
+//! Crashes on files with the word [`POISON`] in their name or text. It answers all other jobs
+//! correctly.
 
 use qcbus_bus::Peer;
 use qcbus_messages::Job;
 
 use crate::keeper::{Animal, GOOD, Manners, Mood, answer};
 
-/// The word that kills it.
+/// Word that crashes it.
 pub const POISON: &str = "poison";
 
 pub(super) const ANIMAL: Animal = Animal {

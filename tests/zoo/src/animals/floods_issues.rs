@@ -1,4 +1,4 @@
-//! Finds far more in a file than there can be, and has much to say about each.
+//! Reports far more issues than a file can have, each with a long description.
 
 use qcbus_bus::Peer;
 use qcbus_formats::xqar::{Issue, Level};
@@ -15,11 +15,11 @@ pub(super) const ANIMAL: Animal = Animal {
     ..GOOD
 };
 
-/// Batches for each job.
+/// Batches per job.
 const BATCHES: usize = 300;
-/// Issues in a batch.
+/// Issues per batch.
 const BATCH: usize = 64;
-/// Bytes of each description.
+/// Bytes per description.
 const TEXT: usize = 2000;
 
 fn job(peer: &mut Peer, job: &Job) -> Mood {

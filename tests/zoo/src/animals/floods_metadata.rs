@@ -1,4 +1,5 @@
-//! Has nothing to report and no end of facts about its run, each message just small enough to be taken.
+//! Reports no issues but far too much metadata of its run. Each message is just small enough to be
+//! accepted.
 
 use qcbus_bus::Peer;
 use qcbus_formats::pool::Ending;
@@ -16,9 +17,9 @@ pub(super) const ANIMAL: Animal = Animal {
     ..GOOD
 };
 
-/// Messages for each job.
+/// Messages per job.
 const MESSAGES: u32 = 30;
-/// Bytes of the facts in each.
+/// Bytes of metadata per message.
 const TEXT: usize = 3 << 20;
 
 fn job(peer: &mut Peer, job: &Job) -> Mood {
@@ -26,7 +27,8 @@ fn job(peer: &mut Peer, job: &Job) -> Mood {
     Mood::GoOn
 }
 
-/// Ends the checkers again and again, with facts of so many bytes each time, and the job.
+/// Reports the end of the checkers repeatedly, each time with `bytes` of metadata. Then it ends the
+/// job.
 pub(super) fn say(peer: &mut Peer, job: &Job, bytes: usize) {
     let fact = Metadata {
         key: "zoo.fact".to_owned(),

@@ -1,4 +1,4 @@
-//! Says of its run what no message may hold.
+//! Sends more metadata of its run than a message may contain.
 
 use qcbus_bus::Peer;
 use qcbus_messages::Job;
@@ -15,7 +15,7 @@ pub(super) const ANIMAL: Animal = Animal {
     ..GOOD
 };
 
-/// Bytes of each message.
+/// Bytes per message.
 const TEXT: usize = 60_000_000;
 
 fn job(peer: &mut Peer, job: &Job) -> Mood {

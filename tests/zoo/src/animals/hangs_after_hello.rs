@@ -1,4 +1,4 @@
-//! Joins and never says what it checks.
+//! Joins the bus and never sends its catalogue.
 
 use qcbus_bus::Peer;
 

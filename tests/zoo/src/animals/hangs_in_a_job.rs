@@ -1,4 +1,4 @@
-//! Takes a job and is never heard of again, as a checker in an endless loop.
+//! Accepts a job and never answers again, like a checker in an endless loop.
 
 use qcbus_bus::Peer;
 use qcbus_messages::Job;

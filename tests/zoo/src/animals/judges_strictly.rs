@@ -1,5 +1,5 @@
-//! Finds an error in every file one of whose parts has the word [`MARK`] in it: the file itself,
-//! what it includes, its map, its catalogs.
+//! Reports an error in every file with the word [`MARK`] in one of its parts: the file itself, its
+//! includes, its map, its catalogs.
 
 use qcbus_bus::Peer;
 use qcbus_formats::xqar::{Issue, Level};
@@ -7,7 +7,7 @@ use qcbus_messages::{FromPeer, Job};
 
 use crate::keeper::{Animal, GOOD, Manners, Mood, answer};
 
-/// The word that it rejects.
+/// Word that it rejects.
 pub const MARK: &str = "forbidden";
 
 pub(super) const ANIMAL: Animal = Animal {

@@ -1,4 +1,5 @@
-//! Speaks of jobs that it was never given, much and often, and of checkers that it does not have.
+//! Sends many messages about jobs that it was never given, and about checkers that it does not
+//! have.
 
 use qcbus_bus::Peer;
 use qcbus_messages::{FromPeer, Job, JobId};
@@ -14,7 +15,7 @@ pub(super) const ANIMAL: Animal = Animal {
     ..GOOD
 };
 
-/// Lies for each job.
+/// False job ids per job.
 const LIES: u64 = 100;
 
 fn job(peer: &mut Peer, job: &Job) -> Mood {

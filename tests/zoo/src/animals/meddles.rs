@@ -1,5 +1,6 @@
-//! Does with every job what is no business of a bundle: writes a file, connects and sends somewhere, signals another
-//! process, looks into its memory, starts a program in a session of its own. Where to, it is told by its environment.
+//! Does with every job things that a bundle must not do: writes and reads a file, connects, sends a
+//! datagram, signals another process, opens its memory, starts a program in a session of its own.
+//! Its environment names the targets.
 
 use std::net::{TcpStream, UdpSocket};
 use std::path::PathBuf;
@@ -21,7 +22,7 @@ pub(super) const ANIMAL: Animal = Animal {
     ..GOOD
 };
 
-/// Something that must not succeed; what it gives when it does.
+/// Attempt that must fail. Returns a value if it succeeds.
 type Try = fn() -> Option<()>;
 
 fn job(peer: &mut Peer, job: &Job) -> Mood {
@@ -70,7 +71,8 @@ fn send() -> Option<()> {
         .map(drop)
 }
 
-/// Through a shell that ends at once, so that what stays has neither its group nor its session nor its parent.
+/// Starts a program through a shell that ends at once. The program that stays has another process
+/// group, session and parent.
 fn start() -> Option<()> {
     let sleep = format!("setsid sleep {} &", told("ZOO_SLEEP")?);
     let mut shell = Command::new("sh");

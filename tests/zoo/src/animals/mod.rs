@@ -1,4 +1,4 @@
-//! The animals, one per file.
+//! The misbehaving bundles and reporters ("animals"), one per file.
 
 mod allocates_forever;
 mod dies_on_every_job;
@@ -29,7 +29,7 @@ pub use speaks_another_protocol::PROTOCOL as ANOTHER_PROTOCOL;
 
 use crate::keeper::Animal;
 
-/// All of them but the polite one, which is a real bundle.
+/// All animals except the polite one, which is a real bundle.
 pub static ANIMALS: &[Animal] = &[
     allocates_forever::ANIMAL,
     dies_on_every_job::ANIMAL,
@@ -55,7 +55,7 @@ pub static ANIMALS: &[Animal] = &[
     writes_to_the_image::ANIMAL,
 ];
 
-/// The animal of this name.
+/// Returns the animal of this name.
 pub fn named(name: &str) -> Option<&'static Animal> {
     ANIMALS.iter().find(|animal| animal.name == name)
 }

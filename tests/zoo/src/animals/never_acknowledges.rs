@@ -1,4 +1,4 @@
-//! Takes jobs, gives signs of life, and never says that a job is done.
+//! Accepts jobs and sends heartbeats, but never reports that a job is done.
 
 use qcbus_bus::Peer;
 use qcbus_messages::Job;

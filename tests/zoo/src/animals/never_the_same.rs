@@ -1,4 +1,4 @@
-//! Says again and again that it is another, so that everything would have to be judged again.
+//! Reports a changed catalogue again and again, so that everything would have to be judged again.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -17,7 +17,7 @@ pub(super) const ANIMAL: Animal = Animal {
     ..GOOD
 };
 
-/// How often it changes at once.
+/// Number of changes sent at once.
 const CHANGES: u32 = 500;
 
 fn welcomed(peer: &mut Peer) -> Mood {

@@ -1,4 +1,4 @@
-//! Says hello without having said to the broker's socket which process it is.
+//! Sends its hello without having proved its process identity to the broker's socket.
 
 use qcbus_bus::Claims;
 

@@ -1,4 +1,5 @@
-//! A reporter that takes results, gives signs of life, and never says that one is written.
+//! A reporter that accepts results and sends heartbeats, but never reports that a result is
+//! written.
 
 use qcbus_bus::Peer;
 use qcbus_messages::{JobId, Role};

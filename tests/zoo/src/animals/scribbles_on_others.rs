@@ -1,5 +1,5 @@
-//! Opens whatever lies in shared memory for writing and scribbles on it: images that others read, and their words.
-//! It tries the ways round a refusal, too: other rights, another name for an open file, cutting it off.
+//! Opens everything in shared memory for writing and overwrites it: images and messages that others
+//! read. It also tries ways around a refusal: other permissions, and another name for an open file.
 
 use std::fs::OpenOptions;
 use std::os::unix::fs::{FileExt as _, PermissionsExt as _};
@@ -20,7 +20,7 @@ pub(super) const ANIMAL: Animal = Animal {
     ..GOOD
 };
 
-/// What it writes over whatever is there.
+/// Bytes that overwrite the existing content.
 const SCRIBBLE: [u8; 4096] = [0xA5; 4096];
 
 fn job(peer: &mut Peer, job: &Job) -> Mood {
@@ -36,8 +36,9 @@ fn job(peer: &mut Peer, job: &Job) -> Mood {
     Mood::GoOn
 }
 
-/// Data segments that it has mapped to read them: what its broker and others of its instance publish. (It leaves
-/// alone what lies there of other instances: other tests run at the same time.)
+/// Returns the data segments that it has mapped for reading. Its broker and other processes of its
+/// instance publish them. It leaves segments of other instances alone, because other tests run at
+/// the same time.
 fn segments(directory: &Path) -> Vec<PathBuf> {
     let maps = std::fs::read_to_string("/proc/self/maps").unwrap_or_default();
     let mapped = maps
@@ -56,7 +57,7 @@ fn is_data(path: &Path) -> bool {
     path.extension().is_some_and(|it| it == "data")
 }
 
-/// The same by the descriptors under which it has them open already.
+/// Returns the segments that it has already opened, as paths of their descriptors.
 fn segments_at_hand() -> Vec<PathBuf> {
     let open = std::fs::read_dir("/proc/self/fd")
         .into_iter()
@@ -71,7 +72,7 @@ fn scribble(segment: &Path) -> bool {
     let Ok(file) = OpenOptions::new().read(true).write(true).open(segment) else {
         return false;
     };
-    // Large segments are mostly holes, which are not to be filled.
+    // Large segments are mostly holes, which must not be filled.
     let len = file.metadata().map_or(0, |it| it.len()).min(8 << 20);
     for at in (0..len).step_by(SCRIBBLE.len()) {
         let mut there = SCRIBBLE;

@@ -1,4 +1,4 @@
-//! Answers a job with bytes that are no message.
+//! Answers a job with bytes that are not a message.
 
 use qcbus_bus::Peer;
 use qcbus_messages::Job;

@@ -1,4 +1,4 @@
-//! Takes its time for every job, `--millis` of it; otherwise polite.
+//! Takes `--millis` of time for every job and otherwise behaves correctly.
 
 use crate::keeper::{Animal, GOOD};
 

@@ -1,11 +1,11 @@
-//! Was built for another version of the messages, and says so.
+//! Claims to be built for another version of the messages.
 
 use qcbus_bus::Claims;
 use qcbus_messages::PROTOCOL_VERSION;
 
 use crate::keeper::{Animal, GOOD, HONEST};
 
-/// The version that it claims to speak.
+/// Protocol version that it claims.
 pub const PROTOCOL: u32 = PROTOCOL_VERSION + 41;
 
 pub(super) const ANIMAL: Animal = Animal {

@@ -1,4 +1,4 @@
-//! Says what a terminal or a script would take for lines of the broker's own.
+//! Sends texts that a terminal or a script would take for lines of the broker itself.
 
 use qcbus_bus::Peer;
 use qcbus_formats::location::OtherPlace;
@@ -17,7 +17,8 @@ pub(super) const ANIMAL: Animal = Animal {
     ..GOOD
 };
 
-/// A line break and a lie, an escape sequence that removes a line, a change of direction.
+/// Text with a line break and a false verdict, an escape sequence that removes a line, and a change
+/// of direction.
 pub const LINES: &str = "so\nimportant.xodr: accepted\n\u{1b}[2K\u{202e}it is";
 
 fn job(peer: &mut Peer, job: &Job) -> Mood {

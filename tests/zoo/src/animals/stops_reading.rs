@@ -1,4 +1,4 @@
-//! Joins, says what it checks, and then reads nothing any more.
+//! Joins the bus, sends its catalogue, and then stops reading.
 
 use qcbus_bus::Peer;
 use qcbus_messages::Job;
@@ -14,7 +14,7 @@ pub(super) const ANIMAL: Animal = Animal {
     ..GOOD
 };
 
-/// It reads up to its first job, so that the broker has given it all that it takes at once.
+/// Stops reading at the first job. By then the broker has sent as many jobs as it accepts at once.
 fn job(peer: &mut Peer, job: &Job) -> Mood {
     checker_done(peer, job.job, 0);
     Mood::Freeze

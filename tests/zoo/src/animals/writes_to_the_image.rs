@@ -1,5 +1,5 @@
-//! Writes into the document image that it was given to read. The image is mapped for reading only,
-//! so this ends with a segmentation fault in this process, and the image stays what it is.
+//! Writes into the document image that it was given to read. The image is mapped read-only, so this
+//! ends with a segmentation fault in this process. The image does not change.
 
 use qcbus_bus::Peer;
 use qcbus_messages::Job;
@@ -20,7 +20,7 @@ fn job(peer: &mut Peer, job: &Job) -> Mood {
     if let Some(held) = root.and_then(|root| peer.document(root.doc)) {
         overwrite(&held);
     }
-    // Only reached when the write went through: then the test fails, as it should.
+    // This line is reached only if the write succeeded. The test must then fail.
     answer(peer, job.job);
     Mood::GoOn
 }
@@ -31,7 +31,7 @@ fn job(peer: &mut Peer, job: &Job) -> Mood {
 )]
 fn overwrite(image: &[u8]) {
     let first = image.as_ptr().cast_mut();
-    // SAFETY: none is claimed. The memory is mapped without the right to write, and the process is
-    // meant to die here; a volatile write is not optimised away.
+    // SAFETY: none is claimed. The memory is mapped without write permission, and the process must
+    // die here. A volatile write is not optimised away.
     unsafe { first.write_volatile(0xFF) };
 }

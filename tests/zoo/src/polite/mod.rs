@@ -1,5 +1,5 @@
-//! A bundle with good manners: two rules, written as real ones are. Other tests use it as "one
-//! more bundle".
+//! A bundle that behaves correctly, with two rules written like real ones. Other tests use it as
+//! "one more bundle".
 
 mod no_blank_values;
 mod root_has_children;
@@ -12,7 +12,7 @@ use qcbus_sdk::{AnyRule, Bundle, Mode, Version, basic};
 
 use crate::Args;
 
-/// What it is called.
+/// Name of the bundle.
 pub const NAME: &str = "polite";
 
 static RULES: &[&dyn AnyRule] = &[&root_has_children::RULE, &no_blank_values::RULE];
@@ -32,7 +32,7 @@ pub static BUNDLE: Bundle = Bundle {
     templates: &[],
 };
 
-/// Runs it under the name and version asked for.
+/// Runs the bundle under the requested name and version.
 pub fn run(args: Args) -> ExitCode {
     let bundle: &'static Bundle = Box::leak(Box::new(Bundle {
         name: args.name.clone().map_or(NAME, leak),
@@ -48,7 +48,7 @@ pub fn run(args: Args) -> ExitCode {
     }
 }
 
-/// A bundle's texts live as long as its process.
+/// Leaks a text, because the texts of a bundle live as long as its process.
 fn leak(text: String) -> &'static str {
     Box::leak(text.into_boxed_str())
 }

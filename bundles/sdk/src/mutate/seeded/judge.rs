@@ -1,4 +1,4 @@
-//! Whether what is said of an edited file is what should be said.
+//! Evaluation of the findings on an edited file.
 
 use std::path::PathBuf;
 
@@ -7,31 +7,31 @@ use crate::mutate::{Said, Spots};
 
 use super::table::Entry;
 
-/// What became of an entry.
+/// Result of an entry.
 #[derive(Debug)]
 pub struct Trial<'e> {
     pub entry: &'e Entry,
     pub found: Found,
-    /// Where it should be.
+    /// Rows where the fault must be found.
     pub spots: Spots,
-    /// What was not said before.
+    /// Findings that did not exist before the edit.
     pub new: Vec<Said>,
-    /// Whether one of these is an error where it should be.
+    /// Whether one of them is an error at the expected rows.
     pub has_error: bool,
-    /// How many of these are errors that are nowhere near.
+    /// Number of errors among them without a location at the expected rows.
     pub further: usize,
 }
 
-/// Whether a fault is found. A harmless variant is tried likewise, and nothing is to be found.
+/// Whether and where a fault is found. A harmless variant is tried likewise, but must not be found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Found {
-    /// The main location of an issue is there.
+    /// The main location of an issue is at the expected rows.
     Here,
-    /// A further location is.
+    /// A further location of an issue is at the expected rows.
     Beside,
-    /// It is, at a lower level than is due.
+    /// An issue is at the expected rows, but its level is too low.
     Weakly,
-    /// Only at other rows.
+    /// An issue is only at other rows.
     Elsewhere,
     Not,
 }
@@ -41,25 +41,25 @@ impl Found {
         matches!(self, Found::Here | Found::Beside)
     }
 
-    /// Whether anything is said at the place.
+    /// Checks whether an issue is at the expected rows.
     pub fn is_there(self) -> bool {
         self.is_enough() || self == Found::Weakly
     }
 }
 
 impl Trial<'_> {
-    /// New issues of a level.
+    /// Returns the new issues of a level.
     pub fn new_at(&self, level: Level) -> impl Iterator<Item = &Said> {
         self.new.iter().filter(move |said| said.level == level)
     }
 
-    /// Whether a harmless variant is rejected.
+    /// Checks whether a harmless variant is rejected.
     pub fn is_alarm(&self) -> bool {
         self.new_at(Level::Error).next().is_some()
     }
 }
 
-/// Judges what an edit led to.
+/// Evaluates the new findings after an edit.
 pub fn judge(entry: &Entry, spots: Spots, new: Vec<Said>) -> Trial<'_> {
     let least = entry.level.unwrap_or(Level::Error);
     let is_at = |(file, row): &(PathBuf, u64)| spots.get(file).is_some_and(|rows| rows.has(*row));

@@ -1,9 +1,11 @@
-//! Real files, broken as authors and tools break them, and changed within what is allowed: the faults are found
-//! where they are, and nothing is said against the rest. `bundles/xosc/tests/seeded/README.md` describes the lists.
+//! Study with real files. Some are broken as authors and tools break them; others are changed in
+//! allowed ways. The faults must be found at their places, and the rest must have no findings.
+//! `bundles/xosc/tests/seeded/README.md` describes the lists.
 //!
-//! Some of the files are among the shared cases, the others lie below a directory that a variable of the
-//! environment names. What is not at hand is skipped. `QCBUS_BLESS=1` writes the study's page when all are;
-//! `QCBUS_SEEDED=ID` tries the entries whose id contains it, and says what each leads to.
+//! Some of the files are among the shared cases. The others are below a directory named by an
+//! environment variable. Missing files are skipped. `QCBUS_BLESS=1` writes the study's page if all
+//! files exist. `QCBUS_SEEDED=ID` tries the entries with this text in their id, and prints their
+//! results.
 
 #![expect(
     clippy::indexing_slicing,
@@ -27,35 +29,36 @@ use trials::Trials;
 
 use crate::Bundle;
 
-/// What is tried.
+/// Input and requirements of a study.
 pub struct Study<'s> {
-    /// Who must find the faults.
+    /// Bundle that must find the faults.
     pub bundle: &'static Bundle,
-    /// What is broken: `scenarios`, `maps`.
+    /// Kind of files that are broken: `scenarios`, `maps`.
     pub what: &'static str,
     /// The attribute that `#` means in selectors.
     pub key: &'static str,
-    /// The lists `faults.txt` and `harmless.txt`.
+    /// Text of the list `faults.txt`.
     pub faults: &'s str,
-    /// Likewise.
+    /// Text of the list `harmless.txt`.
     pub harmless: &'s str,
-    /// The test and the directory of the lists, for the page.
+    /// Path of the test and of its lists, for the page.
     pub place: &'static str,
     /// Directory of the shared cases.
     pub shared: &'s Path,
-    /// The variable that names the directory of the other files.
+    /// Environment variable that names the directory of the other files.
     pub fetched: &'static str,
-    /// Where the tables are written.
+    /// Path of the page with the tables.
     pub page: &'s Path,
-    /// How many of those that are tried must be found at the due level, in hundredths.
+    /// Minimum percentage of the tried faults that must be found at the required level.
     pub least: usize,
 }
 
 impl Study<'_> {
-    /// Tries all.
+    /// Tries all entries.
     ///
     /// # Panics
-    /// When too few faults are found, a harmless variant is rejected, or an entry cannot be tried.
+    /// Panics if too few faults are found, a harmless variant is rejected, or an entry cannot be
+    /// tried.
     pub fn run(&self) {
         let faults = table::read(self.faults, self.key).unwrap();
         let harmless = table::read(self.harmless, self.key).unwrap();
@@ -100,15 +103,15 @@ impl Study<'_> {
     }
 }
 
-/// How many entries of which producer were tried, and how many of these are counted; what is not at hand
-/// is not passed over in silence.
+/// Returns the number of tried, counted and skipped entries of each producer. Missing files are
+/// reported as skipped.
 fn counts(
     sort: &str,
     trials: &Trials<'_>,
     what: &str,
     counted: impl Fn(&Trial<'_>) -> bool,
 ) -> String {
-    // Tried, counted, skipped.
+    // The numbers of tried, counted and skipped entries.
     let mut producers: BTreeMap<&str, [usize; 3]> = BTreeMap::new();
     for trial in &trials.done {
         let counts = producers.entry(&trial.entry.original.producer).or_default();
@@ -124,7 +127,7 @@ fn counts(
     producers.into_iter().map(line).collect()
 }
 
-/// Everything about every entry.
+/// Prints all details of every entry.
 fn told(faults: &Trials<'_>, harmless: &Trials<'_>) {
     for trial in faults.done.iter().chain(&harmless.done) {
         let (entry, found) = (trial.entry, trial.found);
@@ -142,7 +145,7 @@ fn told(faults: &Trials<'_>, harmless: &Trials<'_>) {
     }
 }
 
-/// Not what the test prints: that is only shown when it fails.
+/// Writes to stderr directly, because the captured output of a test is only shown if it fails.
 fn tell(text: &str) {
     std::io::stderr().write_all(text.as_bytes()).unwrap();
 }

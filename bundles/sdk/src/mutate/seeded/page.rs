@@ -1,4 +1,4 @@
-//! What came of the trials, as tables.
+//! Results of the trials as tables.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -11,10 +11,10 @@ use super::judge::{Found, Trial};
 use super::table::Entry;
 use super::trials::Trials;
 
-/// How much of what is said instead is listed.
+/// Maximum number of listed findings instead of the expected one.
 const MAX_INSTEAD: usize = 4;
 
-/// How many faults of one sort were tried, and what became of them.
+/// Number of tried faults in a group, by result.
 #[derive(Default)]
 struct Row {
     tried: usize,
@@ -24,7 +24,7 @@ struct Row {
     elsewhere: usize,
     not: usize,
     skipped: usize,
-    /// Errors nowhere near.
+    /// Errors without a location at the expected rows.
     further: usize,
 }
 
@@ -43,13 +43,13 @@ impl Row {
     }
 }
 
-/// Number of faults that are found, and of all that were tried.
+/// Returns the number of found faults and the number of tried ones.
 pub fn share(faults: &Trials<'_>) -> (usize, usize) {
     let found = faults.done.iter().filter(|trial| trial.found.is_enough());
     (found.count(), faults.done.len())
 }
 
-/// The page.
+/// Returns the text of the page.
 pub fn page(study: &Study, faults: &Trials<'_>, harmless: &Trials<'_>) -> String {
     let (found, tried) = share(faults);
     let Study { what, place, .. } = study;
@@ -82,7 +82,7 @@ pub fn page(study: &Study, faults: &Trials<'_>, harmless: &Trials<'_>) -> String
     page
 }
 
-/// The same counts by what is said at the place, whatever is due.
+/// Returns the counts of findings at the expected rows, whatever level is required.
 fn at_the_place(faults: &Trials<'_>) -> String {
     let tried = faults.done.len();
     let is_due = |trial: &&Trial<'_>| trial.entry.level == Some(Level::Error);
@@ -156,7 +156,7 @@ fn not_found(page: &mut String, faults: &Trials<'_>) {
     }
 }
 
-/// What is said of a fault that is not found, if anything.
+/// Returns the other findings on a fault that is not found, if any.
 fn instead(trial: &Trial<'_>) -> String {
     let said = |said: &Said| {
         let at = said.rows.first();

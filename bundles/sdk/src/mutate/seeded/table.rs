@@ -1,4 +1,5 @@
-//! The lists of faults and of harmless variants; `bundles/xosc/tests/seeded/README.md` describes how they are written.
+//! Parser of the lists of faults and of harmless variants. `bundles/xosc/tests/seeded/README.md`
+//! describes their format.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -6,16 +7,16 @@ use std::path::PathBuf;
 use crate::Level;
 use crate::mutate::{Edit, Target, beside};
 
-/// A real file and how it is changed.
+/// A real file and its edits.
 #[derive(Debug)]
 pub struct Entry {
     pub id: String,
     pub category: String,
     pub original: Original,
-    /// The least level of what must be found; none for a harmless variant.
+    /// Minimum level of the expected finding; `None` for a harmless variant.
     pub level: Option<Level>,
     pub edits: Vec<Edit>,
-    /// Where it must be found; where the edits are, when there is none.
+    /// Targets where the fault must be found. If empty, the edited rows apply.
     pub at: Vec<Target>,
     pub why: String,
 }
@@ -24,12 +25,12 @@ pub struct Entry {
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Original {
     pub producer: String,
-    /// Below the producer's directory.
+    /// Path relative to the producer's directory.
     pub path: PathBuf,
 }
 
-/// Reads a list, whose selectors mean the attribute `key` by `#`; the text of an error begins with the
-/// line's number.
+/// Parses a list. `#` in its selectors means the attribute `key`. The text of an error begins with
+/// the line number.
 pub fn read(text: &str, key: &str) -> Result<Vec<Entry>, String> {
     let (mut aliases, mut all) = (BTreeMap::new(), Vec::<Entry>::new());
     for (number, line) in text.lines().enumerate() {

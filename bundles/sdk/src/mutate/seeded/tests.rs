@@ -1,4 +1,4 @@
-//! The lists and the verdicts, on documents small enough to be read.
+//! Tests of the lists and the verdicts, on small documents.
 
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Tries all entries whose files are at hand, on all processors.
+//! Tries all entries with existing files, on all processors.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -13,18 +13,18 @@ use super::table::{Entry, Original};
 /// Producers among the shared cases.
 const SHARED: [&str; 3] = ["esmini", "scenario_runner", "qc-framework"];
 
-/// What came of the entries.
+/// Results of the entries.
 #[derive(Default)]
 pub struct Trials<'e> {
     pub done: Vec<Trial<'e>>,
-    /// Their files are not at hand.
+    /// Entries with missing files.
     pub skipped: Vec<&'e Entry>,
-    /// What could not be tried.
+    /// Errors of entries that could not be tried.
     pub errors: Vec<String>,
 }
 
 impl Study<'_> {
-    /// Tries entries.
+    /// Tries the given entries.
     pub(super) fn try_all<'e>(&self, entries: &[&'e Entry]) -> Trials<'e> {
         let plan = Plan::by_default(self.bundle);
         let (there, skipped) = entries
@@ -32,15 +32,15 @@ impl Study<'_> {
             .partition::<Vec<&Entry>, _>(|entry| self.directory(&entry.original).is_some());
         let originals: BTreeSet<&Original> = there.iter().map(|entry| &entry.original).collect();
         let originals: Vec<&Original> = originals.into_iter().collect();
-        let before = in_parallel(&originals, |cli: &mut Cli, original| {
-            self.said(cli, &plan, original, &Changed::new())
+        let before = in_parallel(&originals, |overlays: &mut Overlays, original| {
+            self.said(overlays, &plan, original, &Changed::new())
         });
         let before: BTreeMap<&Original, _> = originals.iter().copied().zip(before).collect();
-        let tried = in_parallel(&there, |cli: &mut Cli, entry| {
+        let tried = in_parallel(&there, |overlays: &mut Overlays, entry| {
             let before = before[&entry.original].as_ref();
             before
                 .map_err(String::clone)
-                .and_then(|before| self.trial(cli, &plan, entry, before))
+                .and_then(|before| self.trial(overlays, &plan, entry, before))
                 .map_err(|error| format!("{}: {error}", entry.id))
         });
         let mut trials = Trials {
@@ -56,7 +56,7 @@ impl Study<'_> {
         trials
     }
 
-    /// The directory of the producer, when the file is at hand.
+    /// Returns the directory of the producer if the file exists.
     fn directory(&self, original: &Original) -> Option<PathBuf> {
         let above = if SHARED.contains(&original.producer.as_str()) {
             self.shared.to_owned()
@@ -69,41 +69,41 @@ impl Study<'_> {
 
     fn trial<'e>(
         &self,
-        cli: &mut Cli,
+        overlays: &mut Overlays,
         plan: &Plan,
         entry: &'e Entry,
         before: &[Said],
     ) -> Result<Trial<'e>, String> {
         let source = self.directory(&entry.original).ok_or("not at hand")?;
         let (changed, spots) = apply(&entry.edits, &entry.at, &source)?;
-        let after = self.said(cli, plan, &entry.original, &changed)?;
+        let after = self.said(overlays, plan, &entry.original, &changed)?;
         Ok(judge(entry, spots, new_ones(before, after)))
     }
 
     fn said(
         &self,
-        cli: &mut Cli,
+        overlays: &mut Overlays,
         plan: &Plan,
         original: &Original,
         changed: &Changed,
     ) -> Result<Vec<Said>, String> {
         let producer = &original.producer;
-        if !cli.0.contains_key(producer) {
+        if !overlays.0.contains_key(producer) {
             let source = self.directory(original).ok_or("not at hand")?;
             let overlay = Overlay::of(&source).map_err(|error| error.to_string())?;
-            cli.0.insert(producer.clone(), overlay);
+            overlays.0.insert(producer.clone(), overlay);
         }
-        let all = cli.0[producer].with(changed, |root| said(plan, root, &original.path));
+        let all = overlays.0[producer].with(changed, |root| said(plan, root, &original.path));
         all.map_err(|error| error.to_string())?
     }
 }
 
-/// What one thread works with.
+/// State of one thread: its overlays by producer.
 #[derive(Default)]
-struct Cli(BTreeMap<String, Overlay>);
+struct Overlays(BTreeMap<String, Overlay>);
 
 impl<'e> Trials<'e> {
-    /// Faults, harmless variants and what could not be tried.
+    /// Splits the results into faults, harmless variants and errors.
     pub fn split(self) -> (Trials<'e>, Trials<'e>, Vec<String>) {
         let (mut faults, mut harmless) = (Trials::default(), Trials::default());
         let is_fault = |entry: &Entry| entry.level.is_some();

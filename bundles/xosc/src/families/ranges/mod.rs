@@ -1,7 +1,7 @@
-//! Numbers and the ranges that the standard gives them: tables by type, and one walk over each.
+//! Numbers and their ranges in the standard: tables by type, and one walk over each.
 //!
-//! The schema says `Double` and no more; the ranges are in the standard's class descriptions. A row
-//! is left out where they are plainly wrong (a clothoid whose curvature falls, a road below sea level).
+//! The schema only says `Double`. The ranges are in the standard's class descriptions. Ranges that
+//! are plainly wrong are left out (a clothoid with falling curvature, a road below sea level).
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -13,52 +13,54 @@ use crate::model::About;
 
 pub(crate) mod tables;
 
-/// The rule that ranges hold for what parameters and expressions lead to: another name for them all.
+/// UID of the rule that ranges apply to the results of parameters and expressions. It is another
+/// name for all of them.
 pub(crate) const RESOLVED: &str = "qcbus.dev:xosc:1.0.0:parameters.range_after_resolution";
 
 /// One end of a range.
 #[derive(Clone, Copy)]
 pub(crate) enum Bound {
-    /// Up to and including this.
+    /// The end itself is in range.
     At(f64),
-    /// Up to this, but not this itself.
+    /// The end itself is out of range.
     Beyond(f64),
-    /// There is none.
+    /// There is no limit.
     Open,
 }
 
 use Bound::{At, Beyond, Open};
 
-/// How bad it is that a value is out of range.
+/// Returns the level of a value that is out of range.
 pub(crate) type Judge = fn(Element<'_, '_>, f64) -> Level;
 
 /// An attribute of a type and its range.
 #[derive(Clone, Copy)]
 pub(crate) struct Row {
-    /// Names of the elements of the type; empty when there is one, named like the type.
+    /// Names of the elements of the type. Empty if the only element is named like the type.
     elements: &'static [&'static str],
     class: &'static str,
     attribute: &'static str,
     low: Bound,
     high: Bound,
     unit: &'static str,
-    /// Another rule says what is not finite.
+    /// Whether another rule reports values that are not finite.
     finite: bool,
-    /// The attribute is a count.
+    /// Whether the attribute is a count.
     counts: bool,
     judge: Judge,
-    /// Why the value does no harm, where it does none.
+    /// Reason why the value is harmless, for the cases in which it is.
     excuse: &'static str,
     uid: &'static str,
 }
 
 impl Row {
-    /// The elements of the type have other names than the type.
+    /// Sets the element names, if they differ from the type.
     pub(crate) const fn called(self, elements: &'static [&'static str]) -> Row {
         Row { elements, ..self }
     }
 
-    /// It depends on the value how bad it is; the text says why it is no worse where it is a warning.
+    /// Sets a judge that determines the level by the value. The text says why the level is only a
+    /// warning.
     pub(crate) const fn judged(self, judge: Judge, excuse: &'static str) -> Row {
         Row {
             judge,
@@ -67,7 +69,7 @@ impl Row {
         }
     }
 
-    /// What is not finite is said by another rule.
+    /// Leaves values that are not finite to another rule.
     pub(crate) const fn if_finite(self) -> Row {
         Row {
             finite: true,
@@ -75,7 +77,7 @@ impl Row {
         }
     }
 
-    /// The value is a count.
+    /// Marks the value as a count.
     pub(crate) const fn count(self) -> Row {
         Row {
             counts: true,
@@ -83,7 +85,7 @@ impl Row {
         }
     }
 
-    /// The upper end itself is out of range.
+    /// Excludes the upper end from the range.
     pub(crate) const fn half_open(self) -> Row {
         let high = match self.high {
             At(end) => Beyond(end),
@@ -92,7 +94,7 @@ impl Row {
         Row { high, ..self }
     }
 
-    /// Both ends themselves are out of range.
+    /// Excludes both ends from the range.
     pub(crate) const fn open(self) -> Row {
         let low = match self.low {
             At(end) => Beyond(end),
@@ -115,7 +117,8 @@ impl Row {
         above && below
     }
 
-    /// The value of the attribute. Of a count only what is one: the schema reports the rest.
+    /// Returns the value of the attribute. For a count only valid counts are returned, because the
+    /// schema reports the others.
     fn value(&self, element: Element<'_, '_>) -> Option<f64> {
         if self.counts {
             let count = element.integer(self.attribute)?;
@@ -136,7 +139,7 @@ impl Row {
     }
 }
 
-/// A row without a lower or an upper end, to begin with.
+/// Creates a row without a lower or an upper end.
 const fn row(
     class: &'static str,
     attribute: &'static str,
@@ -158,7 +161,7 @@ const fn row(
     }
 }
 
-/// `[0..inf[`
+/// Creates a row with the range `[0..inf[`.
 pub(crate) const fn from_zero(
     class: &'static str,
     attribute: &'static str,
@@ -168,7 +171,7 @@ pub(crate) const fn from_zero(
     at_least(0.0, class, attribute, unit, uid)
 }
 
-/// `]0..inf[`
+/// Creates a row with the range `]0..inf[`.
 pub(crate) const fn above_zero(
     class: &'static str,
     attribute: &'static str,
@@ -181,7 +184,7 @@ pub(crate) const fn above_zero(
     }
 }
 
-/// `[low..inf[`
+/// Creates a row with the range `[low..inf[`.
 pub(crate) const fn at_least(
     low: f64,
     class: &'static str,
@@ -195,7 +198,7 @@ pub(crate) const fn at_least(
     }
 }
 
-/// `]-inf..high]`
+/// Creates a row with the range `]-inf..high]`.
 pub(crate) const fn at_most(
     high: f64,
     class: &'static str,
@@ -209,7 +212,7 @@ pub(crate) const fn at_most(
     }
 }
 
-/// `[low..high]`
+/// Creates a row with the range `[low..high]`.
 pub(crate) const fn between(
     low: f64,
     high: f64,
@@ -225,7 +228,7 @@ pub(crate) const fn between(
     }
 }
 
-/// `]-inf..inf[`
+/// Creates a row with the range `]-inf..inf[`.
 pub(crate) const fn finite(
     class: &'static str,
     attribute: &'static str,
@@ -239,7 +242,8 @@ pub(crate) const fn finite(
     }
 }
 
-/// What a rule about a table lists: its own UIDs, then those of the rows. `ALL` is how many they are.
+/// Returns the UIDs of a rule about a table: its own UIDs, then those of the rows. `ALL` is their
+/// number.
 pub(crate) const fn uids<const ALL: usize>(
     own: &[&'static str],
     rows: &[Row],
@@ -257,17 +261,18 @@ pub(crate) const fn uids<const ALL: usize>(
     all
 }
 
-/// Out of range is an error.
+/// Returns an error for every value that is out of range.
 pub(crate) fn error(_: Element<'_, '_>, _: f64) -> Level {
     Level::Error
 }
 
-/// Simulators cope, and files in use do it.
+/// Returns a warning, because simulators accept such values and existing files contain them.
 pub(crate) fn warning(_: Element<'_, '_>, _: f64) -> Level {
     Level::Warning
 }
 
-/// Zero is out of range and does no harm; what is below it does.
+/// Returns a warning for zero, which is out of range but harmless. Returns an error for values
+/// below zero.
 pub(crate) fn zero_is_harmless(_: Element<'_, '_>, value: f64) -> Level {
     if value == 0.0 {
         Level::Warning
@@ -276,9 +281,10 @@ pub(crate) fn zero_is_harmless(_: Element<'_, '_>, value: f64) -> Level {
     }
 }
 
-/// A direction a turn away is the same direction; what is farther away is another unit.
+/// Returns a warning up to a full turn, because the direction is the same. A larger value is
+/// probably in another unit and is an error.
 pub(crate) fn a_turn_is_harmless(_: Element<'_, '_>, value: f64) -> Level {
-    // A little more than a turn: 6.2832 is meant to be one.
+    // The tolerance accepts 6.2832, which is meant as a full turn.
     if value.abs() <= TAU + 1e-3 {
         Level::Warning
     } else {
@@ -286,14 +292,14 @@ pub(crate) fn a_turn_is_harmless(_: Element<'_, '_>, value: f64) -> Level {
     }
 }
 
-/// Says every value of a table that is out of its range, each under the UID of its row.
+/// Reports every value of a table that is out of its range, each under the UID of its row.
 pub(crate) fn report(scenario: &Scenario<'_>, rows: &[Row], found: &mut Sink<'_>) {
     for (row, element, value) in out_of_range(scenario, rows) {
         say(row, element, value, found).uid(row.uid);
     }
 }
 
-/// Says every value of a table that is out of its range, under the first UID of the rule.
+/// Reports every value of a table that is out of its range, under the first UID of the rule.
 pub(crate) fn report_as_own(scenario: &Scenario<'_>, rows: &[Row], found: &mut Sink<'_>) {
     for (row, element, value) in out_of_range(scenario, rows) {
         say(row, element, value, found);
@@ -327,8 +333,7 @@ fn say<'s, 'd>(
     found.about(element, row.attribute, text).level(level)
 }
 
-/// The values of all tables that break a scenario because they are out of range, with what is to be
-/// said of each.
+/// Returns the values of all tables that are out of range with level error, each with its message.
 pub(crate) fn broken<'m, 'd>(
     scenario: &'m Scenario<'d>,
 ) -> impl Iterator<Item = (Element<'m, 'd>, &'static str, String)> {
@@ -340,7 +345,7 @@ pub(crate) fn broken<'m, 'd>(
         })
 }
 
-/// What is said of a value that is out of range, and how bad it is.
+/// Returns the message and the level for a value that is out of range.
 fn told(row: &Row, element: Element<'_, '_>, value: f64) -> (String, Level) {
     let level = (row.judge)(element, value);
     let (must, excuse) = match level {
@@ -362,7 +367,8 @@ fn told(row: &Row, element: Element<'_, '_>, value: f64) -> (String, Level) {
     (text, level)
 }
 
-/// A value in backticks, and what is written where a parameter or an expression led to it.
+/// Formats a value in backticks. If it comes from a parameter or an expression, the written text is
+/// added.
 pub(crate) fn shown(element: Element<'_, '_>, attribute: &str, value: f64) -> String {
     let written = element.written(attribute).unwrap_or_default();
     match element.read(attribute) {
@@ -371,7 +377,7 @@ pub(crate) fn shown(element: Element<'_, '_>, attribute: &str, value: f64) -> St
     }
 }
 
-/// A number without the noise that arithmetic leaves behind.
+/// Rounds away the noise of floating point arithmetic.
 fn rounded(value: f64) -> f64 {
     const PARTS: f64 = 1e9;
     let rounded = (value * PARTS).round() / PARTS;
@@ -382,7 +388,7 @@ fn rounded(value: f64) -> f64 {
     }
 }
 
-/// What a range demands, after "must".
+/// Returns the demand of a range, as the text after "must".
 fn wanted(row: &Row) -> String {
     let number = |end: f64| named(end, row.unit);
     match (row.low, row.high) {
@@ -412,7 +418,7 @@ fn wanted(row: &Row) -> String {
     }
 }
 
-/// A number with its unit; parts of a turn as people know them.
+/// Formats a number with its unit. Parts of a turn are shown as multiples of π.
 fn named(end: f64, unit: &str) -> String {
     let known = [(TAU, "2π"), (PI, "π"), (FRAC_PI_2, "π/2")];
     let word = known.iter().find(|(value, _)| *value == end.abs());
@@ -430,10 +436,11 @@ fn named(end: f64, unit: &str) -> String {
     }
 }
 
-/// What is out of range and would be in it in another unit was probably meant as such.
+/// Returns a remark if a value would be in range in another unit. It was probably meant in that
+/// unit.
 fn other_unit(row: &Row, value: f64) -> String {
     let (meant, unit, digits) = match row.unit {
-        // What is within a turn may be one.
+        // A value within a full turn may be in radians.
         "rad" if value.abs() > TAU + 1e-3 => (value.to_radians(), "°", 4),
         "K" => (value + 273.15, " °C", 2),
         "Pa" => (value * 100.0, " hPa", 0),

@@ -1,4 +1,4 @@
-//! The ranges, by what they are about: one table per rule.
+//! Tables of ranges: one table per rule.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -10,7 +10,7 @@ use super::{
     zero_is_harmless,
 };
 
-/// A table: on each line how the range is made, the type, the attribute, its unit and its name.
+/// Builds a table. Each line has the kind of range, the type, the attribute, its unit and its UID.
 macro_rules! table {
     ($name:ident: $(
         $make:ident $(($($end:expr),*))? $class:ident $attribute:ident $unit:literal $uid:literal
@@ -56,7 +56,8 @@ table! {
             .called(&["LaneChangeActionDynamics", "SpeedActionDynamics"]).judged(a_rate_may_have_a_sign, A_RATE);
 }
 
-/// Files in use write the rate of braking with a minus, and simulators take its magnitude.
+/// Returns a warning for rates. Existing files write the rate of braking with a minus, and
+/// simulators use its magnitude.
 fn a_rate_may_have_a_sign(element: Element<'_, '_>, _: f64) -> Level {
     match element.word("dynamicsDimension").as_deref() {
         Some("time" | "distance") => Level::Error,
@@ -97,7 +98,8 @@ table! {
         from_zero TimeToCollisionCondition value "s" "timetocollisioncondition_value";
 }
 
-/// A tolerance beyond half a turn takes any angle, one below zero takes none.
+/// Returns a warning for positive values. A tolerance beyond half a turn accepts any angle. One
+/// below zero accepts none.
 fn a_wide_tolerance_is_harmless(_: Element<'_, '_>, value: f64) -> Level {
     if value > 0.0 {
         Level::Warning
@@ -130,7 +132,8 @@ table! {
         from_zero TraveledDistanceCondition value "m" "traveleddistancecondition_value";
 }
 
-/// Before `displacement` came with 1.1, a sign was the only way to say the side.
+/// Returns a warning before 1.1. The attribute `displacement` exists since 1.1. Before that, only a
+/// sign could state the side.
 fn a_side_may_have_a_sign(element: Element<'_, '_>, _: f64) -> Level {
     if element.scenario().version() < (1, 1) {
         Level::Warning
@@ -141,9 +144,9 @@ fn a_side_may_have_a_sign(element: Element<'_, '_>, _: f64) -> Level {
 
 table! {
     ENTITIES:
-        // Many files in use write degrees, and most simulators do not read it.
+        // Many existing files write degrees, and most simulators do not read this attribute.
         between(0.0, PI) Axle maxSteering "rad" "axle_maxsteering" .called(AXLES).judged(warning, "");
-        // A reference point before the rear axle is odd, and well defined.
+        // A reference point before the rear axle is unusual, but well defined.
         from_zero Axle positionX "m" "axle_positionx" .called(AXLES).judged(an_axle_may_be_behind, BEHIND);
         from_zero Axle positionZ "m" "axle_positionz" .called(AXLES).judged(warning, "");
         from_zero Axle trackWidth "m" "axle_trackwidth" .called(AXLES);
@@ -161,7 +164,8 @@ table! {
         from_zero Vehicle mass "kg" "vehicle_mass";
 }
 
-/// The rear axle is at zero, and many a further axle stands behind it.
+/// Returns an information for additional axles. The rear axle is at zero, and additional axles are
+/// often behind it.
 fn an_axle_may_be_behind(element: Element<'_, '_>, _: f64) -> Level {
     if element.is("AdditionalAxle") {
         Level::Information
@@ -184,7 +188,7 @@ table! {
         between(-PI, PI) Sun elevation "rad" "sun_elevation" .judged(a_turn_is_harmless, A_TURN);
         from_zero Sun illuminance "lx" "sun_illuminance";
         from_zero Sun intensity "lx" "sun_intensity";
-        // Nothing but models of air reads these two; the ranges say what is plausible.
+        // Only models of the air read these two values. The ranges state plausible values.
         between(80_000.0, 120_000.0) Weather atmosphericPressure "Pa" "weather_atmosphericpressure"
             .judged(warning, "");
         between(170.0, 340.0) Weather temperature "K" "weather_temperature" .judged(warning, "");
@@ -192,7 +196,8 @@ table! {
         from_zero Wind speed "m/s" "wind_speed";
 }
 
-// The standard confuses the ranges of latitude and longitude in radians, and has no places below the sea.
+// The standard confuses the ranges of latitude and longitude in radians, and has no places below
+// sea level.
 table! {
     GEO:
         between(-FRAC_PI_2, FRAC_PI_2) GeoPosition latitude "rad" "geoposition_latitude" .if_finite();
@@ -202,7 +207,7 @@ table! {
             .judged(a_turn_in_degrees_is_harmless, A_TURN).if_finite();
 }
 
-/// 190° east is 170° west.
+/// Returns a warning up to a full turn, because 190° east is 170° west.
 fn a_turn_in_degrees_is_harmless(_: Element<'_, '_>, value: f64) -> Level {
     if value.abs() <= 360.0 {
         Level::Warning
@@ -219,11 +224,11 @@ table! {
 
 table! {
     OVERRIDES:
-        // Per cent or newton: neither has a sign.
+        // The unit is per cent or newton. Neither has a sign.
         from_zero Brake value "" "brake_value" .called(BRAKES);
         above_zero Brake maxRate "" "brake_maxrate" .called(BRAKES);
         between(0.0, 1.0) OverrideBrakeAction value "" "overridebrakeaction_value" .called(&["Brake"]);
-        // Tests of simulators that do not read it write any number.
+        // Tests of simulators that do not read this value write any number.
         between(0.0, 1.0) OverrideClutchAction value "" "overrideclutchaction_value"
             .called(&["Clutch"]).judged(warning, "");
         above_zero OverrideClutchAction maxRate "%/s" "overrideclutchaction_maxrate" .called(&["Clutch"]);

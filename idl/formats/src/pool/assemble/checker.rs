@@ -1,4 +1,4 @@
-//! What becomes of one checker.
+//! Processing of a single checker.
 
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -10,13 +10,13 @@ use crate::Text;
 use crate::config::Selected;
 use crate::xqar::{Checker, Issue, Metadata, Param};
 
-/// The rule of issues whose bundle named none that can be written.
+/// The rule of issues without a valid rule UID from their bundle.
 const UNNAMED: &str = "qcbus.dev:qcbus:1.0.0:pooling.rule_named";
 
-/// Key of the metadata that keep a rule UID which no reader would accept.
+/// Metadata key for a rule UID that no reader would accept.
 const UNREADABLE: &str = "qcbus.unreadableRuleUID";
 
-/// How a checker ended. One that never said, or says what cannot be, has failed.
+/// Sets the ending of a checker. A missing or contradictory ending counts as a failure.
 pub(super) fn settle(outcome: &mut CheckerOutcome) {
     let wrong = match &outcome.ending {
         None => "the bundle never said how it ended",
@@ -34,7 +34,7 @@ pub(super) fn settle(outcome: &mut CheckerOutcome) {
     outcome.ending = Some(Ending::Failed { reason });
 }
 
-/// Gives issues their configured level and keeps those that are wanted; returns what was removed.
+/// Gives issues their configured level, keeps the requested ones and counts the removed ones.
 pub(super) fn select(issues: &mut Vec<Issue>, selected: Selected) -> Counts {
     let mut removed = Counts::default();
     issues.retain_mut(|issue| {
@@ -48,7 +48,7 @@ pub(super) fn select(issues: &mut Vec<Issue>, selected: Selected) -> Counts {
     removed
 }
 
-/// The checker as it is written.
+/// Returns the checker as written to the result.
 pub(super) fn finish(
     mut outcome: CheckerOutcome,
     configured: Vec<Param>,
@@ -78,8 +78,8 @@ pub(super) fn finish(
     }
 }
 
-/// The rules of a checker, with those that its issues name besides. UIDs that make readers refuse
-/// the whole file are kept where they do no harm.
+/// Returns the rules of a checker, including those that its issues name. UIDs that would make
+/// readers refuse the whole file are moved to a harmless place.
 fn rules(outcome: &mut CheckerOutcome) -> Arc<[Text]> {
     let given = std::mem::take(&mut outcome.rule_uids);
     let mut rules = Cow::Borrowed(&given[..]);
@@ -107,7 +107,7 @@ fn rules(outcome: &mut CheckerOutcome) -> Arc<[Text]> {
     }
 }
 
-/// What tells a checker that could not look from one that does not apply.
+/// Returns the metadata that distinguish a blocked checker from one that does not apply.
 fn blocked(ending: &Ending) -> Option<Metadata> {
     let Ending::Blocked { by, .. } = ending else {
         return None;

@@ -1,4 +1,4 @@
-//! Summaries, computed from what is really in the result.
+//! Summaries, computed from the actual content of the result.
 
 use std::fmt;
 use std::sync::LazyLock;
@@ -7,7 +7,7 @@ use super::super::{CheckerOutcome, Counts};
 use crate::Text;
 use crate::xqar::{Checker, Status};
 
-/// `23 checkers: 20 completed, 2 skipped, 1 error; 5 issues.`
+/// Returns text such as `23 checkers: 20 completed, 2 skipped, 1 error; 5 issues.`
 pub(super) fn of_bundle(checkers: &[Checker]) -> String {
     let count = |status| checkers.iter().filter(|c| c.status == Some(status)).count();
     let issues: usize = checkers.iter().map(|checker| checker.issues.len()).sum();
@@ -21,10 +21,10 @@ pub(super) fn of_bundle(checkers: &[Checker]) -> String {
     )
 }
 
-/// `Skipped: the file is OpenDRIVE 1.4. 0 issues.`
+/// Returns text such as `Skipped: the file is OpenDRIVE 1.4. 0 issues.`
 pub(super) fn of_checker(outcome: &CheckerOutcome, removed: Counts) -> Text {
     let status = outcome.status();
-    // Most say this, of hundreds for every file.
+    // Most of the hundreds of checkers per file have this summary, so its text is shared.
     if status == Status::Completed && outcome.issues.is_empty() && removed.total() == 0 {
         static NONE: LazyLock<Text> = LazyLock::new(|| Text::from("0 issues."));
         return NONE.clone();
@@ -57,14 +57,14 @@ pub(super) fn of_checker(outcome: &CheckerOutcome, removed: Counts) -> Text {
     summary.into()
 }
 
-/// `1 issue`, `2 issues`.
+/// Returns text such as `1 issue` or `2 issues`.
 fn number(count: usize, what: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} {what}{plural}")
 }
 
 impl fmt::Display for Counts {
-    /// `2 errors and 1 warning`.
+    /// Writes text such as `2 errors and 1 warning`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let plural = |count: u64, word: &str| match count {
             0 => None,

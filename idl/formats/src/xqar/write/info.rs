@@ -1,11 +1,11 @@
-//! Domain specific facts: elements that somebody else made up, written so that no reader refuses
-//! the file because of them.
+//! Domain specific facts: elements defined by third parties, written so that no reader refuses the
+//! file because of them.
 
 use super::super::{DomainInfo, InfoElement, MAX_INFO_DEPTH};
 use super::markup::Markup;
 use crate::xml::{is_name_char, is_name_start};
 
-/// Namespaces that no prefix may be given to (Namespaces in XML 1.0, section 3).
+/// Namespaces that must not be bound to a prefix (Namespaces in XML 1.0, section 3).
 const RESERVED: [&str; 2] = [
     "http://www.w3.org/XML/1998/namespace",
     "http://www.w3.org/2000/xmlns/",
@@ -27,7 +27,7 @@ pub(super) fn write(out: &mut Markup, info: &DomainInfo) {
     out.close("DomainSpecificInfo");
 }
 
-/// Writes an element in one line: white space between its children would not be its own.
+/// Writes an element in one line, because added white space would change its content.
 fn write_element<'e>(
     out: &mut Markup,
     element: &'e InfoElement,
@@ -67,7 +67,7 @@ fn write_element<'e>(
     prefixes.truncate(declared);
 }
 
-/// The prefix that an attribute declares.
+/// Returns the prefix that an attribute declares.
 fn declaration((name, value): &(String, String)) -> Option<&str> {
     let prefix = name.strip_prefix("xmlns:")?;
     let usable = is_plain_name(prefix) && prefix != "xml" && prefix != "xmlns";
@@ -78,8 +78,8 @@ fn is_plain_name(text: &str) -> bool {
     crate::xml::is_name(text) && !text.contains(':')
 }
 
-/// A name as it is when it is one, with a declared prefix or none; else with underscores in
-/// place of what a name cannot hold.
+/// Returns a valid name with a declared prefix or none unchanged. Otherwise it replaces invalid
+/// characters by underscores.
 fn mend(name: &str, prefixes: &[&str], declares: bool) -> String {
     let parts = name.split_once(':');
     let good = match parts {

@@ -1,12 +1,12 @@
-//! Tags, indentation and escaping.
+//! Writing of tags, indentation and escapes.
 
 use std::fmt::Write as _;
 
 use crate::xml::is_xml_char;
 
-/// The first bytes of characters that are to be looked at: control characters, those with a meaning in
-/// markup, and of those beyond ASCII the few among which there are two that XML does not allow
-/// (U+FFFE and U+FFFF begin with this byte, as all from U+F000 do). No byte in the middle of a character is one of them.
+/// First bytes of characters that need a check: control characters, characters with a meaning in
+/// markup, and one byte beyond ASCII. U+FFFE and U+FFFF, which XML does not allow, begin with it,
+/// like all characters from U+F000. A byte in the middle of a character is never among them.
 static SPECIAL: [bool; 256] = {
     let mut special = [false; 256];
     let mut control = 0;
@@ -22,14 +22,14 @@ static SPECIAL: [bool; 256] = {
     special
 };
 
-/// Text that grows by elements, two spaces deeper with every level.
+/// A text to which elements are appended, indented by two spaces for each level.
 pub(super) struct Markup {
     text: String,
     depth: usize,
 }
 
 impl Markup {
-    /// Begins at the end of a text.
+    /// Starts a document at the end of a text.
     pub fn new(mut text: String) -> Markup {
         text.push_str("<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"no\"?>\n");
         Markup { text, depth: 0 }
@@ -65,12 +65,12 @@ impl Markup {
         }
     }
 
-    /// Bytes written as they are.
+    /// Appends a text unchanged.
     pub fn raw(&mut self, text: &str) {
         self.text.push_str(text);
     }
 
-    /// `<name a="…"`, without the end.
+    /// Writes `<name a="…"`, without the end of the tag.
     pub fn tag(&mut self, name: &str, attributes: &[(&str, &str)]) {
         self.text.push('<');
         self.text.push_str(name);
@@ -93,8 +93,8 @@ impl Markup {
         self.escape(text, false);
     }
 
-    /// Escapes what has a meaning in markup. White space in attributes is written by number,
-    /// because readers turn it into spaces otherwise; so is a carriage return in text.
+    /// Escapes characters with a meaning in markup. Readers turn white space in attributes into
+    /// spaces, so it is written by number. So is a carriage return in text.
     fn escape(&mut self, value: &str, attribute: bool) {
         let mut rest = value;
         while let Some(at) = rest.bytes().position(|byte| SPECIAL[usize::from(byte)]) {

@@ -4,7 +4,7 @@ use tokio::sync::mpsc::UnboundedReceiver;
 
 use super::*;
 
-/// A socket whose broker answers `status`, and keeps everybody waiting who asks for a verdict.
+/// A socket with a broker that answers `status` and delays every client that waits for a verdict.
 struct Socket {
     dir: tempfile::TempDir,
     clients: Arc<Clients>,
@@ -39,7 +39,7 @@ impl Socket {
         stream
     }
 
-    /// What comes back, up to the end of a line or of everything.
+    /// Returns the received text up to the end of a line or of the stream.
     async fn hear(&mut self, stream: &mut UnixStream) -> String {
         let mut line = Vec::new();
         let mut reader = BufReader::new(stream);
@@ -98,7 +98,7 @@ async fn the_length_of_a_request_is_bounded_and_their_number_is_not() {
     let mut client = socket.connect("what?\n").await;
     let said = socket.hear(&mut client).await;
     assert!(said.contains("not a request"), "{said}");
-    // As `echo … | nc -U` does.
+    // `echo … | nc -U` does the same.
     let mut client = socket.connect(STATUS.trim()).await;
     client.shutdown().await.unwrap();
     assert!(socket.hear(&mut client).await.contains("timed-out"));
@@ -116,7 +116,7 @@ async fn who_says_nothing_or_half_of_it_is_not_waited_for() {
         assert!(heard.contains("no request came"), "{said}: {heard}");
         assert_eq!(socket.hear(&mut client).await, "", "it was closed");
     }
-    // Having been answered is no licence to stay.
+    // A client that was answered may not stay either.
     let mut client = socket.connect(STATUS).await;
     assert!(socket.hear(&mut client).await.contains("timed-out"));
     assert!(socket.hear(&mut client).await.contains("no request came"));
@@ -176,7 +176,7 @@ async fn the_silent_make_room_and_those_who_wait_stay() {
 async fn of_a_client_that_has_left_nothing_stays() {
     let mut socket = Socket::new(bounds(8, 4));
     let waiting = socket.connect(WAIT).await;
-    // It has nothing more to say, and waits all the same.
+    // This client sends no further request, but it still waits.
     let mut patient = socket.connect(WAIT).await;
     patient.shutdown().await.unwrap();
     socket.until_kept(2).await;
@@ -185,7 +185,7 @@ async fn of_a_client_that_has_left_nothing_stays() {
     while socket.kept.iter_mut().filter(closed).count() == 0 {
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
-    // The next look has found the other one as well, had it left.
+    // The next probe would also have found the other client, if it had left.
     tokio::time::sleep(LOOK + SHORT).await;
     assert_eq!(socket.kept.iter_mut().filter(closed).count(), 1);
     socket.kept.retain(|it| !it.answer.is_closed());

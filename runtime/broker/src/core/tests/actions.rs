@@ -1,4 +1,4 @@
-//! The hands of a random world: files are read and results written, and a broker is killed.
+//! The work of a random world: files are read, results are written, and the broker is killed.
 
 use std::path::Path;
 
@@ -72,7 +72,7 @@ impl World {
         }
     }
 
-    /// The state machine hears what a writer has done.
+    /// Notifies the state machine of a writer's result.
     pub fn tell(&mut self) {
         if !self.told.is_empty() {
             let ((_, job), outcome) = self.told.remove(0);
@@ -80,7 +80,7 @@ impl World {
         }
     }
 
-    /// A writer does its work, and nobody hears of it yet.
+    /// Lets a writer finish its work. The state machine is not yet notified.
     pub fn write_out(&mut self, n: u8, room: bool) {
         if self.storing.is_empty() {
             return;
@@ -93,7 +93,7 @@ impl World {
         } else if job.epoch != self.state.epoch() {
             StoreOutcome::Outdated
         } else if !room {
-            // The journal comes last: by then an acceptance lies behind the gate.
+            // The journal is written last, so an accepted file is already published.
             let failed = job.bundles.iter().any(|it| it.failure.is_some());
             let bad = self.rejected.contains(&file) || is_bad(prepared.root().unwrap().1);
             let under = job.rests_on.iter();
@@ -116,7 +116,8 @@ impl World {
         self.told.push(((file, job.job), outcome));
     }
 
-    /// What a writer makes of a job: the worst of the file's own verdict and of those that it rests on.
+    /// Returns the result of a writer for a job: the worst of the file's own verdict and of those
+    /// that it rests on.
     fn judged(&mut self, file: u8, job: &FinishedJob) -> Judged {
         let (inputs, digest) = {
             let prepared = job.prepared.as_ref().unwrap();
@@ -159,8 +160,8 @@ impl World {
         }
     }
 
-    /// The broker is killed, something happens to a file, and the next one knows what the journal
-    /// knows. `unsettled`: what is there may still be written to when it is first seen.
+    /// Kills the broker, changes a file, and starts the next broker from the journal. `unsettled`
+    /// means that files may still be written to when they are first seen.
     pub fn restart_after(&mut self, file: u8, unsettled: bool) {
         self.stamps += 1;
         if self.there.remove(&path_of(file)).is_none() {
@@ -170,7 +171,7 @@ impl World {
         self.restart_with(unsettled);
     }
 
-    /// The broker is killed, and the next one knows what the journal knows.
+    /// Kills the broker and starts the next one from the journal.
     pub fn restart(&mut self) {
         self.restart_with(false);
     }
@@ -188,7 +189,7 @@ impl World {
         self.told.clear();
         self.clients = Clients::default();
         self.judged.clear();
-        // Every start looks at results before anything is judged.
+        // Every start checks the results before any file is judged.
         self.lost.clear();
         let unpublished = self.gate_is_taken_over();
         let known = self.journal.keys();
@@ -200,7 +201,7 @@ impl World {
         }
         for (file, judged) in self.journal.clone() {
             let mut judged = judged;
-            // As the engine does: what has changed while nobody watched is looked at again.
+            // The engine does the same: it checks changes that happened without a broker again.
             judged.racy |= judged.inputs[1..] != self.inputs(file)[1..];
             let delivered = self.delivered(file);
             self.state.remember(&path_of(file), judged, &delivered);

@@ -1,4 +1,4 @@
-//! The gate of a random world: what lies behind it, as the writers put it there.
+//! The gate of a random world, with the files that the writers have published.
 
 use std::collections::BTreeMap;
 
@@ -8,11 +8,11 @@ use super::super::*;
 use super::things::file_of;
 use super::world::World;
 
-/// Each published file with what its acceptance rests on.
+/// Published files with the inputs of their acceptance.
 pub type Published = BTreeMap<u8, Vec<Input>>;
 
 impl World {
-    /// What becomes of the gate by an action.
+    /// Applies an action to the gate.
     pub fn gate_follows(&mut self, action: &Action) {
         match action {
             Action::CloseGate { path } | Action::Withdraw { path, .. } => {
@@ -25,7 +25,8 @@ impl World {
         }
     }
 
-    /// A verdict has been written: an acceptance is published, anything else ends the last one.
+    /// Publishes an accepted file after its verdict was written. Any other verdict withdraws the
+    /// file.
     pub fn publish(&mut self, file: u8, judged: &Judged) {
         if judged.verdict == Verdict::Accepted {
             self.gate.insert(file, judged.inputs.clone());
@@ -34,7 +35,8 @@ impl World {
         }
     }
 
-    /// What lies behind the gate is what was accepted, or somebody is about to hear of it.
+    /// Asserts that published files are the accepted ones, unless a message about a change is on
+    /// its way.
     pub fn gate_must_be_true(&self) {
         for (file, inputs) in &self.gate {
             let on_the_way = self.told.iter().any(|(it, _)| it.0 == *file);
@@ -45,8 +47,8 @@ impl World {
         }
     }
 
-    /// When a broker starts, what is not as it was read goes from behind the gate. Returns what was accepted and
-    /// does not lie there.
+    /// Withdraws, at the start of a broker, files that differ from those that were read. Returns
+    /// accepted files that are not published.
     pub fn gate_is_taken_over(&mut self) -> Vec<u8> {
         let journal = self.journal.iter();
         let accepted = journal.filter(|(_, it)| it.verdict == Verdict::Accepted);

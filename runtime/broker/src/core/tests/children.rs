@@ -1,4 +1,4 @@
-//! Children: what becomes of files while a child cannot be started, and of upgrades that fail.
+//! Tests of children: files while a child cannot be started, and failed upgrades.
 
 use super::*;
 
@@ -11,7 +11,7 @@ pub fn notices(world: &World) -> Vec<&'static str> {
         .collect()
 }
 
-/// A manifest has come, and its child runs as version 1.
+/// Returns a world with a manifest, whose child runs as version 1.
 fn world_with_a_child() -> World {
     let mut world = World::new();
     world.manifest(Some(1));
@@ -20,7 +20,7 @@ fn world_with_a_child() -> World {
     world
 }
 
-/// The child runs as version 1, and a manifest of version 2 has come.
+/// Returns a world in which the child runs as version 1 and a manifest of version 2 has arrived.
 fn world_with_an_upgrade() -> World {
     let mut world = world_with_a_child();
     world.write(0);
@@ -96,7 +96,7 @@ fn a_process_that_a_newer_manifest_overtakes_before_it_joins_is_killed() {
         world.pass(Duration::ZERO);
         world
     };
-    // What it had said before may come not at all, before its end is known, or after.
+    // Its earlier messages may be lost, or arrive before or after its end is known.
     for late in [None, Some(false), Some(true)] {
         for mut world in [first_start(), world_with_an_upgrade()] {
             let old = world.launched[0].launch;
@@ -179,7 +179,7 @@ fn a_file_is_undetermined_at_once_when_a_child_cannot_be_started() {
         let (_, verdict) = &world.judged[&0];
         assert_eq!(*verdict, Verdict::Undetermined, "{end:?}");
         assert!(world.now < world.state.settings.absence_limit);
-        // And nothing is done over and over while it stays away.
+        // No work is repeated while the child stays away.
         let stored = world.stored.len();
         for _ in 0..10 {
             world.pass(Duration::from_secs(1));
@@ -207,14 +207,15 @@ fn a_child_that_never_joins_is_waited_for_once() {
     assert_eq!(world.judged[&0].1, Verdict::Undetermined);
     let why = &world.failures[&0][0];
     assert!(!why.contains("bundle remove"), "it has a manifest: {why}");
-    // When it comes at last, it judges.
+    // A child that joins late still judges.
     world.pass(Duration::from_secs(60));
     world.child_joins();
     world.settle();
     assert_eq!(world.judged[&0].1, Verdict::Accepted);
 }
 
-/// A module of ASAM's framework runs over samples before it joins, which takes long on a busy machine.
+/// Checks the time limit of a child with a slow start. A module of ASAM's framework runs over
+/// samples before it joins, which takes long on a busy machine.
 #[test]
 fn child_that_starts_slowly_is_waited_for_as_long_as_it_may_take() {
     let starting = || {
@@ -277,7 +278,8 @@ fn a_manifest_that_changed_while_no_broker_ran_is_carried_out() {
         command: vec!["other".to_owned()],
         ..child(2)
     };
-    // What had been started, what it says that it is, and whether that is what is wanted.
+    // Each case has the spec of the started child, its reported version, and whether it is the
+    // wanted one.
     let cases = [
         (child(1), 1, false),
         (child(2), 1, false),
@@ -291,7 +293,7 @@ fn a_manifest_that_changed_while_no_broker_ran_is_carried_out() {
         world.manifest = None;
         world.restart();
         world.manifest(Some(2));
-        // The process of the former broker has outlived it, and joins the next.
+        // The process of the former broker has outlived it and joins the next one.
         world.stale_child_joins(version, &spec);
         assert_eq!(child_version(&world), version.to_string());
         let adopted = world.state.bundles[CHILD].pid;
@@ -376,7 +378,7 @@ fn a_process_that_is_replaced_and_does_not_go_is_killed() {
     assert!(world.killed.contains(&old));
 }
 
-/// A child that is to be started again in this way, and is being started.
+/// Returns a world with a child that has this restart policy and is being started.
 pub fn world_that_starts(restart: Restart) -> World {
     let mut world = World::new();
     let specs = vec![ChildSpec {
@@ -390,7 +392,7 @@ pub fn world_that_starts(restart: Restart) -> World {
     world
 }
 
-/// The same, and it has joined.
+/// Returns the same world after the child has joined.
 fn world_with(restart: Restart) -> World {
     let mut world = world_that_starts(restart);
     world.child_joins();
@@ -442,7 +444,8 @@ fn pauses_between_starts_double_up_to_a_limit() {
     );
     for (number, pause) in (0_u32..).zip(pauses) {
         let least = (first * 2_u32.pow(number)).min(most);
-        // Up to a quarter more, so that children that fell together do not get up together.
+        // The pause has up to a quarter more, so that children that died together do not restart
+        // together.
         let tick = Duration::from_millis(20);
         assert!(
             least <= pause && pause <= least.mul_f64(1.25) + tick,

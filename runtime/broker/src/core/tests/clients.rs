@@ -1,4 +1,4 @@
-//! Clients of a random world that have files checked for themselves alone.
+//! Clients of a random world with on-demand checks.
 
 use std::collections::BTreeMap;
 
@@ -9,30 +9,31 @@ use super::world::World;
 use qcbus_messages::control::{Checked, FileVerdict, Response};
 use qcbus_messages::{JobId, Verdict};
 
-/// A client that has asked and has no answer.
+/// A client that has asked and has no answer yet.
 pub struct Client {
     file: u8,
-    /// By whom the file is to be looked at, each as what is started under that name.
+    /// Required bundles for the file, each with the version digest of the process started under
+    /// that name.
     required_set: Vec<(String, Option<VersionDigest>)>,
     config: Digest,
-    /// All that lay there since it asked.
+    /// All inputs that were present since it asked.
     seen: Vec<Vec<Input>>,
 }
 
-/// All clients, and what is done for them.
+/// All clients, and their work.
 #[derive(Default)]
 pub struct Clients {
     pub open: BTreeMap<RequestId, Client>,
     pub answers: BTreeMap<RequestId, Response>,
     pub pooling: Vec<FinishedJob>,
-    /// What was pooled and the state machine has not heard.
+    /// Pooled outcomes that the state machine has not received.
     pub pooled: Vec<(JobId, OnDemandOutcome)>,
-    /// Of what each result was made.
+    /// Job of each result.
     found: BTreeMap<JobId, FinishedJob>,
 }
 
 impl World {
-    /// `known`: he sees that the file is there, and that the child is.
+    /// Lets a client ask for a file. `known` means that the file and the child exist.
     pub fn somebody_asks(&mut self, file: u8, known: bool) {
         if known {
             self.child_is_there();
@@ -53,7 +54,7 @@ impl World {
         }
     }
 
-    /// Somebody wants to know what the child finds in a file.
+    /// Lets a client ask for the findings of the child in a file.
     pub fn ask(&mut self, file: u8) -> RequestId {
         self.ask_by(file, &[CHILD])
     }
@@ -86,7 +87,7 @@ impl World {
         request_id
     }
 
-    /// A client does not wait any longer.
+    /// Lets a client leave before its answer.
     pub fn client_leaves(&mut self, n: u8) {
         let count = self.clients.open.len();
         if count > 0 {
@@ -97,7 +98,7 @@ impl World {
         }
     }
 
-    /// What is looked at for clients is what lies there while they wait.
+    /// Records the inputs that are present while clients wait. Only these may be checked for them.
     pub fn clients_look(&mut self) {
         let mut open = std::mem::take(&mut self.clients.open);
         for client in open.values_mut() {
@@ -109,7 +110,7 @@ impl World {
         self.clients.open = open;
     }
 
-    /// Nothing that only clients have asked for is known to anybody else.
+    /// Asserts that files of on-demand checks are not known elsewhere.
     pub fn clients_leave_no_trace(&self) {
         let files = self.state.present_files();
         assert!(files.iter().all(|path| file_of(path) < 8), "{files:?}");
@@ -125,7 +126,8 @@ impl World {
         }
     }
 
-    /// What only clients ask for, or is looked at for them alone, is read and pooled, and that is all.
+    /// Asserts that a file of on-demand checks is only read and pooled. The same applies to a
+    /// result for a client.
     pub fn is_for_clients_alone(&self, action: &Action) {
         let (paths, what): (Vec<_>, _) = match action {
             Action::Depend { files } => (files.iter().map(|it| &it.0).collect(), "watched"),
@@ -154,7 +156,7 @@ impl World {
         self.clients.pooling.push(job);
     }
 
-    /// Something is pooled for a client, or cannot be, and nobody hears of it yet.
+    /// Pools a result for a client, or fails to. The state machine is not yet notified.
     pub fn pool(&mut self, n: u8, well: bool) {
         if self.clients.pooling.is_empty() {
             return;
@@ -179,7 +181,7 @@ impl World {
         self.clients.pooled.push((id, outcome));
     }
 
-    /// The state machine hears what was pooled.
+    /// Notifies the state machine of a pooled result.
     pub fn tell_pooled(&mut self) {
         if !self.clients.pooled.is_empty() {
             let (job, outcome) = self.clients.pooled.remove(0);
@@ -187,7 +189,7 @@ impl World {
         }
     }
 
-    /// Whether this was an answer to one of these clients.
+    /// Returns whether this was an answer to one of these clients.
     pub fn client_is_answered(&mut self, request_id: RequestId, response: &Response) -> bool {
         let once = !self.clients.answers.contains_key(&request_id);
         assert!(once, "one answer for each");
@@ -203,7 +205,8 @@ impl World {
         true
     }
 
-    /// A client is told of what lay there since it asked, and of what those found whom it named.
+    /// Asserts that the answer is about inputs present since the client asked, and about the
+    /// findings of exactly the bundles that it named.
     fn must_be_true(&self, client: &Client, checked: &Checked) {
         let job = JobId(checked.result.parse().unwrap());
         let job = &self.clients.found[&job];
@@ -220,7 +223,7 @@ impl World {
         assert_eq!(job.config, client.config);
     }
 
-    /// Whether files are checked otherwise from now on, or may be.
+    /// Returns whether the check context changes, or may change.
     pub fn brings_another_context(&self, event: &Event) -> bool {
         match event {
             Event::Children { .. } => true,
@@ -229,13 +232,13 @@ impl World {
         }
     }
 
-    /// Nobody is left of those who asked under what is not in force any more.
+    /// Asserts that no client is left that asked under an earlier check context.
     pub fn context_differs(&self) {
         let open: Vec<&RequestId> = self.clients.open.keys().collect();
         assert!(open.is_empty(), "{open:?} asked under other terms");
     }
 
-    /// All clients have gone, or have their answers, and there is no trace of any.
+    /// Asserts that all clients have left or have their answers, and that no trace of them remains.
     pub fn clients_are_content(&self) {
         let open: Vec<&RequestId> = self.clients.open.keys().collect();
         assert!(open.is_empty(), "{open:?} wait for ever");
@@ -249,7 +252,7 @@ impl World {
     }
 }
 
-/// A result from which it can be seen how it was found.
+/// Returns a result that identifies its job.
 fn checked(job: &FinishedJob) -> Checked {
     let failed = job.bundles.iter().any(|it| it.failure.is_some());
     Checked {

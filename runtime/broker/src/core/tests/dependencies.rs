@@ -1,8 +1,9 @@
-//! Files that a verdict depends on: they change, go, come back, and come late.
+//! Tests of files that a verdict depends on: they change, go, come back, and come late.
 
 use super::*;
 
-/// A file with all that it depends on, judged. `known` is a file whose verdict is looked at.
+/// Returns a world with a judged file and all its dependencies. `known` is the file whose verdict
+/// is examined.
 fn world_with_dependencies(known: u8) -> World {
     let mut world = World::new();
     world.join("First");
@@ -19,7 +20,7 @@ fn world_with_dependencies(known: u8) -> World {
 fn a_changed_dependency_has_its_file_judged_again() {
     for (file, part) in [(1, 0), (1, 6), (2, 6), (3, 4), (5, 7)] {
         let mut world = world_with_dependencies(file);
-        // It changes, goes, stays away, comes back: each time there is a new verdict.
+        // The dependency changes, is removed and comes back. Each step leads to a new verdict.
         let deeds: [fn(&mut World, u8); 3] = [World::write, World::delete, World::write];
         for deed in deeds {
             let before = world.stored.iter().filter(|it| **it == file).count();
@@ -64,7 +65,7 @@ fn a_dependency_that_has_only_a_new_stamp_costs_no_new_verdict() {
             "the new stamp is known"
         );
         assert_eq!(world.stored.len(), before);
-        // From then on nothing is read any more when the same is said again.
+        // A repeated event with the same stamp causes no further reads.
         let stamp = stamp(world.there[&path_of(touched)]);
         let path = path_of(touched);
         world.event(Event::Settled { path, stamp });
@@ -115,7 +116,7 @@ fn a_file_that_a_writer_finds_changed_is_read_again() {
     world.answer(0);
     world.answer(1);
     assert_eq!(world.storing.len(), 1);
-    // Nobody has reported the next change yet.
+    // The next change is not yet reported.
     world.stamps += 1;
     world.contents.insert(world.stamps, world.stamps);
     world.there.insert(path_of(1), world.stamps);
@@ -149,7 +150,7 @@ fn a_file_that_is_still_written_to_at_the_first_scan_keeps_its_result() {
     assert_eq!(of_it.count(), 1);
 }
 
-/// A file that is being read is written again within the very step of the clock.
+/// Writes a file again while it is being read, within the same clock tick.
 fn written_again(world: &mut World) {
     let (path, stamp) = (path_of(0), stamp(world.there[&path_of(0)]));
     world.event(Event::Settled { path, stamp });
@@ -220,7 +221,7 @@ fn what_could_not_be_read_is_tried_again_and_said_once() {
     assert_eq!(world.judged[&0].1, Verdict::Accepted);
 }
 
-/// The verdict on a file that could not be read.
+/// Returns the verdict on a file that could not be read.
 fn unread() -> Judged {
     Judged {
         job: JobId(0),
@@ -241,14 +242,15 @@ fn unread() -> Judged {
     }
 }
 
-/// An event says once more what was known.
+/// Repeats an event with known content.
 fn is_told_again(world: &mut World, file: u8) {
     let path = path_of(file);
     let stamp = stamp(world.there[&path]);
     world.event(Event::Settled { path, stamp });
 }
 
-/// What is read of a map for one file may serve another that had come by then, and no other.
+/// Checks the reported age of a request. Data read from a map for one file may serve another only
+/// if that one had already arrived.
 #[test]
 fn who_reads_a_file_is_told_how_long_ago_it_came_changed_or_was_asked_for() {
     let second = Duration::from_secs(1);

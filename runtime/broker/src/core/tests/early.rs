@@ -1,8 +1,9 @@
-//! A run reads its files while its bundles start, and nobody looks at them before all are there.
+//! Tests of a run that reads its files while its bundles start. No file is checked before all
+//! bundles are present.
 
 use super::*;
 
-/// A run on one file, whose one bundle has been started and has not joined.
+/// Returns a run on one file. Its only bundle has been started and has not joined.
 fn run(once: bool) -> World {
     let mut world = World::new();
     world.state = fresh_state(1, 0);

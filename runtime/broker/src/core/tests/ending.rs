@@ -1,4 +1,4 @@
-//! How a broker ends, and when it begins to judge.
+//! Tests of the end of a broker, and of the time at which it begins to judge.
 
 use super::*;
 
@@ -31,7 +31,7 @@ fn a_broker_that_cannot_finish_stops_nevertheless() {
     assert_eq!(world.stopped, 1);
 }
 
-/// A world that ends when everything was judged, with two files that are judged one by one.
+/// Returns a world that ends when all files are judged, with two files that are judged one by one.
 fn world_that_runs_once(scanned: bool) -> World {
     let mut world = World::new();
     world.join("First");
@@ -75,7 +75,7 @@ fn a_broker_that_runs_once_does_not_leave_a_file_that_must_rest() {
     assert_eq!(world.stopped, 1);
 }
 
-/// A world with a process that the broker has started, told to stop with nothing to do.
+/// Returns a world with a process that the broker started. It was told to stop and has no work.
 fn world_that_says_goodbye() -> (World, Launch) {
     let mut world = World::new();
     world.manifest(Some(1));

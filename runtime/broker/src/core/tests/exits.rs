@@ -1,4 +1,4 @@
-//! What follows when the process of a child ends.
+//! Tests of the end of a child's process.
 
 use super::children::{notices, world_that_starts};
 use super::*;
@@ -11,7 +11,7 @@ fn done() -> ChildEnd {
     ChildEnd::Done("it ended with exit code 0".to_owned())
 }
 
-/// How long it takes until the child is started again.
+/// Returns the time until the child is restarted.
 fn pause(world: &mut World) -> Duration {
     let start = world.now;
     while world.launched.is_empty() {

@@ -1,4 +1,4 @@
-//! Bundles that change what they are all the time: believed less and less often, and nobody starves.
+//! Bundles that change all the time: they are accepted less and less often, and no file starves.
 
 use qcbus_messages::{Catalogue, Hello};
 
@@ -14,7 +14,7 @@ fn changed(number: u64) -> FromPeer {
     FromPeer::Catalogue(Box::new(catalogue))
 }
 
-/// A world with two bundles in which the first may change three times.
+/// Creates a world with two bundles. The first one may change three times.
 fn world() -> (World, SessionId) {
     let mut world = World::new();
     world.state.settings.changes_forgiven = 4;
@@ -25,7 +25,8 @@ fn world() -> (World, SessionId) {
     (world, session)
 }
 
-/// Lets something happen, and time pass as for the engine: in small steps, with no answers.
+/// Lets time pass in small steps, as the engine does, and calls `each` at every step. No bundle
+/// answers.
 fn over(world: &mut World, time: Duration, step: Duration, mut each: impl FnMut(&mut World)) {
     let end = world.now + time;
     while world.now < end {
@@ -52,7 +53,7 @@ fn changes_without_end_are_believed_less_and_less_often_and_said() {
         say(world, session, changed(number));
     });
     let epochs = world.state.epoch().0 - before;
-    // Three at once, then with pauses of 2, 4, 8 … 256 s.
+    // Three changes are accepted at once, the others after pauses of 2, 4, 8 … 256 s.
     assert_eq!(epochs, 3 + 8, "of 6,000 changes");
     let flapping = |it: &&(Notice, Duration)| it.0.kind() == "flapping";
     assert!(world.state.notices.iter().filter(flapping).count() >= 8);
@@ -108,7 +109,7 @@ fn a_new_session_or_a_way_back_is_no_way_round() {
         say(&mut world, session, changed(number));
     }
     let pid = world.state.bundles["First"].pid;
-    // As it was last believed.
+    // The bundle returns to its last accepted registration.
     say(&mut world, session, changed(2));
     assert!(!world.state.bundles["First"].ready);
     for number in 10..30_u64 {
@@ -166,7 +167,7 @@ fn fresh_names_without_end_are_believed_less_often_too() {
         say(world, session, changed(number));
         say(world, session, FromPeer::Leaving);
     });
-    // Whoever is not believed is not on the roster, so that its going changes nothing.
+    // A bundle that is not accepted is not in the registry. Therefore its end changes nothing.
     let epochs = world.state.epoch().0 - before;
     assert!(epochs < 100, "{epochs} epochs of 600 newcomers");
 }
@@ -179,7 +180,7 @@ enum Whim {
 }
 
 proptest! {
-    /// Whatever a bundle does, changes that are believed come with the pauses that are due.
+    /// The required pauses lie between accepted changes, regardless of the bundle's behaviour.
     #[test]
     fn between_changes_that_are_believed_lie_the_pauses_due(
         whims in prop::collection::vec(

@@ -1,4 +1,4 @@
-//! What the world does with each action, and what must be so then.
+//! Effects of each action on the world, and the invariants that must hold afterwards.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -126,7 +126,7 @@ impl World {
     }
 
     fn is_told(&mut self, file: u8, judged: &Judged, fresh: bool) {
-        // One that others must judge by now may be heard of late, where it is on its way.
+        // A verdict of an older epoch may arrive late, if it was already on its way.
         if !fresh || judged.epoch == self.state.epoch() {
             self.must_be_earned(judged);
         }
@@ -165,7 +165,8 @@ impl World {
         }
     }
 
-    /// The verdict on a file with those on the files that it rests on, as the journal has them.
+    /// Returns the verdict on a file, combined with the journal's verdicts on the files that it
+    /// rests on.
     pub fn verdict_with_all(&self, file: u8, own: Verdict) -> Verdict {
         let under = dependencies_of(file).iter().filter(|it| **it < 6);
         let there = under.filter(|it| self.there.contains_key(&path_of(**it)));
@@ -181,13 +182,14 @@ impl World {
         entry.judged.clone().unwrap()
     }
 
-    /// Nothing is accepted, and nobody is told so, unless all judged who must at this moment.
+    /// Asserts that a file is accepted, and reported as accepted, only if all bundles that are
+    /// required now have judged it.
     pub fn must_be_earned(&self, judged: &Judged) {
         let (required_set, expected) = (named(&judged.required_set), self.expected_set());
         if judged.verdict == Verdict::Accepted {
             assert_eq!(required_set, expected);
         }
-        // Who was not there has a place in the jury nevertheless.
+        // A missing bundle is still part of the required set.
         for (required_bundle, must) in required_set.iter().zip(&expected) {
             let same = required_bundle.0 == must.0
                 && (required_bundle.1.is_none() || required_bundle.1 == must.1);

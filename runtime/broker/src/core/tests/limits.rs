@@ -1,4 +1,4 @@
-//! How long a bundle is waited for, how much it may say, and that it is no moment or word less.
+//! Tests of the exact time limits and size limits of a bundle.
 
 use qcbus_document::FileKind;
 use qcbus_formats::pool::Ending;
@@ -9,7 +9,7 @@ use qcbus_messages::CheckerEnd;
 
 use super::*;
 
-/// A world in which a bundle has one job.
+/// Returns a world in which a bundle has one job.
 fn busy() -> (World, SessionId, JobId) {
     let world = World::at_work();
     let session = world.nth_peer(0).unwrap();
@@ -17,7 +17,8 @@ fn busy() -> (World, SessionId, JobId) {
     (world, session, job)
 }
 
-/// It is waited for exactly that long, while `meanwhile` goes on every second; what it is ended for.
+/// Asserts that the bundle is ended exactly after this limit, while `meanwhile` runs every second.
+/// Returns the reason of the end.
 fn is_ended_after(
     world: &mut World,
     limit: Duration,
@@ -75,7 +76,7 @@ fn a_bundle_that_never_says_what_it_checks_is_ended() {
     let mut world = World::new();
     world.join("First");
     let session = world.nth_peer(0).unwrap();
-    // As if its catalogue had not come.
+    // This simulates a missing catalogue.
     world.state.bundles.get_mut("First").unwrap().ready = false;
     let limit = world.state.settings.silence_limit;
     let why = is_ended_after(&mut world, limit, |_| {});
@@ -98,7 +99,7 @@ fn a_job_that_is_overtaken_has_the_time_of_one_job() {
         },
     );
     let limit = world.state.settings.job_deadline;
-    // Further jobs come and go, so that it is never idle.
+    // Further jobs come and go, so that the bundle is never idle.
     let why = is_ended_after(&mut world, limit, |world| {
         world.state.bundles.get_mut("First").unwrap().moved = world.now;
         alive(world);
@@ -207,7 +208,7 @@ fn done(job: JobId, checker: u32, value: &str, facts: usize) -> FromPeer {
     }
 }
 
-/// What a checker's share came to: its ending and how many facts of its run are kept.
+/// Returns the ending of a checker in the task, and the number of facts of its run that are kept.
 fn kept(world: &World, job: JobId, checker: u32) -> (Ending, usize) {
     let pending = &world.state.jobs[&job].tasks["First"].pending[&checker];
     let (ending, params, metadata) = pending.done.clone().unwrap();
@@ -236,7 +237,7 @@ fn a_checker_with_more_to_say_of_its_run_than_is_kept_has_failed() {
             is_kept || ending.reason().contains("metadata"),
             "{ending:?}"
         );
-        // It is the checker that failed, and nobody else.
+        // Only this checker has failed, and no other.
         world.say(session, done(job, 1, "", 0));
         assert_eq!(kept(&world, job, 1).0, Ending::Completed);
     }
@@ -254,7 +255,7 @@ fn what_all_checkers_say_of_their_end_is_bounded_with_the_findings() {
     );
     world.say(session, done(job, 1, "", 2));
     assert!(kept(&world, job, 1).0.is_open(), "there is no room for it");
-    // What is said again takes the place of what was said.
+    // A repeated message replaces the earlier one.
     world.say(session, done(job, 0, "", 1));
     world.say(session, done(job, 1, "", 2));
     assert_eq!(kept(&world, job, 1), (Ending::Completed, 2));

@@ -1,17 +1,17 @@
-//! Who must judge: joins, leaves and upgrades while files are at work.
+//! Tests of the required bundles: joins, leaves and upgrades while files are being checked.
 
 use qcbus_document::FileKind;
 use qcbus_messages::Catalogue;
 
 use super::*;
 
-/// The session of a bundle that is there.
+/// Returns the session of a present bundle.
 fn session_of(world: &World, name: &str) -> SessionId {
     let found = world.peers.iter().find(|(_, bundle)| bundle.name == name);
     *found.unwrap().0
 }
 
-/// A file at the writers, checked by the first bundle alone.
+/// Returns a world with a file at the writers, checked by the first bundle alone.
 pub fn world_with_a_file_at_the_writers() -> World {
     let mut world = World::new();
     world.join("First");
@@ -48,7 +48,8 @@ fn a_file_at_the_writers_while_a_bundle_joins_is_judged_again() {
     assert_eq!(world.names_that_judged(1), ["First", "Second"]);
 }
 
-/// Six judged files, of which the first four are at work in vain, so that the others wait.
+/// Returns a world with six judged files. When all are checked again, only four can be active, so
+/// the others wait.
 fn world_that_is_busy() -> World {
     let mut world = World::new();
     world.join("First");
@@ -95,7 +96,8 @@ fn late_words_on_many_cancelled_jobs_are_no_offence() {
         world.prepare(0, true);
         let jobs: Vec<JobId> = world.peers[&session].jobs.iter().copied().collect();
         assert_eq!(jobs.len(), 2);
-        // They are cancelled and given anew, and the bundle's words were under way.
+        // The jobs are cancelled and handed out again while the bundle's messages were on their
+        // way.
         world.step(&Step::Reconfigure(round % 2));
         for job in jobs {
             world.say(session, FromPeer::JobDone { job, micros: 1 });
@@ -184,7 +186,7 @@ fn a_bundle_that_only_the_configuration_names_is_missed_at_once() {
     assert_eq!(world.names_that_judged(0), ["First", "Second"]);
 }
 
-/// A process says hello, and what it offers, if it does.
+/// Lets a process say hello and, optionally, send its catalogue.
 fn comes(world: &mut World, name: &'static str, offer: Option<Catalogue>) {
     world.sessions += 1;
     let session = SessionId(world.sessions);
@@ -221,7 +223,7 @@ fn who_has_not_said_what_it_checks_gets_no_job() {
     world.restart();
     world.write(0);
     world.prepare(0, true);
-    // The journal knows what it offered last; it may offer something else by now.
+    // The journal has the last catalogue of the bundle, but the bundle may offer another one now.
     let session = SessionId(99);
     let hello = hello(session, "Second", 1, None);
     let event = Event::Hello { session, hello };

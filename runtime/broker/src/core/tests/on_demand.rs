@@ -1,4 +1,4 @@
-//! Errands: what clients have checked for themselves alone.
+//! Tests of on-demand checks: checks that clients request only for themselves.
 
 use qcbus_formats::xqar::Level;
 use qcbus_messages::control::Response;
@@ -6,7 +6,8 @@ use qcbus_messages::{Absence, DocumentRole, MissingDocument};
 
 use super::*;
 
-/// A world in which the child of a manifest can be asked, besides a bundle that joined by hand.
+/// Returns a world in which clients can ask the child of a manifest, besides a bundle that joined
+/// by hand.
 fn world_that_can_be_asked() -> World {
     let mut world = World::new();
     world.join("First");
@@ -14,7 +15,7 @@ fn world_that_can_be_asked() -> World {
     world
 }
 
-/// The same, and a client has asked for a file that nobody watches.
+/// Returns the same world with a client that has asked for an unwatched file.
 fn world_with_a_client() -> (World, RequestId) {
     let mut world = world_that_can_be_asked();
     world.write(8);
@@ -22,7 +23,7 @@ fn world_with_a_client() -> (World, RequestId) {
     (world, request_id)
 }
 
-/// Everybody does what there is to do, once; those with errands until they have none.
+/// Performs all pending work several times, so that on-demand checks end.
 fn go_round(world: &mut World) {
     for n in 0..4 {
         world.prepare(n, true);
@@ -274,7 +275,7 @@ fn what_a_client_asked_for_counts_for_nothing_under_another_configuration() {
 
 #[test]
 fn nothing_is_done_for_a_client_that_has_left() {
-    // While its file waits, is read, is checked, or is pooled.
+    // The client leaves while its file waits, is read, is checked, or is pooled.
     for rounds in 0..4 {
         let mut world = world_that_can_be_asked();
         world.write(8);
@@ -328,7 +329,8 @@ fn nobody_is_left_without_an_answer_by_a_broker_that_cannot_finish() {
     world.clients_are_content();
 }
 
-/// A world in which clients ask again as soon as they have an answer, more of them than the child takes at a time.
+/// Returns a world in which clients ask again after each answer. There are more clients than the
+/// child takes at a time.
 fn world_of_busy_clients() -> World {
     let mut world = world_that_can_be_asked();
     for file in [8, 9] {
@@ -340,7 +342,7 @@ fn world_of_busy_clients() -> World {
     world
 }
 
-/// Whatever can be done at once is, and then the child ends one job.
+/// Performs all work that is possible at once. Then the child ends one job.
 fn keep_asking(world: &mut World) {
     for _ in 0..8 {
         world.prepare(0, true);

@@ -1,10 +1,10 @@
-//! Results and published files that somebody else removes.
+//! Tests of results and published files that another process removes.
 
 use super::membership::world_with_a_file_at_the_writers;
 use super::*;
 
 impl World {
-    /// Somebody removes the result of a file, if there is one.
+    /// Removes the result of a file, if there is one.
     pub fn lose(&mut self, file: u8) {
         if !self.journal.contains_key(&file) {
             return;
@@ -48,7 +48,7 @@ fn lost_result_whose_file_is_touched_at_the_last_moment_is_written() {
         world.answer(0);
         world.pass(Duration::from_millis(300));
     }
-    // The writer sees other stamps than were read, and nothing is stored.
+    // The writer finds other stamps than were read, and no result is stored.
     world.step(&Step::Touch(1));
     world.store(0, true);
     world.settle();

@@ -1,4 +1,4 @@
-//! What a simulation of the whole broker sees of the state machine.
+//! A summary of the state machine for the simulation of the whole broker.
 
 use super::super::*;
 use crate::simulation::Summary;

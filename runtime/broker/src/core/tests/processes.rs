@@ -1,4 +1,4 @@
-//! The bundles of a random world: processes that come, speak and go.
+//! The bundles of a random world: processes that join, send messages and leave.
 
 use std::collections::BTreeSet;
 
@@ -19,7 +19,7 @@ impl World {
         }
     }
 
-    /// A process that was started for the child says hello.
+    /// Lets a process that was started for the child say hello.
     pub fn child_joins(&mut self) {
         if !self.launched.is_empty() {
             let it = self.launched.remove(0);
@@ -31,7 +31,7 @@ impl World {
         }
     }
 
-    /// What a process had said before it was killed comes only now; `known`: after its end.
+    /// Delivers the earlier messages of a killed process late. `known` means after its end.
     pub fn child_joins_too_late(&mut self, known: bool) {
         let Some(Launched {
             launch,
@@ -57,7 +57,8 @@ impl World {
         }
     }
 
-    /// One that a former broker started has outlived it. It says that it is of this version.
+    /// Lets a process of a former broker join after it has outlived that broker. It reports this
+    /// version.
     pub fn stale_child_joins(&mut self, version: u8, spec: &ChildSpec) {
         let launch = Launch::first_of(self.generation - 1).next(spec);
         self.join_as(CHILD, version, Some(launch.0));
@@ -107,15 +108,16 @@ impl World {
         }
     }
 
-    /// A bundle goes of its own will, or because it was told to.
+    /// Lets a bundle leave on its own or because it was told to.
     pub fn leave(&mut self, n: u8) {
         let Some(session) = self.nth_peer(n) else {
             return;
         };
         let Process { name, drained, .. } = self.peers[&session];
-        // One that somebody else has replaced leaves nothing.
+        // A bundle that another one has replaced does not change the required set.
         let current = self.state.sessions.contains_key(&session);
-        // Told to go because the broker ends, it must judge when the next one begins.
+        // A bundle that was told to leave because the broker ends is still required at the next
+        // start.
         let current = current && !matches!(self.state.phase, Phase::Leaving(_));
         if current && !(name == CHILD && self.manifest.is_some() && !drained) {
             self.demanded.remove(name);
@@ -123,10 +125,10 @@ impl World {
         self.say(session, FromPeer::Leaving);
     }
 
-    /// The manifest of the child comes, changes or goes.
+    /// Adds, changes or removes the manifest of the child.
     pub fn manifest(&mut self, version: Option<u8>) {
         if version.is_some() {
-            // Its last process may not have left yet: what that one said counts.
+            // Its last process may still be running, so that process's version counts.
             let known = self.state.bundles.get(CHILD);
             let known = known.filter(|it| it.catalogue.is_some());
             let known = known.and_then(|it| it.version.parse().ok());
@@ -146,7 +148,7 @@ impl World {
         self.event(Event::Children { specs });
     }
 
-    /// Somebody takes a bundle off the roster.
+    /// Removes a bundle from the registry.
     pub fn remove(&mut self, name: &'static str) {
         if name != CHILD || self.manifest.is_none() {
             self.demanded.remove(name);
@@ -158,7 +160,7 @@ impl World {
         self.event(Event::RemoveBundle { request_id, name });
     }
 
-    /// What a child's process that has not joined comes to.
+    /// Ends a process of the child that has not joined.
     pub fn child_ends(&mut self, end: ChildEnd) {
         if !self.launched.is_empty() {
             let Launched { launch, .. } = self.launched.remove(0);
@@ -166,7 +168,7 @@ impl World {
         }
     }
 
-    /// A bundle says something of a job, and does not end it.
+    /// Lets a bundle report on a job without ending it.
     pub fn begin(&mut self, n: u8) {
         let Some(session) = self.nth_peer(n) else {
             return;
@@ -203,7 +205,7 @@ impl World {
         );
     }
 
-    /// A bundle ends the job that it has with so many findings of each checker.
+    /// Lets a bundle end its job with this number of findings for each checker.
     pub fn answers_with(&mut self, n: u8, findings: usize) {
         let session = self.nth_peer(n).unwrap();
         let process = self.peers.get_mut(&session).unwrap();
@@ -231,7 +233,7 @@ impl World {
         };
         let process = self.peers.get_mut(&session).unwrap();
         for checker in u32::from(process.begun.remove(&job))..2 {
-            // Some have much to say, so that the room for findings runs out now and then.
+            // Some bundles report more, so that the room for findings is exhausted now and then.
             self.says_on(session, job, checker, usize::from(n % 3));
         }
         self.say(session, FromPeer::JobDone { job, micros: 1 });

@@ -1,4 +1,4 @@
-//! The reporter of a random world: a child that writes what it is told, some time.
+//! The reporter of a random world: a child that writes the results sent to it, with a delay.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -10,24 +10,24 @@ use super::world::World;
 
 pub const REPORTER: &str = "text";
 
-/// What a reporter was told and has not answered.
+/// Request to a reporter that has no answer yet.
 #[derive(Debug, Clone, Copy)]
 enum Letter {
     Result(u8, JobId),
     Gone(u8),
 }
 
-/// Everything about the reporter, its processes, and what the journal knows of it.
+/// State of the reporter, its processes and the journal's knowledge of it.
 #[derive(Default)]
 pub struct Requests {
     /// Whether this world has a reporter.
     pub open: bool,
     processes: BTreeMap<SessionId, VecDeque<Letter>>,
-    /// What lies on the desk: of which job the report on each file is.
+    /// Reports written by the reporter: the job of the report on each file.
     pub reports: BTreeMap<u8, JobId>,
-    /// What was ever written.
+    /// All jobs with a report that was ever written.
     written: BTreeSet<JobId>,
-    /// What the journal has been told.
+    /// Deliveries recorded in the journal: the job of the report on each file.
     pub delivered: BTreeMap<u8, JobId>,
     pub voids: BTreeSet<u8>,
 }
@@ -47,7 +47,7 @@ pub fn reporter() -> ChildSpec {
 }
 
 impl World {
-    /// A world with a reporter.
+    /// Creates a world with a reporter.
     pub fn with_a_reporter() -> World {
         let mut world = World::new();
         world.requests.open = true;
@@ -55,7 +55,7 @@ impl World {
         world
     }
 
-    /// What the reporter and the journal learn of an action.
+    /// Passes an action on to the reporter and the journal.
     pub fn requests_hear(&mut self, action: &Action) {
         match action {
             Action::Deliver {
@@ -74,7 +74,7 @@ impl World {
             Action::Void { session, path, .. } => {
                 let process = self.requests.processes.get_mut(session);
                 let process = process.expect("nothing goes to a closed session");
-                // What is read back only now is not sent any more.
+                // A result that is still to be read back is no longer sent.
                 let file = file_of(path);
                 process.retain(|it| !matches!(it, Letter::Result(it, _) if *it == file));
                 process.push_back(Letter::Gone(file));
@@ -100,7 +100,7 @@ impl World {
         }
     }
 
-    /// The process that was started for the reporter says hello.
+    /// Lets the process that was started for the reporter say hello.
     pub fn reporter_joins(&mut self, launch: Launch) {
         self.sessions += 1;
         let session = SessionId(self.sessions);
@@ -119,7 +119,7 @@ impl World {
         self.event(Event::Hello { session, hello });
     }
 
-    /// The reporter does the next thing that it was told. `heard`: it lives to say so.
+    /// Lets the reporter handle its next request. If `heard` is false, it dies before it answers.
     pub fn report(&mut self, heard: bool) {
         let Some((session, letters)) = self.requests.processes.iter_mut().next() else {
             return;
@@ -129,7 +129,7 @@ impl World {
         let message = match letter {
             None => return,
             Some(Letter::Result(file, job)) => {
-                // It is read back from the disk, where another may lie by now.
+                // The result is read back from the disk. Another one may have replaced it by now.
                 if self.journal.get(&file).map(|it| it.job) != Some(job) {
                     let why = "replaced".to_owned();
                     return self.event(Event::Undeliverable { session, job, why });
@@ -157,13 +157,13 @@ impl World {
         }
     }
 
-    /// Whether the reporter is there and has nothing left to do.
+    /// Checks whether the reporter is there and has nothing left to do.
     pub fn reporter_rests(&self) -> bool {
         let idle = self.requests.processes.values().any(VecDeque::is_empty);
         !self.requests.open || (idle && self.state.all_delivered())
     }
 
-    /// The broker is killed, and with it whatever was under way.
+    /// Simulates that the broker is killed, together with all deliveries under way.
     pub fn requests_restart(&mut self) {
         self.requests.processes.clear();
         for file in &self.requests.voids {
@@ -171,7 +171,7 @@ impl World {
         }
     }
 
-    /// What the journal says that the reporter has of a file.
+    /// Returns the reporter's deliveries of a file according to the journal.
     pub fn delivered(&self, file: u8) -> Vec<(String, Reported)> {
         let job = self.requests.delivered.get(&file);
         job.map(|job| (REPORTER.to_owned(), Reported::Of(*job)))

@@ -1,8 +1,8 @@
-//! Verdicts that rest on those of other files.
+//! Verdicts that depend on the verdicts of other files.
 
 use super::*;
 
-/// File 1 is a scenario on the map 0, as far as the state machine can tell.
+/// Creates a world in which file 1 is a scenario on map 0, as far as the state machine can tell.
 fn world() -> World {
     let mut world = World::new();
     world.join("First");
@@ -10,7 +10,7 @@ fn world() -> World {
     world
 }
 
-/// A scenario and its map, which will be rejected, are with the bundles.
+/// Creates a world in which the bundles have a scenario and its map. The map will be rejected.
 fn both_are_read() -> World {
     let mut world = world();
     world.rejected.insert(0);
@@ -40,7 +40,8 @@ fn a_rejected_map_is_named_whichever_comes_first() {
     }
 }
 
-/// A scenario that is read first has all documents that there may be on the bus, and its map must be read, too.
+/// A scenario is read first and takes all document places of the bus. Its map must be read
+/// nevertheless.
 #[test]
 fn who_waits_for_a_verdict_leaves_room_to_those_that_are_to_come() {
     let mut world = world();
@@ -81,7 +82,7 @@ fn a_map_whose_verdict_is_the_same_has_nobody_judged_again() {
     let before = world.stored.len();
     world.step(&Step::Reconfigure(1));
     world.settle();
-    // Each once, for the configuration.
+    // The new configuration makes each file be judged once.
     assert_eq!(world.stored.len(), before + 2);
 }
 
@@ -90,7 +91,7 @@ fn storing(world: &World) -> Vec<u8> {
     jobs.map(|job| file_of(&job.path)).collect()
 }
 
-/// The bundles answer on all that they have.
+/// Lets the bundles answer all their jobs.
 fn answer(world: &mut World) {
     for _ in 0..8 {
         world.answer(0);
@@ -106,12 +107,12 @@ fn a_scenario_waits_for_its_map_and_not_for_ever() {
     assert_eq!(storing(&world), [0]);
     world.pass(Duration::from_secs(11));
     assert_eq!(storing(&world), [0, 1], "patience has an end");
-    // Its result did not know the map's verdict, and another one does.
+    // The first result did not know the map's verdict. The second one does.
     world.settle();
     assert_eq!(world.said_of_maps[&1], [0]);
 }
 
-/// A run that has an end, whose files are still being looked for.
+/// Creates a world with a run that ends (`once`). The search for its files is still under way.
 fn run() -> World {
     let mut world = World::new();
     world.state = fresh_state(2, 0);
@@ -170,7 +171,8 @@ fn client_hears_of_a_scenario_only_after_its_map() {
     world.wait(1);
     answer(&mut world);
     world.pass(Duration::from_secs(11));
-    // The scenario is stored without its map: undetermined, and nobody is told so.
+    // The scenario is stored without its map's verdict. It is undetermined, and no client gets this
+    // verdict.
     world.store(1, true);
     assert_eq!(world.judged[&1].1, Verdict::Undetermined);
     assert!(!world.waiting.is_empty(), "its map has no verdict yet");
@@ -186,7 +188,8 @@ fn verdict_that_a_killed_broker_left_behind_is_given_anew() {
     world.write(1);
     world.settle();
     assert_eq!(world.judged[&1].1, Verdict::Accepted);
-    // The map is rejected under another configuration, and the broker is killed before it comes to the scenario.
+    // The map is rejected under another configuration. The broker is killed before it judges the
+    // scenario again.
     let map = world.journal.get_mut(&0).unwrap();
     (map.verdict, map.own, map.own_errors) = (Verdict::Rejected, Verdict::Rejected, 1);
     world.restart();

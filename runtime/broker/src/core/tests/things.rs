@@ -1,4 +1,4 @@
-//! What a random world is made of: files, bytes, bundles.
+//! Building blocks of a random world: files, contents, bundles.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,10 +14,10 @@ use qcbus_messages::{Catalogue, CheckerInfo, Digest, Hello, PROTOCOL_VERSION, Ro
 
 pub const CAPACITY: usize = 2;
 
-/// The bundle that a manifest brings; the others join by hand.
+/// Name of the bundle that a manifest adds. The other bundles join by hand.
 pub const CHILD: &str = "Child";
 
-/// What the process of a bundle says first.
+/// Returns the first message of a bundle's process.
 pub fn hello(session: SessionId, name: &str, version: u8, launch: Option<u64>) -> Hello {
     Hello {
         protocol: PROTOCOL_VERSION,
@@ -46,7 +46,8 @@ pub fn child(version: u8) -> ChildSpec {
     }
 }
 
-/// What its manifest brings looks and has no weight.
+/// Name of the bundle that the shadow's manifest adds. It checks files but does not affect
+/// verdicts.
 pub const SHADOW: &str = "Shadow";
 
 pub fn shadow(version: u8) -> ChildSpec {
@@ -67,21 +68,22 @@ pub fn fresh_state(generation: u64, configuration: u8) -> State {
         max_preparing: 2,
         max_storing: 2,
         max_findings_bytes: 1000,
-        // In random worlds bundles change all the time; `flapping.rs` says what comes of that.
+        // Bundles change all the time in random worlds. `flapping.rs` tests the effect of such
+        // changes.
         changes_forgiven: u32::MAX,
         ..Settings::default()
     };
     State::new(settings, digest(configuration.into()), in_force.demand())
 }
 
-/// A jury as it can be compared.
+/// Returns a required set in a form that can be compared.
 pub fn named(required_set: &RequiredSet) -> Vec<(String, Option<VersionDigest>)> {
     let required_bundle = |it: &RequiredBundle| (it.name.clone(), it.version_digest);
     required_set.0.iter().map(required_bundle).collect()
 }
 
-/// The first six are checked, the next two are only dependencies of them; of what comes then nobody knows but
-/// clients that ask for it, and of the last of them it is a part.
+/// Returns the path of a file. Files 0 to 5 are checked. Files 6 and 7 are only dependencies of
+/// them. Later files are known only to clients that ask for them. File 10 is a part of these.
 pub fn path_of(file: u8) -> Arc<Path> {
     let ending = if matches!(file, 6 | 7 | 10) {
         "part"
@@ -91,8 +93,8 @@ pub fn path_of(file: u8) -> Arc<Path> {
     Path::new(&format!("/farm/{file}.{ending}")).into()
 }
 
-/// What a verdict depends on besides the file: on another that has a verdict itself, on a part of
-/// its own, on a part that it shares, on all of these, or on nothing.
+/// Returns the dependencies of a verdict besides the file itself. They are a file with its own
+/// verdict, a private part, a shared part, all of these, or none.
 pub fn dependencies_of(file: u8) -> &'static [u8] {
     match file {
         1 => &[0, 6],
@@ -127,10 +129,10 @@ pub fn digest(number: u64) -> Digest {
     digest
 }
 
-/// Content from here on has an error in it.
+/// Contents with this number or a higher one have an error.
 pub const BAD: u64 = 1 << 40;
 
-/// Whether the bytes with this digest have an error in them.
+/// Checks whether the bytes with this digest have an error.
 pub fn is_bad(digest: Digest) -> bool {
     let first = digest.0.first_chunk().copied();
     first.is_some_and(|it| u64::from_le_bytes(it) >= BAD)

@@ -1,4 +1,4 @@
-//! Shadows: they look at everything, and nothing comes of it.
+//! Shadows: they check every file and do not affect any verdict.
 
 use qcbus_messages::control::{Trial, TrialCounts};
 
@@ -11,20 +11,21 @@ use std::sync::Arc;
 use std::time::Duration;
 
 impl World {
-    /// The manifest of the shadow comes, changes or goes.
+    /// Adds, changes or removes the manifest of the shadow.
     pub fn shadow_is(&mut self, version: Option<u8>) {
         self.shadow = version;
         self.children_are(self.manifest);
     }
 
-    /// Whether a shadow that is wanted has nothing left to try.
+    /// Checks whether the shadow has no trial left, or whether no shadow is configured.
     pub fn shadow_rests(&self) -> bool {
         let counts = self.state.trial_counts(SHADOW);
         let rests = counts.is_some_and(|it| it.waiting == 0) && self.is_there(SHADOW);
         self.shadow.is_none() || rests
     }
 
-    /// A shadow has been asked about every file, once the world has calmed down, or was killed by it.
+    /// Asserts that the shadow has tried every file or was killed by it. Call this when the world
+    /// is at rest.
     pub fn all_is_tried(&self) {
         let counts = self.state.trial_counts(SHADOW);
         assert_eq!(counts.is_some(), self.shadow.is_some());
@@ -49,7 +50,7 @@ impl World {
         peers.map(|it| it.jobs.len()).sum()
     }
 
-    /// Until the shadow has the trial of a file.
+    /// Waits until the shadow has the trial of a file.
     fn until_tried(&mut self) {
         for _ in 0..200 {
             if self.jobs_at(SHADOW) > 0 {
@@ -63,7 +64,7 @@ impl World {
 }
 
 impl World {
-    /// Those who are there do all that there is to do; nobody else comes but a shadow that was started again.
+    /// Lets the connected bundles finish all work. Only a restarted shadow may join.
     fn comes_to_rest(&mut self) {
         for _ in 0..500 {
             for n in 0..4 {
@@ -83,7 +84,7 @@ impl World {
     }
 }
 
-/// What a shadow finds as the store would tell it: an error where it has anything to say.
+/// Returns the findings of a shadow as the store reports them: an error if it reported any issue.
 pub fn found_in(job: &FinishedJob) -> TrialEnd {
     let said: Vec<_> = job.bundles.iter().map(TaskOutcome::said).collect();
     let names: Vec<&str> = said.iter().map(|it| &*it.name).collect();
@@ -103,7 +104,7 @@ pub fn found_in(job: &FinishedJob) -> TrialEnd {
     }
 }
 
-/// A world with a bundle that judges, and a shadow that is there.
+/// Creates a world with a judging bundle and a connected shadow.
 fn world_with_a_shadow() -> World {
     let mut world = World::new();
     world.join("First");
@@ -220,7 +221,7 @@ fn what_it_would_change_is_told_and_follows_the_files() {
     world.until_judged(2);
     world.until_tried();
     let process = world.peer(SHADOW);
-    // Of the first it finds nothing, of the second an error.
+    // The shadow finds nothing in the first file and an error in the second.
     world.answers_with(process, 0);
     world.pool(0, true);
     world.tell_pooled();
@@ -277,7 +278,8 @@ fn a_shadow_that_comes_has_no_other_try_anything_again() {
     assert_eq!((waiting("Another"), world.trials().0), (1, before));
 }
 
-/// After a restart a shadow may be ready before the watcher has seen the files whose verdicts the journal knows.
+/// After a restart a shadow may be ready before the watcher has seen the files. The journal already
+/// knows their verdicts.
 #[test]
 fn shadow_that_is_ready_before_the_files_are_seen_tries_them() {
     let seen: [fn(Arc<Path>, Stamp) -> Event; 2] = [
@@ -316,7 +318,7 @@ fn who_becomes_a_shadow_need_not_judge_and_who_is_none_any_more_must() {
         shadow: false,
         ..shadow(1)
     };
-    // From now on it must judge, also while its next process is not there.
+    // From now on the bundle must judge, even while its next process is missing.
     world.event(Event::Children {
         specs: vec![judge.clone()],
     });

@@ -1,11 +1,11 @@
-//! Files that are being written to.
+//! Files that are still being written.
 
 use qcbus_messages::control::Response;
 
 use super::words::{answers, comes_of, waits};
 use super::*;
 
-/// File 1 has another stamp, and its writer is not done.
+/// Gives file 1 another stamp while its writer is not finished.
 fn write_slowly(world: &mut World) -> Vec<Action> {
     world.stamps += 1;
     let stamp = Some(stamp(world.stamps));
@@ -65,7 +65,7 @@ fn who_waits_for_a_file_that_goes_unfinished_is_told_so() {
     assert!(matches!(answers(&gone)[..], [Response::Unwatched { .. }]));
 }
 
-/// File 1 depends on file 0, and both have their verdicts.
+/// Creates a world in which file 1 depends on file 0. Both have their verdicts.
 fn two_judged() -> World {
     let mut world = judged_world();
     world.write(0);

@@ -1,11 +1,11 @@
-//! What is said, by bundles and to clients, and what comes of it.
+//! Messages of bundles and answers to clients, and their effects.
 
 use qcbus_messages::control::Response;
 use qcbus_messages::{Hello, PROTOCOL_VERSION};
 
 use super::*;
 
-/// Everything that comes of an event; the world goes on.
+/// Handles an event and returns all its actions. The world does not execute them.
 pub(super) fn comes_of(world: &mut World, event: Event) -> Vec<Action> {
     world.state.handle(world.now, event)
 }
@@ -193,7 +193,7 @@ fn a_file_that_is_back_to_what_was_judged_is_written_again_if_another_result_was
     world.put(0, other);
     world.prepare(0, true);
     world.answer(0);
-    // The result lies there, and only the journal could not be written.
+    // The result file is written. Only the journal could not be written.
     world.store(0, false);
     world.put(0, content);
     world.pass(world.state.settings.retry_after);
@@ -255,7 +255,7 @@ fn what_a_moment_hinders_is_tried_again_with_growing_pauses_and_then_said() {
     assert!(world.preparing.is_empty());
     let finished = &world.storing[0];
     assert_eq!(finished.unreadable.as_deref(), Some("too many open files"));
-    // When it is read the next time, and can be, nothing of this is left.
+    // The next successful reading clears the failure.
     let job = world.storing.remove(0).job;
     let outcome = StoreOutcome::Stale;
     world.event(Event::Stored { job, outcome });
@@ -287,7 +287,7 @@ fn a_file_without_room_is_undetermined_when_nothing_moves_for_long() {
     assert!(world.now >= begun + limit);
     let why = "full; nothing became free for 60 seconds";
     assert_eq!(world.storing[0].unreadable.as_deref(), Some(why));
-    // What waited as long does not wait as long again.
+    // A file that has waited as long does not wait as long again.
     let (job, _) = world.preparing.pop().unwrap();
     world.event(Event::Prepared {
         job,
@@ -383,7 +383,7 @@ fn who_waits_for_a_file_that_goes_while_it_is_read_anew_is_not_told_what_it_was(
     let mut world = judged_world();
     world.write(1);
     world.wait(1);
-    // Nobody tells; who reads it finds nothing.
+    // No event reports the removal. The reader finds no file.
     world.there.remove(&path_of(1));
     let (job, _) = world.preparing.remove(0);
     let result = Err(PrepareFailure::Vanished);
@@ -395,7 +395,8 @@ fn who_waits_for_a_file_that_goes_while_it_is_read_anew_is_not_told_what_it_was(
     );
 }
 
-/// Whoever asks while a result is being written has what it rests on looked at, and not what the one before did.
+/// While a result is being written, a client's request looks at the inputs of this result, and not
+/// at those of the previous one.
 #[test]
 fn what_a_verdict_on_its_way_rests_on_is_known() {
     let mut world = World::new();
@@ -423,7 +424,7 @@ fn who_waits_for_a_file_that_is_back_is_not_told_that_it_has_gone() {
     let mut world = judged_world();
     world.write(1);
     let (job, _) = world.preparing.remove(0);
-    // Who read it found nothing, and now it is back.
+    // The reader found no file, but now the file is back.
     world.write(1);
     world.wait(1);
     let result = Err(PrepareFailure::Vanished);
@@ -455,7 +456,7 @@ fn whoever_waits_comes_before_those_for_whom_nobody_does() {
     world.until_judged(6);
     world.join("Second");
     let under_way = world.preparing[0].1;
-    // One that rests on no other, whose verdict would have to come first.
+    // This file depends on no other file that needs a verdict first.
     let alone = |file: &u8| dependencies_of(*file).iter().all(|it| *it >= 6);
     let mut others = (0..6).rev().filter(|file| *file != under_way);
     let last = others.find(alone).unwrap();
@@ -475,7 +476,7 @@ fn who_waits_for_what_is_not_there_is_not_told_what_was() {
         let mut world = judged_world();
         let request_id = RequestId(7);
         world.waiting.insert(request_id, 1);
-        // Its directory is away, so the verdict is kept.
+        // The directory is away, so the verdict is kept.
         world.event(Event::Wait {
             request_id,
             path: path_of(1),
@@ -511,7 +512,7 @@ fn what_a_process_said_before_it_died_is_not_said_twice() {
 
 #[test]
 fn no_more_is_read_than_there_is_room_for() {
-    // All together, being read, documents of all.
+    // Limit of documents, and files that are in work at the same time.
     for (documents, at_once) in [(48, 4), (3, 3)] {
         let mut world = World::new();
         world.state.settings.max_documents = documents;
@@ -585,7 +586,7 @@ fn a_verdict_that_stands_after_all_is_not_told_of_what_is_not_there() {
     };
     let answered = |it: &Action| matches!(it, Action::Answer { .. });
     assert!(!comes_of(&mut world, waits).iter().any(answered));
-    // Its file waits for another judgement, which nobody wants any more when its turn comes.
+    // The file waits for another judgement. When it can start, the judgement is no longer required.
     world.state.settings.max_active = 0;
     world.join("Third");
     world.remove("Third");

@@ -1,4 +1,4 @@
-//! A world around the state machine: it answers actions when it pleases, and knows what must be so.
+//! A world around the state machine: it answers actions at any time and checks the invariants.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
@@ -12,75 +12,75 @@ use super::reporting::Requests;
 use super::things::*;
 use qcbus_messages::{JobId, Verdict};
 
-/// A world around the state machine: it answers actions when it pleases.
+/// World around the state machine that answers actions at any time.
 pub struct World {
     pub state: State,
     pub now: Duration,
-    /// What is there, each with the number of its stamp.
+    /// Existing files with the number of their stamp.
     pub there: HashMap<Arc<Path>, u64>,
-    /// The bytes behind each stamp: a file that is touched has the same under a new one.
+    /// Content behind each stamp. A touched file has the same content under a new stamp.
     pub contents: HashMap<u64, u64>,
     pub stamps: u64,
     pub preparing: Vec<(JobId, u8)>,
-    /// How long each job's file had waited when it was to be read.
+    /// Waiting time of each job's file before it was read.
     pub waited: BTreeMap<JobId, Duration>,
     pub storing: Vec<FinishedJob>,
     pub stored: Vec<u8>,
-    /// Files whose results were removed by others, and have not been written again.
+    /// Files with a result that was removed by others and is not written again yet.
     pub lost: BTreeSet<u8>,
     pub peers: BTreeMap<SessionId, Process>,
     pub sessions: u64,
     pub judged: BTreeMap<u8, (Vec<Input>, Verdict)>,
-    /// The bundles whose judgement is in the verdict of each file, as stored.
+    /// Bundles with a judgement in the stored verdict of each file.
     pub judges: BTreeMap<u8, Vec<String>>,
     pub released: BTreeSet<JobId>,
-    /// Who must judge, and as which version: what the state machine has to keep to.
+    /// Required bundles with their versions. The state machine must comply with them.
     pub demanded: BTreeMap<String, Option<u8>>,
-    /// The version of each bundle's next process.
+    /// Version of each bundle's next process.
     pub versions: BTreeMap<&'static str, u8>,
-    /// Children that were started and have not joined.
+    /// Children that were started and have not joined yet.
     pub launched: Vec<Launched>,
-    /// Those of them that were killed. What they have said before may still come.
+    /// Children of `launched` that were killed. Their earlier messages may still arrive.
     pub dying: Vec<Launched>,
     pub killed: Vec<Launch>,
-    /// Which version the manifest of the child brings, if it is there.
+    /// Version in the manifest of the child, if the manifest exists.
     pub manifest: Option<u8>,
-    /// The same of the shadow.
+    /// Version in the manifest of the shadow, if the manifest exists.
     pub shadow: Option<u8>,
-    /// What the journal has been told.
+    /// Required bundles recorded in the journal.
     pub members: BTreeMap<String, Member>,
     pub journal: BTreeMap<u8, Judged>,
     pub generation: u64,
     pub reconfigured: u8,
     pub request_ids: u64,
     pub waiting: BTreeMap<RequestId, u8>,
-    /// Until when those wait who do not wait for ever.
+    /// Deadlines of the requests that have a timeout.
     pub until: BTreeMap<RequestId, Duration>,
-    /// What writers have done and the state machine has not heard.
+    /// Outcomes of writers that the state machine has not received yet.
     pub told: Vec<((u8, JobId), StoreOutcome)>,
-    /// What is watched because verdicts depend on it.
+    /// Files watched because verdicts depend on them.
     pub watched: BTreeSet<u8>,
     pub gate: Published,
     pub requests: Requests,
     pub clients: Clients,
-    /// Why bundles have failed on each file, as stored.
+    /// Reasons why bundles failed on each file, as stored.
     pub failures: BTreeMap<u8, Vec<String>>,
     /// Files with an error in them.
     pub rejected: BTreeSet<u8>,
-    /// The rejected maps that the result of each file names, as stored.
+    /// Rejected maps named in the result of each file, as stored.
     pub said_of_maps: BTreeMap<u8, Vec<u8>>,
-    /// Whether files are so young that their stamps prove nothing.
+    /// Whether files are too young for their stamps to prove anything.
     pub young: bool,
-    /// How often the state machine has ended.
+    /// Number of times that the state machine has ended.
     pub stopped: u8,
 }
 
-/// A process that was started and has not joined.
+/// A process that was started and has not joined yet.
 #[derive(Clone)]
 pub struct Launched {
     pub launch: Launch,
     pub name: &'static str,
-    /// Of the manifest that it was started by.
+    /// Version in the manifest that started the process.
     pub version: u8,
 }
 
@@ -88,14 +88,14 @@ pub struct Launched {
 pub struct Process {
     pub name: &'static str,
     pub jobs: BTreeSet<JobId>,
-    /// Those of them of which it has said something.
+    /// Jobs of `jobs` on which the process has reported something.
     pub begun: BTreeSet<JobId>,
-    /// It was told to finish and go.
+    /// Whether the process was told to finish and leave.
     pub drained: bool,
 }
 
 impl World {
-    /// One in which a bundle has a job.
+    /// Creates a world in which a bundle has a job.
     pub fn at_work() -> World {
         let mut world = World::new();
         world.join("First");
@@ -179,7 +179,7 @@ impl World {
         }
     }
 
-    /// Who must judge, each as what it is.
+    /// Returns the required bundles with their version digests.
     pub fn expected_set(&self) -> Vec<(String, Option<VersionDigest>)> {
         let version_digest = |(name, version): (&String, &Option<u8>)| {
             let version_digest = version.map(|it| {
@@ -195,7 +195,7 @@ impl World {
         self.put(file, self.stamps + 1);
     }
 
-    /// The same bytes under a new stamp.
+    /// Gives a file a new stamp with the same bytes.
     pub fn touch(&mut self, file: u8) {
         if let Some(number) = self.there.get(&path_of(file)) {
             self.put(file, self.contents[number]);
@@ -205,23 +205,23 @@ impl World {
     pub fn put(&mut self, file: u8, content: u64) {
         self.lay(file, content);
         if file >= 8 {
-            // Nobody watches it.
+            // This file is not watched.
             return self.clients_look();
         }
         self.find(file);
     }
 
-    /// A file lies there that nobody has found yet.
+    /// Creates a file that is not found yet.
     pub fn lay(&mut self, file: u8, content: u64) {
         self.stamps += 1;
         self.contents.insert(self.stamps, content);
         self.there.insert(path_of(file), self.stamps);
     }
 
-    /// A file that lies there is found.
+    /// Reports an existing file to the state machine.
     pub fn find(&mut self, file: u8) {
         let (path, stamp) = (path_of(file), stamp(self.there[&path_of(file)]));
-        // As the engine does with what lies outside of the watched directories.
+        // The engine does the same with files outside of the watched directories.
         self.event(if file == 7 {
             Event::Touched { path, stamp }
         } else {
@@ -281,7 +281,7 @@ impl World {
         }
     }
 
-    /// What reading a file now would give.
+    /// Returns the inputs that reading a file now would give.
     pub fn inputs(&self, file: u8) -> Vec<Input> {
         let others = dependencies_of(file).iter();
         let all = std::iter::once(&file).chain(others);
@@ -298,7 +298,7 @@ impl World {
         );
     }
 
-    /// Lets the bundles that are there work until so many files are judged.
+    /// Lets the connected bundles work until this number of files is judged.
     pub fn until_judged(&mut self, files: usize) {
         for _ in 0..100 {
             self.prepare(0, true);
@@ -311,7 +311,7 @@ impl World {
         panic!("{files} are not judged: {:?}", self.judged);
     }
 
-    /// Lets them work until so many results are stored.
+    /// Lets the bundles work until this number of results is stored.
     pub fn until_stored(&mut self, results: usize) {
         for _ in 0..100 {
             if self.stored.len() >= results {
@@ -325,7 +325,7 @@ impl World {
         panic!("only {:?} are stored", self.stored);
     }
 
-    /// Everybody is there and does something.
+    /// Connects all bundles and lets every participant do some work.
     fn go_on(&mut self) {
         self.join("First");
         self.join("Second");
@@ -341,7 +341,7 @@ impl World {
         self.pass(Duration::from_millis(300));
     }
 
-    /// The broker is told to stop.
+    /// Tells the broker to stop, and waits for its end.
     pub fn drain(&mut self) {
         self.event(Event::Drain);
         for _ in 0..2000 {
@@ -353,7 +353,7 @@ impl World {
         panic!("it does not stop: {:#?}", self.state.jobs);
     }
 
-    /// Lets everything that is under way come to its end, with both bundles there.
+    /// Finishes all work under way while both bundles are connected.
     pub fn settle(&mut self) {
         for _ in 0..2000 {
             self.go_on();

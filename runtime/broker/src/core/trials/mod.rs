@@ -1,11 +1,12 @@
-//! Trials: what shadows find. A *shadow* is a bundle of a manifest that looks at every file and has no weight in any
-//! verdict, so that somebody sees what it would change before it counts.
+//! Trials: the findings of shadows. A *shadow* is a bundle of a manifest that checks every file and
+//! has no weight in any verdict. It shows its effect before it counts.
 //!
-//! A trial is an errand of the broker's own. It begins after the verdict on its file has been stored, one at a time for
-//! each shadow, and gives way to everything else: it takes no place among the jobs, holds up no findings, and ends when
-//! the bus has no room for others. Nothing of it is in a result, in the journal or behind the gate. All that is known
-//! of trials is in memory, and the results of those that found something in the directory of state; a broker that is
-//! started anew tries everything again.
+//! A trial is an on-demand check of the broker itself. It begins after the verdict on its file has
+//! been stored. Each shadow has one trial at a time, and all other work takes precedence. A trial
+//! takes no job place, delays no findings, and ends if the bus has no room for other jobs. It
+//! leaves no trace in results, in the journal or behind the gate. The state of trials is in memory
+//! only. The results of trials with findings are in the state directory. A restarted broker repeats
+//! all trials.
 
 mod told;
 
@@ -25,42 +26,43 @@ use super::required_set::{Requirement, VersionDigest};
 use super::types::RequestId;
 use super::{Actions, Phase, State};
 
-/// Tickets of clients count up from 1, those of trials from here.
+/// First request id of trials. The request ids of clients count up from 1.
 const FIRST_REQUEST_ID: u64 = 1 << 63;
 
-/// While files wait for their verdicts, the pause between two trials of a shadow: it gets on all the same where a farm
-/// never rests.
+/// Pause between two trials of a shadow while files wait for their verdicts. Thus a shadow
+/// progresses even under permanent load.
 const PAUSE: Duration = Duration::from_millis(500);
 
-/// The pause after a trial that was not to be.
+/// Pause after a trial that could not be done.
 const PUT_BACK_PAUSE: Duration = Duration::from_secs(1);
 
-/// Deaths of a shadow with one file, until that is not tried again.
+/// Number of deaths of a shadow with one file after which the file is not retried.
 const DEATHS: u8 = 2;
 
-/// What a shadow found in a file.
+/// Findings of a shadow in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TrialEnd {
-    /// What it adds to the verdict of others: rejected by an error, undetermined by a checker that failed, else nothing.
+    /// Effect on the verdict of the required bundles. An error rejects, a failed checker makes it
+    /// undetermined, otherwise there is none.
     pub adds: Verdict,
-    /// The verdict if nobody else judged.
+    /// Verdict if no other bundle judged.
     pub alone: Verdict,
     /// Its issues by level: errors, warnings, information.
     pub counts: [u64; 3],
-    /// Which of its checkers failed, and why.
+    /// Its failed checkers, each with the reason.
     pub why: Vec<String>,
-    /// Where its result lies; nothing where it found nothing.
+    /// Path of its result. `None` if there are no findings.
     pub result: Option<PathBuf>,
 }
 
 impl RequestId {
-    /// Whether it is of no client, but of a trial of the broker's own.
+    /// Checks whether the id belongs to a trial of the broker instead of a client.
     pub(super) fn is_trial(self) -> bool {
         self.0 >= FIRST_REQUEST_ID
     }
 }
 
-/// The shadows that are wanted, by name.
+/// The wanted shadows, by name.
 #[derive(Debug, Default)]
 pub(super) struct Trials {
     shadows: BTreeMap<String, Shadow>,
@@ -69,17 +71,17 @@ pub(super) struct Trials {
 
 #[derive(Debug, Default)]
 struct Shadow {
-    /// As what it has tried.
+    /// Version digest that its trials belong to.
     version_digest: Option<VersionDigest>,
     waiting: VecDeque<Arc<Path>>,
-    /// The same, to be found.
+    /// Set of the same paths for fast lookup.
     waits: HashSet<Arc<Path>>,
     under_way: Option<(RequestId, Arc<Path>)>,
-    /// How often it has died in a row with the file that is first in line.
+    /// Number of consecutive deaths with the first file in the queue.
     deaths: u8,
     tried: BTreeMap<Arc<Path>, Result<TrialEnd, String>>,
     not_before: Duration,
-    /// Before that only when nobody waits.
+    /// Until this time trials start only if no file waits.
     pause_until: Duration,
 }
 
@@ -111,7 +113,7 @@ impl Shadow {
 }
 
 impl Trials {
-    /// How many are under way.
+    /// Returns the number of active trials.
     pub fn under_way(&self) -> usize {
         let shadows = self.shadows.values();
         shadows.filter(|it| it.under_way.is_some()).count()
@@ -133,12 +135,12 @@ impl Trials {
 }
 
 impl State {
-    /// Whether a bundle is wanted as a shadow.
+    /// Checks whether a bundle is a shadow.
     pub(super) fn is_shadow(&self, name: &str) -> bool {
         self.children.get(name).is_some_and(|it| it.spec.shadow)
     }
 
-    /// The shadow that a job is a trial of, if it is one.
+    /// Returns the shadow of a trial job, or `None` for other jobs.
     pub fn tried_out(&self, job: JobId) -> Option<&str> {
         let on_demand = self.jobs.get(&job)?.on_demand.as_ref()?;
         let name = on_demand
@@ -148,7 +150,8 @@ impl State {
         name.map(String::as_str)
     }
 
-    /// The children are others: who is a shadow by now need not judge, and who no longer is one is forgotten as such.
+    /// Applies a change of the children. New shadows are not required any more, and the trials of
+    /// former shadows are discarded.
     pub(super) fn follow_shadows(&mut self, actions: &mut Actions) {
         let children = self.children.iter();
         let wanted = children.filter(|(_, it)| it.spec.shadow);
@@ -173,7 +176,8 @@ impl State {
         }
     }
 
-    /// A shadow has said what it checks: unless it has tried everything as this already, it begins.
+    /// Starts the trials of a shadow that has sent its catalogue, unless it has done them in this
+    /// version.
     pub(super) fn shadow_is_ready(
         &mut self,
         name: &str,
@@ -203,13 +207,13 @@ impl State {
         });
     }
 
-    /// A file has a verdict: the shadows are to look at it. Whether they take such files is asked when it is their turn,
-    /// for one that is away has not said so.
+    /// Queues a file with a new verdict for the shadows. The kind of file is checked later, because
+    /// a disconnected shadow has not sent its catalogue.
     pub(super) fn let_shadows_try(&mut self, file: FileId) {
         let Some(entry) = self.files.get(file) else {
             return;
         };
-        // One that has never said what it checks gets all files when it does.
+        // A shadow that has never sent its catalogue gets all files when it does.
         let ready = self.trials.shadows.values_mut();
         for shadow in ready.filter(|it| it.version_digest.is_some()) {
             shadow.tried.remove(&entry.path);
@@ -217,7 +221,7 @@ impl State {
         }
     }
 
-    /// A file has gone, and with it what was found in it.
+    /// Discards the trials of a removed file.
     pub(super) fn forget_trials(&mut self, path: &Arc<Path>, actions: &mut Actions) {
         for (name, shadow) in &mut self.trials.shadows {
             if shadow.forget(path) {
@@ -229,7 +233,8 @@ impl State {
         }
     }
 
-    /// What a shadow has to look at in files of a kind; empty when that is nothing, or nobody knows.
+    /// Returns the requirements of a shadow for files of a kind. They are empty if it checks none
+    /// of them or if its catalogue is unknown.
     pub(super) fn requirements_of_trial(
         &self,
         names: &[String],
@@ -243,7 +248,7 @@ impl State {
         names.iter().filter_map(requirement).collect()
     }
 
-    /// Begins the trials whose time it is.
+    /// Begins all due trials.
     pub(super) fn pump_trials(&mut self, actions: &mut Actions) {
         if self.trials.shadows.is_empty() || self.phase != Phase::Running || !self.may_judge() {
             return;
@@ -261,7 +266,7 @@ impl State {
         }
     }
 
-    /// Begins with the first file in line that has a verdict and is at rest.
+    /// Begins a trial of the first queued file that has a verdict and is idle.
     fn begin_trial(&mut self, name: &str, actions: &mut Actions) {
         let waiting = self
             .trials
@@ -276,7 +281,7 @@ impl State {
                 return;
             };
             let entry = self.files.id(&path).and_then(|id| self.files.get(id));
-            // One without a verdict is to be tried when it has got one.
+            // A file without a verdict is queued when it gets one.
             let Some(entry) = entry.filter(|it| it.present && it.judged.is_some()) else {
                 continue;
             };
@@ -307,13 +312,13 @@ impl State {
             self.on_demand_checks.insert(request_id, id);
             return self.take(id, actions);
         }
-        // None of them is at rest.
+        // No queued file is idle.
         if let Some(shadow) = self.trials.shadows.get_mut(name) {
             shadow.not_before = self.now + PAUSE;
         }
     }
 
-    /// The shadow of a trial has answered, or was not to be asked.
+    /// Handles the answer of a trial's shadow, or a task that could not be sent.
     pub(super) fn pool_trial(&mut self, id: JobId, actions: &mut Actions) {
         let Some(job) = self.jobs.get(&id) else {
             return;
@@ -324,7 +329,7 @@ impl State {
         };
         let mut tasks = job.tasks.values();
         let Some(task) = tasks.next().filter(|task| !task.missing) else {
-            // It is not there: its file waits for it.
+            // The shadow is missing, so its file waits for it.
             return self.end_job(id, actions);
         };
         match failed(&task.state) {
@@ -336,7 +341,7 @@ impl State {
         }
     }
 
-    /// A trial has come to its end.
+    /// Handles the end of a trial.
     pub(super) fn trial_ended(&mut self, request_id: RequestId, end: Result<TrialEnd, String>) {
         let now = self.now;
         let Some(shadow) = self.trials.of(request_id) else {
@@ -347,13 +352,14 @@ impl State {
         };
         shadow.deaths = 0;
         shadow.pause_until = now + PAUSE;
-        // One that was judged again meanwhile is in line again, and one that has gone is of no interest.
+        // A file with a new verdict is already queued again, and the trial of a removed file is
+        // discarded.
         if self.files.id(&path).is_some() && !shadow.waits.contains(&path) {
             shadow.tried.insert(path, end);
         }
     }
 
-    /// A trial was not to be; its file is the next.
+    /// Returns the file of a trial that could not be done to the front of the queue.
     pub(super) fn put_trial_back(&mut self, request_id: RequestId) {
         let now = self.now;
         if let Some(shadow) = self.trials.of(request_id)
@@ -364,7 +370,7 @@ impl State {
         }
     }
 
-    /// A shadow has died with the file of a trial. Whether it is tried again.
+    /// Handles the death of a shadow during a trial. Returns whether the file is retried.
     pub(super) fn try_again(&mut self, id: JobId, actions: &mut Actions) -> bool {
         let on_demand = self.jobs.get(&id).and_then(|job| job.on_demand.as_ref());
         let Some(request_id) = on_demand.map(|it| it.request_id).filter(|it| it.is_trial()) else {
@@ -382,7 +388,7 @@ impl State {
         true
     }
 
-    /// There is no room on the bus for a job: those of trials give theirs back.
+    /// Ends the trials if a job finds no room on the bus.
     pub(super) fn trials_give_way(&mut self, to: JobId, actions: &mut Actions) {
         let is_trial = self.jobs.get(&to).is_some_and(|job| job.is_trial());
         if !is_trial {
@@ -390,7 +396,7 @@ impl State {
         }
     }
 
-    /// Ends the trials that are under way; their files wait again.
+    /// Ends all active trials. Their files are queued again.
     pub(super) fn end_trials(&mut self, actions: &mut Actions) {
         let names: Vec<String> = self.trials.shadows.keys().cloned().collect();
         for name in names {

@@ -1,4 +1,4 @@
-//! What is told of trials: which verdicts would be others if a shadow judged as well.
+//! Reports of trials: the verdicts that would change if a shadow judged as well.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,11 +9,11 @@ use qcbus_messages::control::{Trial, TrialCounts};
 use super::TrialEnd;
 use crate::core::State;
 
-/// Trials that are told one by one.
+/// Maximum number of trials that are listed individually.
 const TOLD: usize = 1000;
 
 impl State {
-    /// How the trials of a bundle stand; `None` when it is no shadow.
+    /// Returns the trial counts of a bundle, or `None` if it is not a shadow.
     pub(in crate::core) fn trial_counts(&self, name: &str) -> Option<TrialCounts> {
         let shadow = self.trials.shadows.get(name)?;
         let mut counts = TrialCounts {
@@ -33,7 +33,8 @@ impl State {
         Some(counts)
     }
 
-    /// The trials of a shadow that change something, or failed, or found anything; `None` when there is no such shadow.
+    /// Returns the trials of a shadow that change a verdict, failed or have findings. Returns
+    /// `None` if the shadow does not exist.
     pub fn trials(&self, name: &str) -> Option<(TrialCounts, Vec<Trial>)> {
         let counts = self.trial_counts(name)?;
         let tried = self.trials.shadows.get(name)?.tried.iter();
@@ -44,7 +45,7 @@ impl State {
                 || it.errors + it.warnings + it.information > 0
         };
         let mut told: Vec<Trial> = told.filter(of_interest).collect();
-        // What would change first; of each, in the order of the paths.
+        // Failures and changes come first, each sorted by path.
         told.sort_by_key(|it| (it.failure.is_none(), it.would == it.verdict));
         told.truncate(TOLD);
         Some((counts, told))

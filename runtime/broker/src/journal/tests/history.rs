@@ -1,4 +1,4 @@
-//! The history of jobs, and what several threads write.
+//! The history of jobs, and concurrent writes of several threads.
 
 use super::*;
 
@@ -64,7 +64,8 @@ fn what_jobs_skip_is_kept_once_and_read_with_each() {
             .map(|(a, b, c)| (a.to_owned(), b.to_owned(), c));
         assert_eq!(checkers_of(&journal, job), expected.collect::<Vec<_>>());
     }
-    // What no job has any more goes with the last one, and comes back with the next.
+    // A checker list that no job uses any more is removed with its last job. The next job writes it
+    // again.
     let old = "UPDATE jobs SET at = 0 WHERE job < 3";
     journal.connection.execute(old, []).unwrap();
     assert_eq!(journal.prune(Duration::from_secs(60)).unwrap(), 2);
@@ -80,7 +81,7 @@ fn a_list_counts_as_written_once_its_job_is() {
     let dir = tempfile::tempdir().unwrap();
     let mut journal = Journal::open(dir.path(), "test").unwrap();
     let refuse = |journal: &Journal, sql: &str| journal.connection.execute_batch(sql).unwrap();
-    // Of another connection's doing, for instance.
+    // Another connection, for example, may cause such a failure.
     refuse(
         &journal,
         "CREATE TRIGGER no BEFORE INSERT ON job_skipped BEGIN SELECT RAISE(ABORT, 'no'); END",

@@ -1,5 +1,5 @@
-//! The watcher as it runs, over directories that others work in. Nothing is looked through at
-//! intervals: what is told here was told by an event, or by what the watcher makes of one.
+//! The running watcher, on directories that others change. There are no periodic scans: every
+//! report here comes from an event, or from the watcher's reaction to one.
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -19,10 +19,10 @@ use crate::watch::{Seen, WatchOptions, Watcher};
 
 const NEVER: Duration = Duration::from_secs(86_400);
 
-/// What is said of a directory from its first look on.
+/// Reports of a watcher on a directory, from its first scan on.
 struct Watched {
     told: Receiver<Seen>,
-    /// Everything that was said so far, in words.
+    /// All reports so far, as text.
     said: Vec<String>,
     root: PathBuf,
     _watcher: Watcher,
@@ -67,7 +67,7 @@ impl Watched {
         }
     }
 
-    /// Waits until all this has been said, whatever else is.
+    /// Waits until all these reports have arrived. Other reports may arrive, too.
     fn until_all(&mut self, words: impl IntoIterator<Item = String>) {
         let mut missing: BTreeSet<String> = words.into_iter().collect();
         while !missing.is_empty() {
@@ -94,7 +94,7 @@ impl Watched {
     }
 }
 
-/// Written aside and renamed into place.
+/// Writes a file aside and renames it into place.
 fn put(path: &Path) {
     let aside = path.with_extension("tmp");
     fs::write(&aside, "<OpenDRIVE/>").unwrap();
@@ -107,20 +107,21 @@ fn files_in_directories_that_have_just_come_are_all_told() {
     let mut watched = Watched::start(&root);
     for round in 0..100 {
         let at = |name: &str| format!("{name}{round}");
-        // As `mkdir` and `cp` do it.
+        // `mkdir` and `cp` do it like this.
         fs::create_dir(root.join(at("plain"))).unwrap();
         put(&root.join(at("plain")).join("a.xodr"));
-        // As `tar x` and `unzip` do it.
+        // `tar x` and `unzip` do it like this.
         let deep = root.join(at("deep")).join("1/2/3/4");
         fs::create_dir_all(&deep).unwrap();
         put(&deep.join("a.xodr"));
-        // As `rsync --delay-updates` and `mv` do it, and renamed once more at once.
+        // `rsync --delay-updates` and `mv` do it like this. The directory is then renamed once more
+        // at once.
         fs::create_dir_all(aside.join(at("moved")).join("1/2")).unwrap();
         put(&aside.join(at("moved")).join("1/2/a.xodr"));
         fs::rename(aside.join(at("moved")), root.join(at("first"))).unwrap();
         fs::rename(root.join(at("first")), root.join(at("then"))).unwrap();
         put(&root.join(at("then")).join("1/2/b.xodr"));
-        // The place of another that has gone.
+        // A new directory takes the place of a removed one.
         fs::create_dir(root.join(at("twice"))).unwrap();
         fs::remove_dir(root.join(at("twice"))).unwrap();
         fs::create_dir(root.join(at("twice"))).unwrap();
@@ -165,7 +166,7 @@ fn a_root_that_is_replaced_is_watched_anew() {
     put(&root.join("old.xodr"));
     let mut watched = Watched::start(&root);
 
-    // Removed and made again.
+    // The root is removed and created again.
     fs::remove_dir_all(&root).unwrap();
     fs::create_dir(&root).unwrap();
     put(&root.join("a.xodr"));
@@ -174,7 +175,7 @@ fn a_root_that_is_replaced_is_watched_anew() {
     put(&root.join("maps/b.xodr"));
     watched.until("settled maps/b.xodr");
 
-    // Another in its place.
+    // Another directory takes the place of the root.
     let new = base.join("above/new");
     fs::create_dir_all(new.join("maps")).unwrap();
     put(&new.join("maps/c.xodr"));
@@ -183,10 +184,10 @@ fn a_root_that_is_replaced_is_watched_anew() {
     watched.until_all(["settled maps/c.xodr", "vanished maps/b.xodr"].map(str::to_owned));
     put(&root.join("maps/d.xodr"));
     watched.until("settled maps/d.xodr");
-    // What happens in the former one is no business of ours.
+    // Changes in the former root must not be reported.
     put(&base.join("above/aside/e.xodr"));
 
-    // What is above goes, and comes back.
+    // The directory above the root disappears and comes back.
     let whole = watched.said.len();
     fs::rename(base.join("above"), base.join("away")).unwrap();
     put(&base.join("away/inbox/maps/f.xodr"));
@@ -224,7 +225,7 @@ fn what_is_above_a_root_may_be_away_for_long() {
     );
 }
 
-/// It is said once and not every second, and nothing is looked through again and again.
+/// The watcher reports this once and not every second. It does not scan again and again.
 #[test]
 fn a_root_that_becomes_a_link_is_away_until_it_is_a_directory() {
     let (_dir, base) = farm();
@@ -239,7 +240,7 @@ fn a_root_that_becomes_a_link_is_away_until_it_is_a_directory() {
         let seen = watched.told.recv_timeout(Duration::from_secs(30)).unwrap();
         watched.said.push(watched.word(&seen));
     }
-    // Several times as long as between two looks.
+    // This is several times as long as the pause between two looks.
     while let Ok(seen) = watched.told.recv_timeout(Duration::from_secs(3)) {
         watched.said.push(watched.word(&seen));
     }
@@ -255,7 +256,7 @@ fn a_root_that_becomes_a_link_is_away_until_it_is_a_directory() {
     assert!(!said.contains(&"vanished a.xodr".to_owned()), "{said:?}");
 }
 
-/// A directory outside with a file, to which links may lead.
+/// Creates an outside directory with files, as a target for links.
 fn outside() -> (tempfile::TempDir, PathBuf) {
     let (dir, outside) = farm();
     fs::create_dir(outside.join("deep")).unwrap();
@@ -264,8 +265,8 @@ fn outside() -> (tempfile::TempDir, PathBuf) {
     (dir, outside)
 }
 
-/// What lies behind a link to a directory is not looked at, whenever the link came and whatever
-/// happens there.
+/// The watcher ignores everything behind a link to a directory. The time of the link's creation and
+/// events behind the link do not matter.
 #[test]
 fn links_to_directories_are_never_followed_however_they_came() {
     let ((_dir, root), (_other, outside)) = (farm(), outside());
@@ -281,11 +282,11 @@ fn links_to_directories_are_never_followed_however_they_came() {
     symlink(&outside, root.join("link.tmp")).unwrap();
     fs::rename(root.join("link.tmp"), root.join("renamed")).unwrap();
     watched.until_all(["unseen created".to_owned(), "unseen renamed".to_owned()]);
-    // One that comes with its directory.
+    // This link appears together with its directory.
     fs::create_dir(root.join("new")).unwrap();
     symlink(&outside, root.join("new/inner")).unwrap();
     watched.until("unseen new/inner");
-    // Retargeted, and back.
+    // The link gets another target, and then its first one again.
     let retarget = |to: &Path| {
         symlink(to, root.join("next")).unwrap();
         fs::rename(root.join("next"), root.join("latest")).unwrap();
@@ -313,7 +314,7 @@ fn links_to_directories_are_never_followed_however_they_came() {
     assert_eq!(settled, BTreeSet::from(expected));
 }
 
-/// A directory gives way to a link to another while something happens in it, over and over.
+/// Something happens in a directory while a link to another directory replaces it, over and over.
 #[test]
 fn a_directory_that_flips_to_a_link_is_not_followed_in_between() {
     let ((_dir, root), (_other, outside)) = (farm(), outside());
@@ -330,7 +331,7 @@ fn a_directory_that_flips_to_a_link_is_not_followed_in_between() {
     symlink(&outside, &maps).unwrap();
     put(&root.join("last.xodr"));
     watched.until_all(["settled last.xodr".to_owned(), "unseen maps".to_owned()]);
-    // The last word on what it held while it was a directory.
+    // The last report on the file that the directory held.
     let words = |it: &&String| it.ends_with(" maps/behind.xodr");
     let last = watched.said.iter().rev().find(words);
     assert!(
@@ -356,7 +357,7 @@ fn a_directory_that_is_closed_and_a_link_to_everything_cost_themselves() {
 fn storm(root: &Path, is_over: &AtomicBool) {
     let (here, there) = (root.join("here"), root.join("there"));
     while !is_over.load(Ordering::Relaxed) {
-        // In circles, with all that is in it.
+        // The directory moves in circles with all its contents.
         for (from, to) in [("here", "there"), ("there", "third"), ("third", "here")] {
             fs::rename(root.join(from), root.join(to)).unwrap();
         }
@@ -394,12 +395,12 @@ fn who_storms_in_one_place_keeps_no_other_from_being_told() {
     let notices = |it: &&String| it.starts_with("notice");
     let notices: Vec<&String> = watched.said.iter().filter(notices).collect();
     assert!(notices.len() < 20, "{notices:#?}");
-    // And nothing was lost in it.
+    // No event was lost in the storm.
     put(&root.join("here/wide/last.xodr"));
     watched.until("settled here/wide/last.xodr");
 }
 
-/// Directories in each other, deeper than any path can name, with a file in the last.
+/// Creates nested directories, deeper than any path can name, with a file in the last one.
 fn dig(root: &Path, depth: usize) {
     let flags = OFlags::DIRECTORY | OFlags::CLOEXEC;
     let mut at: OwnedFd = rustix::fs::openat(CWD, root, flags, Mode::empty()).unwrap();
@@ -412,7 +413,7 @@ fn dig(root: &Path, depth: usize) {
     rustix::fs::openat(&at, "deepest.xodr", flags, Mode::RWXU).unwrap();
 }
 
-/// `remove_dir_all` goes by descriptors, too, and needs one for each level.
+/// Fills the root. `remove_dir_all` works with descriptors, too, and needs one for each level.
 fn fill_up(root: &Path) {
     dig(root, 300);
 }

@@ -1,4 +1,4 @@
-//! `qcbus check`: a private broker for one run, the same engine as `serve`.
+//! `qcbus check`: runs a private broker for one run, with the same engine as `serve`.
 
 mod outputs;
 mod printer;
@@ -52,7 +52,7 @@ fn carry_out(args: &CheckArgs, prepared: Prepared) -> Result<Exit, Refusal> {
     let mut run = Run::new().map_err(cannot)?;
     match warm::check(args, prepared, &mut run) {
         Ok(exit) => {
-            // A thread that still waits for an answer must not hold up the end.
+            // A thread that still waits for an answer must not delay the end.
             run.runtime.shutdown_background();
             Ok(exit)
         }
@@ -63,7 +63,7 @@ fn carry_out(args: &CheckArgs, prepared: Prepared) -> Result<Exit, Refusal> {
     }
 }
 
-/// Names the files that are passed over, for whoever wants to know everything.
+/// Prints the names of the excluded files in verbose mode.
 fn say_excluded(args: &CheckArgs, excluded: &[PathBuf]) {
     for file in excluded.iter().filter(|_| args.print.verbose) {
         let shown = to_text(relative(file));
@@ -71,7 +71,7 @@ fn say_excluded(args: &CheckArgs, excluded: &[PathBuf]) {
     }
 }
 
-/// Every named file is excluded, as whoever excluded them wants. There is nothing to report on.
+/// Ends the run if every named file is excluded on purpose. There is nothing to report on.
 fn nothing_left(args: &CheckArgs, mut outputs: Outputs) -> Exit {
     if args.print.quiet {
         return Exit::Accepted;
@@ -92,7 +92,7 @@ fn usage(why: impl Into<String>) -> Refusal {
     (Exit::Usage, why.into())
 }
 
-/// What is to be checked, and how.
+/// Prepared input and options of a check.
 struct Prepared {
     options: Options,
     config: Option<Arc<Config>>,
@@ -117,14 +117,14 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         files,
         excluded,
     } = targets(args, config.as_deref(), parsed.as_ref())?;
-    // A directory may have any number of them.
+    // A directory may contain any number of files.
     let several = if roots.is_empty() {
         files.len()
     } else {
         usize::MAX
     };
     let asam = config.is_some() && roots.is_empty() && files.len() == 1;
-    // The one result that there is then is that of the file that is named.
+    // In this case the only result must be that of the named file.
     let own_verdicts = args.own_verdict || asam;
     let out = absolute(args.output.out.as_deref().unwrap_or(Path::new(if asam {
         "."
@@ -146,7 +146,8 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         args.limits.threads,
     );
     let options = Options {
-        // One of its own is made when it is checked here, and not where a broker is asked.
+        // A private instance is created only if the check runs here, and not if a running broker is
+        // used.
         instance: Instance::at(PathBuf::new()),
         roots,
         files,
@@ -169,7 +170,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         bundles_d,
         standard: wanted_bundles(bundles.map_err(usage)?, parsed.as_ref()),
         reporters: standard::reporter_specs(program),
-        // Only configurations are compared with it.
+        // This list is needed only to validate configurations.
         known: match config_named {
             true => standard::known(),
             false => Known::default(),
@@ -190,7 +191,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
     })
 }
 
-/// The state machine of a run that ends by itself. There are no more writers than files to write.
+/// Returns the settings of a run that ends by itself, with at most one writer per file.
 fn run_settings(args: &CheckArgs, files: usize, own_verdicts: bool) -> Settings {
     let settings = settings(&args.limits);
     Settings {
@@ -202,14 +203,14 @@ fn run_settings(args: &CheckArgs, files: usize, own_verdicts: bool) -> Settings 
     }
 }
 
-/// What is to be asked, if somebody narrows it. A name that fits nothing is a mistake: what it was to
-/// keep or leave out would go unsaid.
+/// Returns the choice of checkers on the command line. A name without a match is an error, because
+/// its effect would be silently lost.
 fn choice(args: &CheckArgs) -> Result<Choice, Refusal> {
     let choice = Choice {
         select: args.select.clone(),
         ignore: args.ignore.clone(),
     };
-    // Only they themselves know what bundles of others look at, once they have joined.
+    // The checkers of other bundles are known only after these bundles have joined.
     if args.bundles_d.is_some() {
         return Ok(choice);
     }
@@ -222,12 +223,12 @@ fn choice(args: &CheckArgs) -> Result<Choice, Refusal> {
     Ok(choice)
 }
 
-/// The directory in which the command was typed.
+/// Returns the current directory of the command.
 fn here() -> Result<PathBuf, Refusal> {
     std::env::current_dir().map_err(|error| usage(format!("cannot see where this is: {error}")))
 }
 
-/// Refuses a place for results where nothing can be written, before anything is checked for it.
+/// Rejects an output directory that is not writable, before any check starts.
 fn writable(out: &Path) -> Result<(), Refusal> {
     use rustix::fs::{Access, access};
     let mut above = out.ancestors();
@@ -246,7 +247,7 @@ fn writable(out: &Path) -> Result<(), Refusal> {
     })
 }
 
-/// A configuration runs what it names and nothing else.
+/// Returns the bundles to run. With a configuration, these are only the bundles that it names.
 fn wanted_bundles(
     specs: Vec<qcbus_broker::ChildSpec>,
     config: Option<&Config>,
@@ -273,7 +274,7 @@ fn random_bytes() -> Result<[u8; 8], String> {
     Ok(bytes)
 }
 
-/// Where the results of a run go.
+/// Returns the paths of the results of a run.
 fn places(options: &Options) -> ResultPaths {
     let here = options.here.clone().unwrap_or_default();
     let (out, roots) = (options.out.clone(), options.roots.clone());
@@ -289,7 +290,7 @@ fn check(args: &CheckArgs, prepared: Prepared, run: Run) -> Exit {
     let printer = Printer::new(places, roots, prepared.config, prepared.outputs, args);
     let directory = prepared.options.instance.dir().to_path_buf();
     let (sender, receiver) = channel();
-    // Reports of large maps take their time; the broker has others to listen to meanwhile.
+    // Reports of large maps take time, and the broker must handle other messages meanwhile.
     let printing = std::thread::Builder::new()
         .name("reports".to_owned())
         .spawn(move || print(printer, &receiver));
@@ -303,7 +304,7 @@ fn check(args: &CheckArgs, prepared: Prepared, run: Run) -> Exit {
     let driven = drive(run, prepared.options, &sender);
     drop(sender);
     let printer = printing.join();
-    // Private to this run; what is left of it is of no use to anybody.
+    // The directory is private to this run, so its remains are useless.
     let _ = std::fs::remove_dir_all(directory);
     match (driven, printer) {
         (Err((exit, why)), _) => {
@@ -311,12 +312,12 @@ fn check(args: &CheckArgs, prepared: Prepared, run: Run) -> Exit {
             exit
         }
         (Ok(()), Ok(printer)) => printer.finish(),
-        // The panic has been printed.
+        // The panic message has already been printed.
         (Ok(()), Err(_)) => Exit::Internal,
     }
 }
 
-/// Prints until nobody has news any more.
+/// Prints until all senders of news are gone.
 fn print(mut printer: Printer, news: &Receiver<News>) -> Printer {
     while let Ok(news) = news.recv() {
         printer.take(news);
@@ -332,12 +333,12 @@ fn drive(run: Run, options: Options, news: &Sender<News>) -> Result<(), Refusal>
         }
         Ok(())
     })?;
-    // Threads that still read a file must not hold up the end.
+    // Threads that still read a file must not delay the end.
     run.runtime.shutdown_background();
     Ok(())
 }
 
-/// Passes wishes to stop on, and tells the printer that there was one.
+/// Forwards stop requests and informs the printer about them.
 fn noted(
     mut stops: mpsc::Receiver<OperatorSignal>,
     news: Sender<News>,
@@ -354,11 +355,11 @@ fn noted(
     receiver
 }
 
-/// How often a start is tried again for which there is no shared memory.
+/// Interval between start attempts while shared memory is insufficient.
 const START_AGAIN: Duration = Duration::from_millis(50);
 
-/// Starts the broker, when others have let go of shared memory if need be. `None`: somebody wanted it
-/// to stop before.
+/// Starts the broker. If necessary, it waits until other processes free shared memory. Returns
+/// `None` after a stop request.
 async fn start(
     options: Options,
     news: &Sender<News>,
@@ -369,7 +370,7 @@ async fn start(
     loop {
         let listener = news.clone();
         let tell = move |told| {
-            // Who prints lives longer than the broker.
+            // The printer outlives the broker, so sending cannot fail.
             let _ = listener.send(News::Told(told));
         };
         let error = match Broker::start(options.clone(), tell) {
@@ -383,7 +384,7 @@ async fn start(
             StartError::Bus(why) if why.may_pass() => {}
             _ => return Err((Exit::Internal, error.to_string())),
         }
-        // What becomes free goes to others, who end, too: that is progress.
+        // Freed memory may go to other processes, which also end. So any change is progress.
         let free = SharedMemory::now().map_or(0, |memory| memory.free);
         if free != most_free {
             (moved, most_free) = (Instant::now(), free);

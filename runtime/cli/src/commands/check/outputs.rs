@@ -1,4 +1,4 @@
-//! What is printed, and what is written besides.
+//! Output on the terminal and additional report files.
 
 use std::path::Path;
 
@@ -13,17 +13,17 @@ use crate::args::{OutputFormat, PrintArgs, TerminalFormat};
 use crate::commands::settings::real;
 use crate::{standard, talk};
 
-/// What goes to stdout.
+/// Content of stdout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Terminal {
-    /// Each finding in full with its line of the file, if one file is checked; a line for each if it is
-    /// several.
+    /// Each finding in full with its source line for a single file; a line for each finding for
+    /// several files.
     Fitting,
     /// Each finding in full.
     Full,
     /// A line for each finding.
     Concise,
-    /// What a reporter writes; nothing of ours is between.
+    /// Only the output of a reporter, without other text.
     Reporter,
 }
 
@@ -36,24 +36,24 @@ impl From<TerminalFormat> for Terminal {
     }
 }
 
-/// Everything that the findings go to.
+/// All outputs of the findings.
 pub(super) struct Outputs {
-    /// What stdout is for.
+    /// Content of stdout.
     pub(super) terminal: Terminal,
     reporters: Vec<Output>,
 }
 
-/// One reporter, and where it writes.
+/// One reporter and its output.
 struct Output {
     alias: &'static str,
     reporter: Box<dyn Reporter>,
-    /// The value of its parameter `OutputFile`.
+    /// Value of its parameter `OutputFile`.
     to: String,
     failed: bool,
 }
 
 impl Outputs {
-    /// What the flags ask for. A format without a file goes to stdout; a page goes into `out`.
+    /// Returns the outputs of the flags. A format without a file goes to stdout; a page into `out`.
     pub(super) fn new(args: &PrintArgs, out: &Path) -> Result<Outputs, Refusal> {
         let mut outputs = Outputs {
             terminal: Terminal::Fitting,
@@ -83,7 +83,7 @@ impl Outputs {
         Ok(outputs)
     }
 
-    /// Of two reports in one file, one would be lost.
+    /// Rejects two reports in one file, because one of them would be lost.
     fn refuse_twice(&self, file: &Path) -> Result<(), Refusal> {
         let to = to_text(&real(file));
         match self.reporters.iter().find(|it| it.to == to) {
@@ -127,12 +127,12 @@ impl Outputs {
         Ok(())
     }
 
-    /// Whether results are printed in our own words alone.
+    /// Checks whether there are no reporters, so only the program itself prints results.
     pub(super) fn are_none(&self) -> bool {
         self.reporters.is_empty()
     }
 
-    /// Gives a result to all of them.
+    /// Passes a result to all reporters.
     pub(super) fn report(&mut self, message: &mut ResultMessage, sources: &FileSources) {
         for output in &mut self.reporters {
             message.params = vec![Param {
@@ -145,7 +145,7 @@ impl Outputs {
         }
     }
 
-    /// All results were given. Says whether everything is where it belongs.
+    /// Finishes all reporters after the last result. Returns whether all reports are complete.
     pub(super) fn finish(&mut self) -> bool {
         for output in &mut self.reporters {
             if let Err(error) = output.reporter.finish() {
@@ -155,8 +155,8 @@ impl Outputs {
         self.reporters.iter().all(|output| !output.failed)
     }
 
-    /// Not everything was checked, so there are no reports: half of one looks like a whole one. Gives their
-    /// names and places.
+    /// Discards the reports because the check is incomplete and a partial report looks like a full
+    /// one. Returns their names and places.
     pub(super) fn give_up(&mut self) -> Vec<String> {
         let named = |output: &mut Output| {
             output.failed = true;
@@ -165,7 +165,7 @@ impl Outputs {
         self.reporters.iter_mut().map(named).collect()
     }
 
-    /// The files that were written.
+    /// Returns the files that were written.
     pub(super) fn files(&self) -> impl Iterator<Item = &str> {
         let written = self.reporters.iter().filter(|output| !output.failed);
         let to = written.map(|output| output.to.as_str());
@@ -174,7 +174,7 @@ impl Outputs {
 }
 
 impl Output {
-    /// Said once: what refuses one result refuses all.
+    /// Reports a failure once, because the other results would fail in the same way.
     fn fails(&mut self, why: &str) {
         if !std::mem::replace(&mut self.failed, true) {
             talk::fail(&format!("the {} report: failed to {why}", self.alias));
@@ -182,8 +182,8 @@ impl Output {
     }
 }
 
-/// Refuses a file for a report that cannot be written, or that nobody would want to be written over, before
-/// anything is done for it; takes away the report of an earlier run, which is none of this one.
+/// Rejects a report file that is not writable or must not be overwritten, before the check starts.
+/// It also removes the report of an earlier run.
 pub(in crate::commands) fn report_place(file: &Path) -> Result<(), Refusal> {
     let shown = to_text(file);
     let is_result = file.extension().is_some_and(|it| it == "xqar");

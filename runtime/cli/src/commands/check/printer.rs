@@ -1,4 +1,4 @@
-//! What a person sees of a run, as it goes on.
+//! Terminal output of a run while it is in progress.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -20,29 +20,29 @@ use crate::args::{CheckArgs, FailLevel, PrintArgs};
 use crate::commands::settings::relative;
 use crate::talk;
 
-/// So many files that were not judged are named.
+/// Maximum number of unchecked files that are named.
 const NAMED: usize = 10;
 
-/// So many findings of one rule are shown of one of several files.
+/// Maximum number of findings of one rule that are shown for each of several files.
 const SHOWN_OF_A_RULE: usize = 5;
 
-/// Something to print, or to remember for the end.
+/// An item to print or to remember for the end.
 pub(super) enum News {
-    /// The broker has told something.
+    /// A message of the broker.
     Told(Told),
-    /// Something is waited for.
+    /// The reason for a wait.
     Waits(&'static str),
-    /// Somebody wants it to stop.
+    /// A request to stop.
     Interrupted,
 }
 
-/// Prints results in the order of their paths, each as soon as those before it are there.
+/// Printer of results in path order; each is printed as soon as all earlier ones are available.
 pub(super) struct Printer {
     places: ResultPaths,
-    /// The directories that are checked.
+    /// Checked directories.
     roots: Vec<PathBuf>,
     config: Option<Arc<Config>>,
-    /// The command line names what is to be asked.
+    /// Whether the command line selects or ignores checkers.
     has_choice: bool,
     outputs: Outputs,
     args: PrintArgs,
@@ -51,15 +51,15 @@ pub(super) struct Printer {
     printed: usize,
     judged: BTreeMap<Arc<Path>, Arc<Judged>>,
     tally: Tally,
-    /// Files whose result could not be written.
+    /// Number of files with a result that could not be written.
     unwritten: usize,
-    /// Files whose result could not be read back for the reports.
+    /// Number of files with a result that could not be read back for the reports.
     unreported: usize,
-    /// What could not be looked at: nobody knows what lies there.
+    /// Number of places that could not be read, so their content is unknown.
     unseen: usize,
-    /// Somebody wanted it to stop.
+    /// Whether a stop was requested.
     interrupted: bool,
-    /// Everything that is to be checked is known.
+    /// Whether all files to check are known.
     scanned: bool,
     notices: BTreeSet<String>,
 }
@@ -93,7 +93,7 @@ impl Printer {
         }
     }
 
-    /// Prints what there is to print.
+    /// Handles an item of news and prints all results that are ready.
     pub(super) fn take(&mut self, news: News) {
         match news {
             News::Interrupted => self.interrupted = true,
@@ -116,7 +116,7 @@ impl Printer {
         }
     }
 
-    /// Says something once.
+    /// Prints a note, but each text only once.
     fn note(&mut self, text: String) {
         if !self.notices.contains(&text) {
             self.progress.clear();
@@ -125,11 +125,11 @@ impl Printer {
         }
     }
 
-    /// A directory that somebody named and in which there is nothing to check is told: perhaps it was moved.
+    /// Reports a named directory without files to check, because it may have been moved.
     fn say_empty(&mut self) {
         let is_empty = |root: &&PathBuf| !self.expected.iter().any(|it| it.starts_with(root));
         let empty: Vec<PathBuf> = self.roots.iter().filter(is_empty).cloned().collect();
-        // Where there is nothing at all, that is what is said in the end.
+        // If there are no files at all, a message at the end reports that.
         if !self.expected.is_empty() {
             for root in empty {
                 let shown = to_text(relative(&root));
@@ -178,7 +178,7 @@ impl Printer {
             Err(why) => {
                 self.tally.add_verdict(verdict);
                 self.unreported += 1;
-                // Of what was not written that has been said.
+                // A result that was not written has already been reported.
                 if is_written {
                     talk::fail(&why);
                 }
@@ -187,7 +187,7 @@ impl Printer {
     }
 
     fn report(&mut self, message: &mut ResultMessage) {
-        // The end of the run says it once for all files.
+        // The end of the run reports the choice once for all files.
         let choice = take_choice(message);
         self.tally.add(message);
         let sources = FileSources::new(message);
@@ -219,14 +219,14 @@ impl Printer {
         self.outputs.report(message, &sources);
     }
 
-    /// Whether nothing of a result is printed but that there is one more accepted: most are so, and reading a result
-    /// back takes longer than checking a small file. Who configures or chooses is told in the result what was left
-    /// out, and reports are made of whole results.
+    /// Checks whether a result only adds to the number of accepted files. Most results do, and
+    /// reading one back takes longer than checking a small file. With a configuration or a choice,
+    /// the result lists the checkers that were left out. Reports need whole results.
     fn has_nothing_to_say(&self, judged: &Judged) -> bool {
         let is_clean = judged.is_accepted() && judged.counts == [0; 3];
         let is_whole = self.config.is_none() && !self.has_choice;
         let unread = !self.args.verbose && self.outputs.are_none();
-        // One that is not there any more cannot be read back, which is said where it is tried.
+        // A missing result file cannot be read back. The attempt to read it reports the error.
         let is_there = |xqar: &PathBuf| {
             let found = std::fs::symlink_metadata(xqar);
             found.is_ok_and(|it| it.is_file() && it.len() > 0)
@@ -234,7 +234,7 @@ impl Printer {
         is_clean && is_whole && unread && judged.xqar.as_ref().is_some_and(is_there)
     }
 
-    /// What stdout is for: of one file there is room for everything.
+    /// Returns the content of stdout. A single file is printed in full.
     fn terminal(&self) -> Terminal {
         match self.outputs.terminal {
             Terminal::Fitting if self.expected.len() == 1 => Terminal::Full,
@@ -242,8 +242,8 @@ impl Printer {
         }
     }
 
-    /// What is still to be printed. A scenario may be judged again when its map is: it counts once. A file that nobody
-    /// named, and on which others rest, is worth a word when it is not accepted.
+    /// Returns the results still to print. A scenario that is checked again after its map counts
+    /// once. A file that was not named but is needed by others is included if it is not accepted.
     fn rest(&mut self) -> Vec<(Arc<Path>, Arc<Judged>)> {
         let printed: BTreeSet<&Arc<Path>> = self.expected.iter().take(self.printed).collect();
         let is_named = |path: &Arc<Path>| self.places.contains(path);
@@ -254,14 +254,14 @@ impl Printer {
         rest.collect()
     }
 
-    /// The files without a verdict, apart from those that are still to be printed.
+    /// Returns the files without a verdict, except those that must still be printed.
     fn unjudged(&self, rest: &[(Arc<Path>, Arc<Judged>)]) -> Vec<Arc<Path>> {
         let left = self.expected.iter().skip(self.printed);
         let waiting = left.filter(|path| !rest.iter().any(|(it, _)| it == *path));
         waiting.cloned().collect()
     }
 
-    /// Says what was not looked at.
+    /// Reports the files that were not checked.
     fn say_unjudged(&self, missing: &[Arc<Path>]) {
         let why = match self.interrupted {
             true => "ended by a signal",
@@ -289,7 +289,7 @@ impl Printer {
         }
     }
 
-    /// All news are in: prints what is left and the summary.
+    /// Prints the remaining results and the summary after all news have arrived.
     pub(super) fn finish(mut self) -> Exit {
         self.progress.clear();
         let rest = self.rest();
@@ -315,8 +315,8 @@ impl Printer {
         }
     }
 
-    /// Half a run would look like a whole one to whoever reads the reports. Says whether they are
-    /// where they belong.
+    /// Finishes the reports, or discards them after an incomplete run, because they would look
+    /// complete. Returns whether the reports are as expected.
     fn finish_reports(&mut self, interrupted: bool) -> bool {
         if !interrupted && self.tally.total() > 0 {
             return self.outputs.finish();
@@ -331,7 +331,7 @@ impl Printer {
         true
     }
 
-    /// No file has a verdict.
+    /// Ends a run in which no file has a verdict.
     fn nothing(&self, interrupted: bool) -> Exit {
         if interrupted {
             return Exit::Undetermined;
@@ -368,7 +368,7 @@ impl Printer {
             }
             lines.push_str(&self.last_line());
         }
-        // What is printed for programs stays for programs.
+        // Output for programs must not contain other text.
         if lines.is_empty() {
             return;
         }
@@ -400,7 +400,7 @@ impl Printer {
         line
     }
 
-    /// Files that are accepted, and are to fail all the same.
+    /// Returns the number of accepted files that must fail because of `--fail-level`.
     fn failing(&self) -> usize {
         let level = match self.args.fail_level {
             FailLevel::Error => return 0,
@@ -418,7 +418,7 @@ impl Printer {
         };
         match verdict {
             Exit::Rejected if !self.args.exit_zero => Exit::Rejected,
-            // That nobody could look is no finding.
+            // A check that was not possible is not a finding.
             Exit::Rejected if self.tally.count(Verdict::Undetermined) > 0 => Exit::Undetermined,
             Exit::Rejected => Exit::Accepted,
             exit => exit,
@@ -426,7 +426,7 @@ impl Printer {
     }
 }
 
-/// The issues that only say what the command line left out, taken out of a result.
+/// Issues that only list the checkers left out by the command line, removed from a result.
 struct LeftOut(Option<(usize, Vec<Issue>)>);
 
 fn take_choice(message: &mut ResultMessage) -> LeftOut {
@@ -450,7 +450,7 @@ impl LeftOut {
     }
 }
 
-/// The findings of one file in full, and why nobody can say more where that is so.
+/// Returns the findings of one file in full. If the verdict is undetermined, the reasons follow.
 fn full(message: &ResultMessage, options: &Options, sources: &FileSources) -> String {
     let mut text = qcbus_report_text::findings(message, options, sources);
     let blocked = message.verdict == Verdict::Undetermined;

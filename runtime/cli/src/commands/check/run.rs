@@ -1,4 +1,4 @@
-//! What carries a run, and who may end it before it is through.
+//! Runtime of a `check` run and the signals that can stop it early.
 
 use std::io;
 
@@ -8,10 +8,11 @@ use tokio::sync::mpsc::Receiver;
 
 use crate::commands::stops;
 
-/// A run.
+/// Runtime and stop signals of one run.
 pub(super) struct Run {
     pub runtime: Runtime,
-    /// Listened to from the beginning: no signal is lost between asking a broker and being one.
+    /// Signals are received from the start. No signal is lost between asking a broker and starting
+    /// one.
     pub stops: Receiver<OperatorSignal>,
 }
 
@@ -22,7 +23,8 @@ impl Run {
         Ok(Run { runtime, stops })
     }
 
-    /// What becomes of some work; `None`: somebody wanted the run to stop, and nobody waits for the work any more.
+    /// Returns the result of some work. Returns `None` if a signal stops the run; the work is then
+    /// no longer awaited.
     pub fn unless_stopped<T: Send + 'static>(
         &mut self,
         work: impl FnOnce() -> Result<T, String> + Send + 'static,

@@ -1,4 +1,4 @@
-//! What a run comes to.
+//! Summary of a run: counts of verdicts, findings and rules.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -9,29 +9,30 @@ use qcbus_formats::xqar::Level;
 use qcbus_messages::{ResultMessage, Verdict, shown};
 use qcbus_reporter_sdk::{checkers, is_blocked, not_listed, rule_name};
 
-/// Rules that are named at the end of a run without `--statistics`.
+/// Number of rules that the summary lists without `--statistics`.
 const FIRST: usize = 5;
 
-/// From so many findings on, the end of a run says what to mend first.
+/// Number of findings from which the summary says what to fix first.
 const MANY: usize = 30;
 
 /// Counts over all files of a run.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
-    /// Verdicts in the order of [`Verdict`].
+    /// Number of files by verdict, in the order of [`Verdict`].
     verdicts: BTreeMap<Verdict, usize>,
-    /// Findings by level.
+    /// Number of findings by level.
     levels: BTreeMap<Level, usize>,
-    /// Files with findings of any level, and the worst of each.
+    /// Number of files with findings, by the worst level of each file.
     files_at: BTreeMap<Level, usize>,
     rules: BTreeMap<(Level, String), RuleCount>,
-    /// Checkers that were kept from looking in files that have errors, and the number of those files.
+    /// Number of checkers that could not run in files with errors, and number of those files.
     blocked: (usize, usize),
-    /// Findings that are counted and not listed.
+    /// Number of findings that are counted but not listed.
     not_listed: u64,
-    /// Files that are undetermined, the first few.
+    /// The first few undetermined files.
     open: Vec<String>,
-    /// What configuration or command line left out, by bundle: the same for every file.
+    /// Checks that configuration or command line left out, by bundle. They are the same for every
+    /// file.
     left_out: BTreeMap<String, NotAsked>,
 }
 
@@ -44,7 +45,7 @@ struct RuleCount {
 }
 
 impl Tally {
-    /// Counts a file.
+    /// Adds the result of a file.
     pub(super) fn add(&mut self, result: &ResultMessage) {
         *self.verdicts.entry(result.verdict).or_default() += 1;
         let (mut worst, mut seen, mut blocked) = (None, BTreeSet::new(), 0);
@@ -79,22 +80,22 @@ impl Tally {
         }
     }
 
-    /// A file whose result says nothing beside its verdict, or could not be read back.
+    /// Adds only a verdict: the result contains nothing else or could not be read back.
     pub(super) fn add_verdict(&mut self, verdict: Verdict) {
         *self.verdicts.entry(verdict).or_default() += 1;
     }
 
-    /// Files with a verdict.
+    /// Returns the number of files with a verdict.
     pub(super) fn total(&self) -> usize {
         self.verdicts.values().sum()
     }
 
-    /// Files with this verdict.
+    /// Returns the number of files with this verdict.
     pub(super) fn count(&self, verdict: Verdict) -> usize {
         self.verdicts.get(&verdict).copied().unwrap_or(0)
     }
 
-    /// The files that are undetermined: the first few, and how many more.
+    /// Returns the first few undetermined files and the number of further ones.
     pub(super) fn open_files(&self) -> String {
         let named = self.open.join(", ");
         match self
@@ -106,17 +107,18 @@ impl Tally {
         }
     }
 
-    /// The verdicts, each as often as it was given.
+    /// Returns all verdicts, one per file.
     pub(super) fn verdicts(&self) -> impl Iterator<Item = Verdict> {
         let each = self.verdicts.iter();
         each.flat_map(|(verdict, count)| std::iter::repeat_n(*verdict, *count))
     }
 
-    /// Files with a finding of this level or a worse one.
+    /// Returns the number of files with a finding of this level or a worse one.
     pub(super) fn files_from(&self, level: Level) -> usize {
         self.files_at.range(..=level).map(|(_, files)| files).sum()
     }
 
+    /// Returns the summary line:
     /// `28 errors, 9 warnings in 13 of 28 files; 15 accepted, 13 rejected`.
     pub(super) fn line(&self) -> String {
         let level = |level, one: &str, many: &str| {
@@ -142,7 +144,7 @@ impl Tally {
         line
     }
 
-    /// What was not looked at although it might have been, in sentences.
+    /// Returns sentences about checks that did not run although they could have.
     pub(super) fn not_looked(&self) -> Vec<String> {
         let mut said = Vec::new();
         let (checks, files) = self.blocked;
@@ -165,15 +167,15 @@ impl Tally {
         said
     }
 
-    /// The rules that were broken, those first whose mending helps most: errors before warnings, then
-    /// by files, then by findings.
+    /// Returns the violated rules, ordered by how much a fix helps: errors before warnings, then by
+    /// files, then by findings.
     fn ranked(&self) -> Vec<Row<'_>> {
         let mut rules: Vec<Row<'_>> = self.rules.iter().collect();
         rules.sort_by_key(|((level, _), it)| (*level, Reverse(it.files), Reverse(it.findings)));
         rules
     }
 
-    /// What to mend first, when there is so much that a person cannot see it: the first few rules.
+    /// Returns the first few rules to fix if a run has many findings.
     pub(super) fn first(&self) -> Option<String> {
         let findings: usize = self.levels.values().sum();
         let errors = self.levels.contains_key(&Level::Error);
@@ -187,7 +189,7 @@ impl Tally {
         Some(format!("fix first:\n{}", table(first.take(FIRST))))
     }
 
-    /// All rules that were broken, the most frequent first.
+    /// Returns all violated rules, the most frequent first.
     pub(super) fn statistics(&self) -> String {
         let mut rules = self.ranked();
         rules.sort_by_key(|(_, it)| Reverse(it.findings));
@@ -198,10 +200,10 @@ impl Tally {
     }
 }
 
-/// A rule at one level, and how often it was broken.
+/// A rule at one level, and how often it was violated.
 type Row<'t> = (&'t (Level, String), &'t RuleCount);
 
-/// Rows of findings, files, level, rule and what it is about.
+/// Formats rows of findings, files, level, rule and description of the rule.
 fn table<'t>(rules: impl Iterator<Item = &'t Row<'t>>) -> String {
     let rows: Vec<_> = rules.collect();
     let names = rows.iter().map(|((_, name), _)| name.chars().count());

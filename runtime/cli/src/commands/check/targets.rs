@@ -1,4 +1,4 @@
-//! What is to be checked.
+//! Files and directories that a run checks.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -12,15 +12,15 @@ use super::{Refusal, usage};
 use crate::args::CheckArgs;
 use crate::commands::settings::{looks_into, named, outermost};
 
-/// What is to be checked.
+/// Files and directories to be checked.
 pub(super) struct Targets {
     pub roots: Vec<PathBuf>,
     pub files: Vec<PathBuf>,
-    /// Files that are named and that a `.qcignore` excludes.
+    /// Files that are named explicitly but excluded by a `.qcignore`.
     pub excluded: Vec<PathBuf>,
 }
 
-/// Directories and files, from the command line or from the configuration.
+/// Returns the directories and files from the command line or from the configuration.
 pub(super) fn targets(
     args: &CheckArgs,
     config_path: Option<&Path>,
@@ -44,7 +44,7 @@ pub(super) fn targets(
     for path in &paths {
         let real = std::fs::canonicalize(path)
             .map_err(|error| usage(format!("cannot check {}: {error}", to_text(path))))?;
-        // A link to a file is checked under its own name, as it is in a directory.
+        // A link to a file is checked under its own name, as in a directory scan.
         let file = named(path);
         if real.is_dir() {
             roots.insert(real);
@@ -83,8 +83,8 @@ pub(super) fn targets(
     })
 }
 
-/// A relative InputFile is meant from here, as ASAM's bundles take it, else from beside the
-/// configuration.
+/// Resolves a relative InputFile against the current directory, as ASAM's bundles do, else against
+/// the directory of the configuration.
 fn input_path(input: &Path, config: Option<&Path>) -> PathBuf {
     let beside = config
         .and_then(Path::parent)
@@ -95,7 +95,8 @@ fn input_path(input: &Path, config: Option<&Path>) -> PathBuf {
     }
 }
 
-/// The kinds of files that may have to be checked: maps rest on nothing, and scenarios on files of any kind.
+/// Returns the kinds of files that may have to be checked. Maps refer to no other files; scenarios
+/// may refer to files of any kind.
 pub(super) fn kinds(
     roots: &[PathBuf],
     files: &[PathBuf],

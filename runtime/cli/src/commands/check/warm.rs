@@ -1,8 +1,9 @@
-//! A run of `check` that asks a broker which is there already, because a start of one's own takes longer than most
+//! A run of `check` that asks a running broker, because starting a new one takes longer than most
 //! checks.
 //!
-//! Whatever would be found otherwise by that broker is checked here: one of another program, with another
-//! configuration or other limits, that cannot read what we can, or that is about to end.
+//! The run checks the files itself if that broker could find something else. Examples are a broker
+//! of another program, with another configuration or other limits. Others are a broker that cannot
+//! read the same files or is about to end.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -24,13 +25,15 @@ use crate::args::{CheckArgs, DEFAULT_INSTANCE};
 use crate::commands::settings::instance;
 use crate::{standard, talk};
 
-/// So many files are asked for: with more of them a start of one's own is a small part of the work.
+/// Maximum number of files to ask for. With more files, starting a new broker is a small part of
+/// the work.
 const MOST_FILES: usize = 64;
 
-/// So many are asked for at once.
+/// Maximum number of concurrent requests.
 const AT_ONCE: usize = 4;
 
-/// Asks the broker of the instance for all files. Gives back what was prepared if they are to be checked here.
+/// Asks the broker of the instance for all files. Returns the prepared run if the files must be
+/// checked here.
 pub(super) fn check(
     args: &CheckArgs,
     prepared: Prepared,
@@ -54,22 +57,23 @@ pub(super) fn check(
     }
 }
 
-/// Why no broker was asked.
+/// Reasons why no broker checks the files.
 enum Elsewhere {
-    /// The files are to be checked here: why, for a person, if that is worth a word.
+    /// The files must be checked here. The text is the reason for the user; it is empty if there is
+    /// nothing to report.
     Here(String),
-    /// They cannot be checked at all.
+    /// The files cannot be checked at all.
     Refused(String),
-    /// Somebody wanted the run to stop.
+    /// A signal stopped the run.
     Interrupted,
 }
 
-/// A file, and the terms under which it is to be checked.
+/// A file and its check context.
 type Question = (PathBuf, CheckContext);
 
-/// Everything that was answered.
+/// All answers of a broker.
 struct Given {
-    /// The process that answered.
+    /// Process id of the broker that answered.
     by: u32,
     results: GivenResults,
     files: Vec<(PathBuf, Checked)>,
@@ -84,7 +88,8 @@ fn ask(
     if args.cold || !may_ask(args, options) {
         return Err(here(""));
     }
-    // Nobody needs an instance to check files by himself; who names one has something in mind.
+    // A check does not need an instance. A user who names one explicitly must learn that it is
+    // unusable.
     let unusable = match args.instance.instance.as_str() {
         DEFAULT_INSTANCE => Elsewhere::Here,
         _ => Elsewhere::Refused,
@@ -97,7 +102,8 @@ fn ask(
     })?;
     let in_force = InForce::new(None, SearchPath::of_environment());
     let config = in_force.map_err(|error| here(&error.to_string()))?.digest;
-    // Before anything is checked, as always: what lies there was found in other bytes.
+    // The results directory is opened before any check: existing results there belong to other file
+    // contents.
     let opened = GivenResults::open(places(options), config);
     let (results, left) = opened.map_err(|error| Elsewhere::Refused(error.to_string()))?;
     let asking = Asking {
@@ -112,7 +118,7 @@ fn ask(
     Ok((Given { by, results, files }, left))
 }
 
-/// What is asked, and whom.
+/// The request and the directory of the broker that receives it.
 struct Asking {
     options: Options,
     config: Digest,
@@ -121,8 +127,9 @@ struct Asking {
 }
 
 impl Asking {
-    /// Asks for all files, and for those that they rest on. A verdict that counts in others must be made here: the
-    /// broker knows of each file by itself. That is so only where one of those others is not accepted.
+    /// Asks for all files and for the files that they refer to. The broker gives each file its own
+    /// verdict only. A verdict that depends on other files must therefore be made here. That is
+    /// necessary only if one of those files is not accepted.
     fn ask_for_everything(&self, line: &mut Line) -> Result<Vec<(PathBuf, Checked)>, String> {
         let mut files = self.ask_for_files(line, self.options.files.clone())?;
         let mut begin = 0;
@@ -168,8 +175,8 @@ impl Asking {
     }
 }
 
-/// Whether any broker would find the same: it knows nothing of a configuration or of bundles that are named here, and
-/// has read schemas when it began, which may be others now.
+/// Checks whether any broker would find the same. A broker does not know a configuration or bundles
+/// named here. It read its schemas at its start, and they may have changed since.
 fn may_ask(args: &CheckArgs, options: &Options) -> bool {
     options.roots.is_empty()
         && options.files.len() <= MOST_FILES
@@ -179,7 +186,7 @@ fn may_ask(args: &CheckArgs, options: &Options) -> bool {
         && options.choice.is_everything()
 }
 
-/// The terms under which a file would be checked here.
+/// Returns the check context of a file for a check in this process.
 fn context_of(options: &Options, config: Digest, file: &Path) -> CheckContext {
     let kind = FileKind::of_path(file);
     let takes = |name: &str| {
@@ -191,7 +198,7 @@ fn context_of(options: &Options, config: Digest, file: &Path) -> CheckContext {
     check_context(options, config, &bundles)
 }
 
-/// Asks for one file; why it is to be checked here, if it is.
+/// Asks for one file. Returns an error with the reason if the file must be checked here.
 fn ask_for(line: &mut Line, (file, check_context): &Question) -> Result<Checked, String> {
     let request = Request::Check {
         file: file.clone(),
@@ -241,7 +248,7 @@ fn ask_for_all(directory: &Path, questions: &[Question]) -> Result<Vec<Checked>,
     all.ok_or_else(|| "it has not answered everything".to_owned())
 }
 
-/// Prints what a run of our own would print.
+/// Prints the same output as a run in this process.
 fn print(args: &CheckArgs, prepared: Prepared, given: Given, left: Vec<String>) -> Exit {
     if args.print.verbose {
         let by = given.by;
@@ -264,14 +271,14 @@ fn print(args: &CheckArgs, prepared: Prepared, given: Given, left: Vec<String>) 
     printer.finish()
 }
 
-/// Says what was not checked.
+/// Prints the files that were not checked.
 fn interrupted(args: &CheckArgs, prepared: Prepared) -> Exit {
     let mut printer = printer(args, prepared);
     printer.take(News::Interrupted);
     printer.finish()
 }
 
-/// Who knows what is to be checked, and nothing else yet.
+/// Creates a printer that knows the files to be checked and no results yet.
 fn printer(args: &CheckArgs, prepared: Prepared) -> Printer {
     let options = &prepared.options;
     let (places, outputs) = (places(options), prepared.outputs);

@@ -1,4 +1,4 @@
-//! `qcbus bundle new`: a directory with a bundle of one's own.
+//! `qcbus bundle new`: creates a directory with a new bundle.
 
 mod python;
 mod rust;
@@ -14,18 +14,19 @@ use super::manifests::{Refusal, good_name, said, usage};
 use super::settings::absolute;
 use crate::args::BundleNewArgs;
 
-/// What a bundle is written in. A language more is a file beside `rust.rs`, with its templates below.
+/// Programming language of a new bundle. To add one, write a file beside `rust.rs` and put its
+/// templates in a directory of that name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Language {
     Python,
     Rust,
 }
 
-/// A directory to be made.
+/// A directory to be created.
 struct Layout {
-    /// Paths in it, and what they hold.
+    /// Relative paths of the files, and their contents.
     files: Vec<(&'static str, String)>,
-    /// What to type next, in it.
+    /// Commands to type next in the directory.
     next: String,
 }
 
@@ -42,7 +43,7 @@ fn new(args: &BundleNewArgs) -> Result<String, Refusal> {
     };
     let directory = absolute(Path::new(&args.name));
     let shown = to_text(&directory);
-    // It must be ours: nothing of anybody is written over.
+    // The directory must be new, so that no existing file is overwritten.
     std::fs::create_dir(&directory)
         .map_err(|error| usage(format!("cannot make {shown}: {error}")))?;
     for (path, text) in &layout.files {
@@ -60,7 +61,7 @@ fn new(args: &BundleNewArgs) -> Result<String, Refusal> {
     ))
 }
 
-/// Exactly one is given.
+/// Returns the language. The arguments contain exactly one.
 fn language(args: &BundleNewArgs) -> Language {
     match args.python {
         true => Language::Python,

@@ -1,8 +1,8 @@
-//! A bundle in Python: a script, its examples, and nothing to build.
+//! A bundle in Python: a script and its examples, without a build step.
 
 use super::Layout;
 
-/// Paths, and what they are made of.
+/// Paths of the files and their templates.
 const TEMPLATES: [(&str, &str); 4] = [
     ("README.md", include_str!("python/README.md.in")),
     (".gitignore", include_str!("python/gitignore.in")),
@@ -10,9 +10,9 @@ const TEMPLATES: [(&str, &str); 4] = [
     ("test_bundle.py", include_str!("python/test_bundle.py.in")),
 ];
 
-/// What a bundle of this name consists of.
+/// Returns the files of a bundle with this name.
 pub(super) fn layout(name: &str) -> Layout {
-    // A UID takes letters, digits and underscores between its dots.
+    // A UID allows letters, digits and underscores between its dots.
     let domain = name.replace(['-', '.'], "_").to_ascii_lowercase();
     let fill = |text: &str| {
         let text = text.replace("{{name}}", name);

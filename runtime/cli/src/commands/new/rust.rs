@@ -8,10 +8,10 @@ use super::Layout;
 use crate::commands::manifests::{Refusal, usage};
 use crate::commands::settings::absolute;
 
-/// Where this program was built.
+/// Directory in which this program was built.
 const BUILT_AT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
-/// Paths, and what they are made of.
+/// Paths of the files and their templates.
 const TEMPLATES: [(&str, &str); 8] = [
     ("Cargo.toml", include_str!("rust/Cargo.toml.in")),
     ("README.md", include_str!("rust/README.md.in")),
@@ -29,7 +29,7 @@ const TEMPLATES: [(&str, &str); 8] = [
     ),
 ];
 
-/// What a bundle of this name consists of.
+/// Returns the files of a bundle with this name.
 pub(super) fn layout(name: &str, sdk: Option<&Path>) -> Result<Layout, Refusal> {
     let begins = name.starts_with(|c: char| c.is_ascii_alphabetic());
     let good = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
@@ -55,7 +55,7 @@ pub(super) fn layout(name: &str, sdk: Option<&Path>) -> Result<Layout, Refusal> 
         .iter()
         .map(|(path, text)| (*path, fill(text)))
         .collect();
-    // The compiler and the versions that the SDK is tested with.
+    // The bundle uses the compiler and the versions with which the SDK is tested.
     for shared in ["rust-toolchain.toml", "Cargo.lock"] {
         if let Ok(text) = std::fs::read_to_string(sdk.join(shared)) {
             files.push((shared, text));
@@ -67,7 +67,7 @@ pub(super) fn layout(name: &str, sdk: Option<&Path>) -> Result<Layout, Refusal> 
     Ok(Layout { files, next })
 }
 
-/// The checkout whose SDK is meant.
+/// Returns the named checkout that contains the SDK, else the one that this program was built from.
 fn checkout(named: Option<&Path>) -> Result<PathBuf, Refusal> {
     let path = named.map_or_else(|| PathBuf::from(BUILT_AT), absolute);
     let has_the_sdk = path.join("bundles/sdk/Cargo.toml").is_file();

@@ -1,4 +1,4 @@
-//! Runs of text, references and CDATA sections between two tags.
+//! Handles runs of text, references and CDATA sections between two tags.
 
 use qcbus_document::FaultCode;
 
@@ -48,7 +48,8 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
         text: &str,
         after: bool,
     ) -> Result<(), Stop> {
-        // The characters are reported as such, and a file that was not cut off has nothing else there.
+        // NUL characters are already reported as forbidden. A file that was not cut off has no
+        // other text here.
         if text
             .bytes()
             .all(|byte| byte == 0 || byte.is_ascii_whitespace())
@@ -96,7 +97,7 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
         at: usize,
         text: &str,
     ) -> Result<(), Stop> {
-        // The refused DOCTYPE may well have defined it: one fault says it all.
+        // The refused DOCTYPE may have defined the entity, and one fault is enough.
         if self.refused_doctype && text.contains("not defined") {
             return Ok(());
         }
@@ -118,7 +119,7 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
         }
         let content = &file.text[from + HEAD..to - TAIL];
         if !self.run.active {
-            // A section alone is literally its content.
+            // The value of a single section is exactly its content.
             self.append(file, from + HEAD, to - TAIL, content, false);
         } else {
             self.append(file, from, to, content, true);
@@ -126,7 +127,8 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
         Ok(())
     }
 
-    /// White space alone is no character data, but before a reference it is part of the run.
+    /// Starts a run with the white space before a reference. White space without a reference is not
+    /// character data.
     pub(super) fn lead(&mut self, file: File<'t>, to: usize) {
         let before = &file.text[..to];
         let blank = before.len() - before.trim_ascii_end().len();
@@ -135,8 +137,8 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
         }
     }
 
-    /// Adds a piece to the run of character data. `differs` says that its value is not what the
-    /// text has from `from` to `to`.
+    /// Adds a piece to the run of character data. `differs` means that its value is not identical
+    /// to the text from `from` to `to`.
     pub(super) fn append(
         &mut self,
         file: File<'t>,
@@ -155,7 +157,7 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
         }
         if differs {
             run.resolved = true;
-            // A reference to a carriage return means one.
+            // A reference to a carriage return keeps its character and is not normalized.
             if value == "\r" {
                 run.value.push_str(value);
             } else {
@@ -165,7 +167,7 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
         run.stop = to;
     }
 
-    /// Character data ends where an element starts or ends.
+    /// Ends the run of character data, because an element starts or ends.
     #[inline]
     pub(super) fn flush(&mut self, file: File<'t>) -> Result<(), Stop> {
         if !self.run.active {

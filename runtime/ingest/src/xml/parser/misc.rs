@@ -1,4 +1,4 @@
-//! What is no content: comments, processing instructions, the XML declaration, DOCTYPE.
+//! Handles markup without content: comments, processing instructions, the XML declaration, DOCTYPE.
 
 use qcbus_document::FaultCode;
 
@@ -62,8 +62,8 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
         }
     }
 
-    /// A document type declaration. One that only names the root says nothing and does no harm, and
-    /// tools write it; whatever declares or refers to something is refused.
+    /// Handles a document type declaration. A declaration with only the name of the root is
+    /// harmless, and tools write it. A declaration that defines or refers to something is refused.
     pub(super) fn doctype(
         &mut self,
         file: File<'t>,
@@ -84,7 +84,7 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
     }
 }
 
-/// Whether a document type declaration has nothing but a name: no subset, and no reference to one.
+/// Checks whether a document type declaration has only a name: no subset, and no reference to one.
 fn is_bare(declaration: &str) -> bool {
     let inside = declaration
         .strip_prefix("<!DOCTYPE")
@@ -95,8 +95,8 @@ fn is_bare(declaration: &str) -> bool {
     })
 }
 
-/// What is wrong with the inside of an XML declaration, which is `version`, `encoding`,
-/// `standalone` in this order, the first of them required.
+/// Returns the fault inside an XML declaration, or `None`. It must contain `version`, `encoding`,
+/// `standalone` in this order. Only the first is required.
 fn declaration_trouble(text: &str, from: usize, to: usize) -> Option<(usize, String)> {
     let mut expected: &[&str] = &["version", "encoding", "standalone"];
     for attribute in AttributeScanner::new(text, from..to) {
@@ -129,7 +129,7 @@ fn declaration_trouble(text: &str, from: usize, to: usize) -> Option<(usize, Str
         }
         expected = &expected[place + 1..];
         let sound = match name {
-            // Fifth edition: whatever follows 1. is read as 1.0.
+            // In the fifth edition, every version with the prefix `1.` is read as 1.0.
             "version" => value.strip_prefix("1.").is_some_and(is_digits),
             "standalone" => matches!(value, "yes" | "no"),
             _ => value.starts_with(|c: char| c.is_ascii_alphabetic()),

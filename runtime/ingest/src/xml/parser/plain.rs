@@ -1,4 +1,4 @@
-//! Plain tags, which are nearly all that a file has, without a call of quick-xml for each.
+//! Reads plain tags without a call of quick-xml for each. Nearly all tags in a file are plain.
 
 use super::{File, Open, Parser, Stop, narrow};
 use crate::xml::plain::{PlainTag, end_tag, skip_indent, start_tag};
@@ -6,13 +6,13 @@ use crate::xml::sink::Sink;
 use crate::xml::tag::RawAttribute;
 
 impl<'t, S: Sink> Parser<'_, 't, S> {
-    /// Takes plain tags with nothing but white space between them, from `at` on and within the root
-    /// element; gives the place behind the last. What stands there has been looked at by nobody.
+    /// Reads plain tags with only white space between them, from `at` on and within the root
+    /// element. Returns the position after the last one. The text after it is still unread.
     pub(super) fn plain_tags(&mut self, file: File<'t>, mut at: usize) -> Result<usize, Stop> {
         let text = file.text.as_bytes();
         let mut attributes = std::mem::take(&mut self.attributes);
         let depth = usize::from(self.input.limits.max_depth);
-        // White space is part of a run of character data that has begun.
+        // In a started run of character data, white space belongs to the run.
         while !self.run.active && self.stack.len() > file.floor {
             let from = skip_indent(text, at);
             if text.get(from) != Some(&b'<') {
@@ -91,7 +91,8 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
     }
 }
 
-/// Names with different marks differ; most names in one tag have different ones.
+/// Returns a small hash of a name. Names with different hashes differ, and most names in one tag
+/// have different hashes.
 #[inline]
 fn mark_of(name: &[u8]) -> u8 {
     let (first, last) = (name.first().copied(), name.last().copied());
@@ -110,7 +111,7 @@ mod tests {
     use crate::xml::parser::{Input, SourceText, Splice, SpliceKey, parse_by};
     use crate::xml::sink::Halt;
 
-    /// Everything that comes, in words.
+    /// Records all events as text.
     #[derive(Default, Debug, PartialEq)]
     struct Record(Vec<String>);
 
@@ -174,7 +175,7 @@ mod tests {
         (record, faults)
     }
 
-    /// Both ways of reading must come to the same: nodes, values, faults, places.
+    /// Checks that both ways of reading give the same result: nodes, values, faults, places.
     fn both_agree(text: &str, limits: &Limits) {
         let part = "<road a='1'><x/> <y b=\"&lt;\"></y>t<z/></road>";
         let texts = [text, part];
