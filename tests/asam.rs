@@ -1,4 +1,4 @@
-//! The way of ASAM's framework: a configuration goes in, `Result.xqar` and reports come out, and
+//! Use like ASAM's framework: a configuration goes in, `Result.xqar` and reports come out, and
 //! ASAM's own library reads them.
 
 #![expect(
@@ -20,7 +20,7 @@ use support::inside::skip;
 const IDS: &str = "check_asam_xodr_ids_id_unique_in_class";
 const HEADER: &str = "check_qcbus_xodr_header_attributes";
 
-/// A configuration for a faulty map with two configured checkers and more children.
+/// Returns a configuration for a faulty map with two configured checkers and more children.
 fn config(input: &Path, levels: &str, more: &str) -> String {
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Config>\n\
@@ -145,7 +145,7 @@ fn report_modules_run_afterwards_with_their_params() {
 #[test]
 fn a_malformed_configuration_is_refused_with_its_place() {
     let cli = Cli::new();
-    // The slip in an example of 2023: a letter outside the quotes.
+    // This is the mistake in an example of 2023: a letter outside the quotes.
     let broken = config(&header_faults(), ALL, "").replace("value=\"", "value=\"e\"");
     cli.write("config.xml", broken);
     for command in [
@@ -199,7 +199,7 @@ fn a_bundle_is_a_module_of_the_framework() {
     assert!(issues(&cli.result("xodr.xqar")).any(|(checker, _)| *checker.id == *HEADER));
 }
 
-/// A Python with ASAM's library, or why there is none.
+/// Returns a Python with ASAM's library, or the reason why there is none.
 fn python() -> Result<PathBuf, String> {
     let home = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("asam-venv");
     let python = home.join("bin/python");

@@ -1,7 +1,8 @@
-//! Chaos: whatever dies, every file gets exactly one complete verdict for its exact bytes.
+//! Chaos: processes die at random, but every file gets exactly one complete verdict for its exact
+//! bytes.
 //!
-//! `QCBUS_CHAOS_SECONDS` makes the storm longer (20 by default), `QCBUS_CHAOS_SEED` brings one
-//! back, `QCBUS_MANY_FILES` sets how many files are dropped at once (1,500 by default).
+//! `QCBUS_CHAOS_SECONDS` makes the storm longer (20 by default), `QCBUS_CHAOS_SEED` repeats one,
+//! `QCBUS_MANY_FILES` sets how many files are dropped at once (1,500 by default).
 
 #![allow(
     clippy::unwrap_used,
@@ -25,7 +26,7 @@ use support::judge::{Files, judge, verdicts_in_journal};
 use support::processes::private_kib;
 use support::watchdog::{until_or, until_so};
 
-/// A shared memory of its own, small enough to be filled.
+/// Command for a private shared memory that is small enough to be filled.
 const SMALL_SHM: &str = "mount -t tmpfs -o size=512m tmpfs /dev/shm";
 
 #[test]
@@ -33,11 +34,11 @@ fn nothing_is_lost_whatever_dies() {
     if is_inside() {
         return storm::rage(seed(), storm::seconds());
     }
-    // Inside, nothing is built.
+    // The zoo is built first, because nothing is built inside.
     zoo();
     match run_inside("nothing_is_lost_whatever_dies", SMALL_SHM) {
         Some(status) => assert!(status.success(), "see above"),
-        // Without a shared memory of its own, it is not filled; the rest is the same.
+        // Without a private shared memory the storm does not fill it. The rest is the same.
         None => storm::rage(seed(), storm::seconds()),
     }
 }
@@ -85,8 +86,8 @@ fn memory_does_not_follow_the_number_of_files() {
         "private memory of the broker at its peak: {few_kib} KiB with {few} files, {many_kib} KiB with {many}"
     ));
     let entry = many_kib.saturating_sub(few_kib) * 1024 / (many - few);
-    // An entry of the files table with its path, stamps and verdict, and twice that for vectors
-    // that double: what it costs is kept per file, and nothing else is.
+    // This covers an entry of the files table with its path, stamps and verdict, twice because
+    // vectors double. No other cost grows with the number of files.
     assert!(entry < 6 << 10, "{entry} bytes for each further file");
 }
 
@@ -108,8 +109,8 @@ fn peak_with(count: u64) -> u64 {
     peak
 }
 
-/// The most private memory in KiB that the broker was seen with until all files were judged. What it
-/// maps of the bus is not counted: how many documents lie there at once is a matter of chance.
+/// Returns the maximum private memory of the broker in KiB until all files are judged. Its mappings
+/// of the bus do not count, because the number of documents there is random.
 fn peak_until_judged(farm: &Farm, broker: u32, total: usize) -> u64 {
     let total = u64::try_from(total).unwrap();
     let (mut done, mut peak) = (0, 0);
@@ -149,7 +150,7 @@ fn results(farm: &Farm) -> usize {
         .count()
 }
 
-/// Stops the broker and demands that nothing of it stays.
+/// Stops the broker and asserts that it leaves nothing behind.
 fn end(farm: &Farm, mut broker: support::broker::Broker) {
     let prefix = farm.shm_prefix();
     let down = farm.qcbus(&["down"]);

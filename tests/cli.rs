@@ -1,5 +1,5 @@
-//! What is typed at a desk must not succeed by doing nothing: bundles that cannot be added, removed
-//! or found, and configurations that ask for what is not there.
+//! Commands must not succeed without an effect: bundles that cannot be added, removed or found, and
+//! configurations that demand missing items.
 
 #![expect(
     clippy::unwrap_used,
@@ -18,7 +18,7 @@ use support::content::Content;
 use support::farm::{Farm, zoo};
 use support::watchdog;
 
-/// A program that can be started and joins no bus.
+/// Creates a program that can be started but joins no bus.
 fn idler(directory: &Path) -> String {
     let path = directory.join("idler");
     std::fs::write(&path, "#!/bin/sh\nexec sleep 600\n").unwrap();
@@ -126,7 +126,7 @@ fn a_running_broker_takes_a_bundle_or_nothing_is_added() {
     let (code, text) = told(&farm.qcbus(&add));
     assert_eq!(code, Some(0), "{text}");
     assert!(farm.bundles_d().join("polite.json").exists());
-    // It has been taken before the command ends.
+    // The broker has accepted the bundle before the command ends.
     let is_known = || {
         let status = farm.status().unwrap();
         status.peers.iter().any(|peer| peer.name == "polite")
@@ -141,7 +141,7 @@ fn a_running_broker_takes_a_bundle_or_nothing_is_added() {
         assert_eq!(code, Some(2), "{name}: {text}");
     }
 
-    // One bad manifest keeps the broker from taking any.
+    // A single bad manifest keeps the broker from accepting any.
     std::fs::write(farm.bundles_d().join("broken.json"), "{").unwrap();
     let (code, text) = told(&farm.qcbus(&add));
     assert_eq!(code, Some(2), "{text}");
@@ -152,7 +152,7 @@ fn a_running_broker_takes_a_bundle_or_nothing_is_added() {
     assert!(!farm.bundles_d().join("polite.json").exists());
 }
 
-/// Everything that a configuration can name and nobody has.
+/// Configuration with every kind of name that may be unknown.
 const ODD: &str = r#"<Config>
 <Param name="InputFile" value="a.xodr"/>
 <CheckerBundle application="xodr">
@@ -164,7 +164,7 @@ const ODD: &str = r#"<Config>
 <ReportModule application="GitforgeReport"/>
 </Config>"#;
 
-/// Words of what is wrong with it, and the rows.
+/// Parts of the expected warnings, and their rows.
 const ODDITIES: [(&str, u32); 4] = [
     (
         "`check_asam_xodr_road_length_sum_geometrie`; did you mean",
@@ -194,7 +194,7 @@ fn what_a_configuration_names_in_vain_is_said_wherever_it_is_used() {
     refused(&said, &cli, 2, "not in order, 4 warnings");
     says_it_all(&said.stdout);
 
-    // The unknown checker and the unknown bundle are demanded, and nobody can run them.
+    // The unknown checker and the unknown bundle are demanded, but cannot be run.
     let said = cli.qcbus(&["check", "-c", "config.xml", "--quiet"]);
     assert_eq!(said.code, Some(3), "{}", said.whole(&cli));
     says_it_all(&said.stderr);

@@ -1,4 +1,4 @@
-//! What a person reads who types commands: helps, mistakes, explanations.
+//! Output for people who type commands: helps, mistakes, explanations.
 
 #![expect(
     clippy::unwrap_used,
@@ -11,7 +11,7 @@ mod support;
 use support::cli::Cli;
 use support::content::Content;
 
-/// Types several commands and shows what was said.
+/// Runs several commands and returns their output.
 fn session(cli: &Cli, commands: &[&str]) -> String {
     let mut text = String::new();
     for command in commands {
@@ -236,7 +236,7 @@ fn a_gate_that_is_watched_is_refused_whatever_the_way_to_it() {
     assert!(!cli.path().join("in/accepted").exists());
 }
 
-/// A check that asks nobody is in need of no instance.
+/// A check without a broker needs no instance.
 #[test]
 fn a_check_is_made_where_no_instance_can_be() {
     let cli = Cli::new();
@@ -245,14 +245,14 @@ fn a_check_is_made_where_no_instance_can_be() {
     let there = cli.qcbus(&["check", map, "--cold"]);
     assert_eq!(there.code, Some(0), "{}", there.whole(&cli));
     let instance = cli.path().join(".run/qcbus/default");
-    // An earlier command may have made it.
+    // An earlier command may have created it.
     let _ = std::fs::remove_dir(&instance);
     std::fs::write(&instance, "no directory").unwrap();
     for more in [&[][..], &["--cold"]] {
         let said = cli.qcbus(&[&["check", map], more].concat());
         assert_eq!(said.whole(&cli), there.whole(&cli), "{more:?}");
     }
-    // One that is named is not passed over.
+    // An instance that is named explicitly is not ignored.
     let said = cli.qcbus(&["check", map, "--instance", "../other"]);
     assert_eq!(said.code, Some(2), "{}", said.whole(&cli));
     assert!(said.stderr.contains("../other"), "{}", said.whole(&cli));

@@ -1,4 +1,4 @@
-//! Bundles that do what is no business of theirs, inside the sandbox and without it.
+//! Bundles that exceed their task, inside the sandbox and without it.
 
 #![allow(
     clippy::unwrap_used,
@@ -23,7 +23,7 @@ use support::inside::skip;
 use support::judge::{Files, judge};
 use support::watchdog::{until, until_or};
 
-/// Without Landlock there is nothing to test but that it is said.
+/// Checks whether Landlock is missing. Then the test is skipped with a message.
 fn landlock_is_missing() -> bool {
     let missing = qcbus_confine::kernel_level() == 0;
     if missing {
@@ -52,7 +52,7 @@ fn line_of(farm: &Farm, bundle: &str) -> String {
     line.unwrap_or_else(|| panic!("{text}")).to_owned()
 }
 
-/// What the animal said last, once it has had a job.
+/// Waits for this output of the animal, which needs a job for it, and returns the log.
 fn words(farm: &Farm, what: &str) -> String {
     until_or(
         "the animal has had a job",
@@ -138,12 +138,12 @@ fn standard_bundles_are_confined_and_that_is_said() {
     }
 }
 
-/// What the animal meddles with.
+/// Targets of the animal.
 struct Victims {
     file: PathBuf,
     listener: TcpListener,
     process: Child,
-    /// How long what it starts would sleep: by that it is found.
+    /// Sleep time of the processes that the animal starts. The test finds them by it.
     sleep: String,
 }
 
@@ -164,7 +164,7 @@ impl Victims {
         }
     }
 
-    /// The command line of the animal that is told of them. The shell takes it apart.
+    /// Returns the command line of the animal with its targets. The shell splits it.
     fn animal(&self) -> PathBuf {
         let port = self.listener.local_addr().unwrap().port();
         let (file, victim, sleep) = (self.file.display(), self.process.id(), &self.sleep);
@@ -178,7 +178,7 @@ impl Victims {
         self.process.try_wait().unwrap().is_none()
     }
 
-    /// Processes that the animal has started, wherever they have placed themselves.
+    /// Counts the processes that the animal has started, in whatever session they are.
     fn sleepers(&self) -> usize {
         let entries = std::fs::read_dir("/proc").unwrap().flatten();
         let lines = entries.filter_map(|it| std::fs::read(it.path().join("cmdline")).ok());
@@ -212,7 +212,7 @@ fn with_a_meddler(
     (farm, broker, victims, log)
 }
 
-/// A manifest that declares something.
+/// Adds a manifest with declared permissions.
 fn declare(farm: &Farm, program: &Path, may: &serde_json::Value) {
     let manifest = serde_json::json!({ "module": [{
         "name": "meddles",

@@ -1,5 +1,5 @@
-//! Hostile clients of the control socket: whatever they do, an honest `status` is answered beside them, and
-//! when they have gone nothing of them is left. `QCBUS_FUZZ_SECONDS` is how long they go on.
+//! Hostile clients of the control socket: an honest `status` beside them is always answered, and
+//! they leave nothing behind. `QCBUS_FUZZ_SECONDS` sets the duration.
 
 #![expect(
     clippy::unwrap_used,
@@ -25,10 +25,10 @@ use support::dice::{Dice, seed};
 use support::farm::{Farm, tail};
 use support::watchdog::{pause, until_or};
 
-/// Descriptors that most machines give a process.
+/// Number of descriptors that most machines give a process.
 const USUAL: u64 = 1024;
 
-/// A broker with as many descriptors as are usual.
+/// Starts a broker with the usual number of descriptors.
 fn serve(farm: &Farm) -> Broker {
     let plain = farm.serve_command();
     let mut command = Command::new("sh");
@@ -43,7 +43,7 @@ fn serve(farm: &Farm) -> Broker {
     broker
 }
 
-/// This process needs more descriptors than those whom it attacks.
+/// Raises the limit of descriptors, because this process needs more than its victims.
 fn be_many() {
     use rustix::process::{Resource, getrlimit, setrlimit};
     let mut limit = getrlimit(Resource::Nofile);
@@ -56,7 +56,7 @@ fn descriptors(broker: &Broker) -> usize {
     std::fs::read_dir(path).unwrap().count()
 }
 
-/// How many there are once it has judged something.
+/// Returns the number of descriptors after the broker has judged a file.
 fn descriptors_at_work(farm: &Farm, broker: &Broker) -> usize {
     farm.write("early.xodr", &Content::Good(0).bytes());
     assert_eq!(farm.verdict("early.xodr").verdict, Verdict::Accepted);
@@ -133,7 +133,7 @@ fn who_waits_and_vanishes_makes_room_for_others() {
         told > 100,
         "those for whom there is no room are told so: {told}"
     );
-    // And who waits rightly is told the verdict.
+    // A client with a valid request gets the verdict.
     farm.write("never.xodr", &Content::Good(1).bytes());
     assert_eq!(farm.verdict("never.xodr").verdict, Verdict::Accepted);
 }
@@ -142,7 +142,7 @@ fn bytes(dice: &mut Dice, count: usize) -> Vec<u8> {
     (0..count).map(|_| dice.roll().to_le_bytes()[0]).collect()
 }
 
-/// What one hostile client does.
+/// Runs one hostile client.
 fn attack(dice: &mut Dice, socket: &Path, kept: &mut Vec<UnixStream>) {
     let Ok(mut client) = UnixStream::connect(socket) else {
         return;
@@ -150,7 +150,7 @@ fn attack(dice: &mut Dice, socket: &Path, kept: &mut Vec<UnixStream>) {
     let limit = Some(Duration::from_millis(5));
     client.set_write_timeout(limit).unwrap();
     let status = b"{\"request\":\"status\"}\n";
-    // A client that was sent away cannot say any more; that is as it should be.
+    // A rejected client cannot send any more. This is correct.
     let _ = match dice.below(8) {
         0 => client.write_all(&bytes(dice, 300)),
         1 => client.write_all(&vec![b'['; 200_000]),
@@ -164,7 +164,7 @@ fn attack(dice: &mut Dice, socket: &Path, kept: &mut Vec<UnixStream>) {
         _ => Ok(()),
     };
     if dice.below(4) > 0 {
-        // It neither reads nor goes.
+        // This client neither reads nor disconnects.
         kept.push(client);
     }
     if kept.len() > 700 {
@@ -225,7 +225,7 @@ fn an_honest_client_is_answered_beside_hostile_ones() {
     assert!(broker.wait().success());
 }
 
-/// It says neither yes nor no, and whoever asks must not hang with it.
+/// A stopped broker does not answer, and its clients must not hang with it.
 #[test]
 fn a_broker_that_is_stopped_is_named_and_not_waited_for() {
     let farm = Farm::new();
@@ -264,7 +264,7 @@ fn whoever_waits_when_the_broker_is_stopped_is_told_that_none_runs() {
     );
 }
 
-/// `qcbus down && qcbus serve` is what everybody writes.
+/// `qcbus down && qcbus serve` is a common command line.
 #[test]
 fn what_is_down_can_be_started_again_at_once() {
     let farm = Farm::new();

@@ -1,5 +1,5 @@
-//! What a broker removes: nothing from a directory that is not its own, as when a state is copied, moved or
-//! pointed elsewhere; and of its own, the directories that are empty.
+//! Removal by a broker: it removes no file from a foreign directory, for example after a state is
+//! copied, moved or pointed elsewhere. In its own directory it removes empty directories.
 
 #![expect(
     clippy::unwrap_used,
@@ -17,7 +17,7 @@ use support::content::Content;
 use support::farm::Farm;
 use support::watchdog::until_or;
 
-/// A farm with a gate and reports beside its results.
+/// Creates a farm with a gate, and with reports beside its results.
 fn farm_with_everything() -> Farm {
     let mut farm = Farm::new();
     let gate = farm.base().join("gate").to_string_lossy().into_owned();
@@ -26,7 +26,7 @@ fn farm_with_everything() -> Farm {
     farm
 }
 
-/// Serves a good and a bad file until their reports are there.
+/// Serves a good and a bad file until their reports exist.
 fn serve_both(farm: &Farm) -> Broker {
     farm.write("good.xodr", &Content::Good(1).bytes());
     farm.write("bad.xodr", &Content::NoHeader(1).bytes());
@@ -39,7 +39,7 @@ fn serve_both(farm: &Farm) -> Broker {
     broker
 }
 
-/// Everything that a farm has written for others to read.
+/// Returns every file that a farm has written for others.
 fn written(farm: &Farm) -> Vec<PathBuf> {
     let mut files = Vec::new();
     let mut open = vec![farm.out(), farm.base().join("gate")];
@@ -141,7 +141,7 @@ fn results_in_a_former_directory_belong_to_whoever_writes_there_now() {
     let state = first.base().join("state");
     copy_tree(&first.out().join(".qcbus"), &state);
 
-    // Somebody else writes results of files of the same names there.
+    // Another broker writes results of files with the same names there.
     std::fs::remove_dir_all(first.out()).unwrap();
     let inbox = first.base().join("other");
     std::fs::create_dir(&inbox).unwrap();

@@ -1,9 +1,9 @@
-//! Crash points: the broker is killed before and after every single thing that it does to the disk
-//! in a small job. Whatever lies there then, the next broker makes it right.
+//! Crash points: the broker is killed before and after each of its disk operations in a small job.
+//! The next broker repairs every resulting state.
 //!
-//! The job: a file is written and accepted, written again and rejected, and deleted; then the broker
-//! is asked to end. `QCBUS_CRASH_POINTS` says at how many points, or `all` (a sample by default);
-//! `QCBUS_CHAOS_SEED` brings a sample back.
+//! The job: a file is written and accepted, written again and rejected, and deleted; then the
+//! broker is told to end. `QCBUS_CRASH_POINTS` sets the number of points, or `all` (a sample by
+//! default); `QCBUS_CHAOS_SEED` repeats a sample.
 
 #![expect(
     clippy::unwrap_used,
@@ -25,13 +25,13 @@ use support::judge::{Files, judge, verdicts_in_journal};
 use support::tracer::{Aim, Side, Traced, refused};
 use support::watchdog::until_or;
 
-/// Points of a sample.
+/// Number of points in a sample.
 const SAMPLE: usize = 10;
-/// The file of the small job, and one that nothing happens to.
+/// File of the small job, and a file that never changes.
 const NAME: &str = "job.xodr";
 const BYSTANDER: &str = "bystander.xodr";
 
-/// What happens to the file between the crash and the next broker.
+/// Change of the file between the crash and the next broker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Meanwhile {
     Nothing,
@@ -39,12 +39,12 @@ enum Meanwhile {
     Rewritten,
 }
 
-/// A farm with a gate whose brokers are traced.
+/// A farm with a gate and traced brokers.
 struct Victim {
     farm: Farm,
     broker: Option<Traced>,
     files: Files,
-    /// Makes the bytes of every round differ from all others.
+    /// Number that makes the bytes of every round different.
     number: u64,
 }
 
@@ -78,7 +78,7 @@ impl Victim {
         self.number
     }
 
-    /// A broker, killed at this point if it gets there.
+    /// Starts a broker. It is killed at the given point if it reaches it.
     fn start(&mut self, aim: Option<Aim>) -> &Traced {
         let below = [self.farm.out(), self.farm.gate(), self.farm.instance()];
         let (command, log) = (self.farm.serve_command(), self.farm.log_path());
@@ -90,7 +90,7 @@ impl Victim {
         self.broker.as_ref().unwrap()
     }
 
-    /// Waits until something is so, or the broker has ended.
+    /// Waits until a condition holds or the broker has ended.
     fn until(&self, what: &str, is_so: impl Fn() -> bool) -> Option<ExitStatus> {
         until_or(
             what,
@@ -108,7 +108,7 @@ impl Victim {
         format!("{deeds:#?}\n{status:#?}\n{}", tail(&log))
     }
 
-    /// The small job, until it is over or the broker is.
+    /// Runs the small job until the job or the broker ends.
     fn job(&mut self) -> ExitStatus {
         let steps = [Victim::accept, Victim::reject, Victim::remove];
         let ended = steps.iter().find_map(|step| step(self));
@@ -153,14 +153,14 @@ impl Victim {
         })
     }
 
-    /// Asks it to end.
+    /// Tells the broker to end.
     fn down(&self) -> ExitStatus {
         let _ = self.farm.ask(&Request::Down);
         let ended = self.until("the broker ends", || false);
         ended.unwrap()
     }
 
-    /// A broker that nobody kills puts everything right.
+    /// Starts a broker that is not killed, and waits until it has repaired everything.
     fn recover(&mut self, what: &str) {
         self.start(None);
         let total = u64::try_from(self.files.len()).unwrap();
@@ -176,7 +176,7 @@ impl Victim {
     }
 
     fn demand(&self, what: &str) {
-        // What is withdrawn late is withdrawn: only what stays is a complaint.
+        // A late withdrawal is allowed. Only a remaining file is a complaint.
         let complaints = || {
             let mut judgement = judge(&self.farm, &self.files, &[]);
             judgement.gate(&self.farm, &self.files, &Files::new(), &self.farm.gate());
@@ -194,17 +194,17 @@ impl Victim {
     }
 }
 
-/// What is interrupted.
+/// Work that is interrupted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Work {
-    /// The small job, with a broker that is ready for it.
+    /// The small job, with a ready broker.
     Job,
-    /// The start of a broker that finds a file rewritten.
+    /// The start of a broker that finds a rewritten file.
     Start,
 }
 
 impl Victim {
-    /// Does the work, killed at this point if it gets there.
+    /// Does the work. The broker is killed at the given point if it reaches it.
     fn work(&mut self, work: Work, aim: Option<Aim>) -> ExitStatus {
         match work {
             Work::Job => {
@@ -234,7 +234,7 @@ impl Victim {
     }
 }
 
-/// The points of a work with so many deeds that are tried.
+/// Returns the points to try for a work with this number of disk operations.
 fn points(deeds: usize) -> Vec<Aim> {
     let sides = [Side::Before, Side::After];
     let of = |deed| sides.map(|side| Aim { deed, side });
@@ -247,7 +247,7 @@ fn points(deeds: usize) -> Vec<Aim> {
     let seed = seed();
     report(&format!("crash points: QCBUS_CHAOS_SEED={seed}"));
     let mut dice = Dice::new(seed);
-    // One of each stretch of the work, so that every stage of it is among them.
+    // One point is taken from each stretch of the work, so that every stage is covered.
     let stretch = |at: usize| &all[at * all.len() / wanted..(at + 1) * all.len() / wanted];
     let chosen = (0..wanted).filter_map(|at| dice.pick(stretch(at)));
     chosen.copied().collect()
@@ -259,8 +259,8 @@ fn killed_anywhere(work: Work, meanwhile: Meanwhile) {
     }
     let mut victim = Victim::new();
     victim.recover("nothing has happened yet");
-    // Some of what the first job leaves in the journal (lists of what is skipped) no later one writes again:
-    // the points are those of a job as all later ones are.
+    // Later jobs do not repeat some journal entries of the first job (lists of skipped checkers).
+    // The points must be those of later jobs.
     let ended = victim.work(work, None);
     assert!(ended.success(), "{ended}\n{}", victim.explain());
     victim.recover("nothing has happened yet");
@@ -286,7 +286,7 @@ fn killed_anywhere(work: Work, meanwhile: Meanwhile) {
             "{work:?}, {meanwhile:?}, killed at {point:?}, {hit}"
         ));
     }
-    // Threads take turns, so that the last points of one run may not be there in another.
+    // The order of threads varies, so that the last points of one run may be missing in another.
     assert!(
         hits * 2 > points.len(),
         "{hits} of {} points were hit",

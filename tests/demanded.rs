@@ -1,5 +1,5 @@
-//! What a configuration demands: a demanded checker that could not look is no answer, and how little
-//! was asked is said.
+//! Demands of a configuration: a demanded checker that could not run gives no answer, and qcbus
+//! reports how little was demanded.
 
 #![expect(
     clippy::unwrap_used,
@@ -92,7 +92,7 @@ fn a_filter_on_what_a_checker_rests_on_makes_no_acceptance() {
 #[test]
 fn where_no_demanded_checker_applies_nobody_looked() {
     let cli = Cli::new();
-    // Of a later version than the file.
+    // This checker is for a later version than that of the file.
     let later = "check_asam_xodr_road_lane_layer_lane_group_width_temporary";
     let plain = sample_farm().join("maps/ring.xodr");
     let said = check_with(&cli, "xodrBundle", &[later], &plain);

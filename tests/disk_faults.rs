@@ -1,6 +1,6 @@
-//! The system gives the broker other answers than it should: no descriptors, no room, a disk that fails,
-//! a server that forgot a file, an interruption, a single byte, or no answer at all. While it is so nothing
-//! false is said, and when it is over everything is right without anybody doing anything.
+//! System calls of the broker fail: no descriptors, no room, a failing disk, a server that forgot a
+//! file, an interruption, a single byte, or no answer at all. During the failure the broker reports
+//! nothing false. Afterwards it recovers without any help.
 
 #![expect(
     clippy::unwrap_used,
@@ -22,7 +22,7 @@ use support::judge::{Files, judge};
 use support::tracer::{Answer, Failure, Kind, Traced, no_other_answers};
 use support::watchdog::{pause, until_or};
 
-/// A farm whose broker gets other answers.
+/// A farm with a broker that gets wrong answers from the system.
 struct Victim {
     farm: Farm,
     broker: Traced,
@@ -30,7 +30,7 @@ struct Victim {
 }
 
 impl Victim {
-    /// `None` where nobody can be given other answers; that is said.
+    /// Creates the farm. Returns `None` with a message if the answers cannot be replaced here.
     fn new(test: &str) -> Option<Victim> {
         if let Some(why) = no_other_answers() {
             skip(test, &why);
@@ -58,7 +58,7 @@ impl Victim {
         self.files.insert(name.to_owned(), content);
     }
 
-    /// Files of every kind of fate, all of which have to do with what lies there already.
+    /// Writes files with every kind of outcome. All of them relate to existing files.
     fn work(&mut self, round: u64) {
         self.put("good.xodr", Content::Good(100 + round));
         self.put("bad.xodr", Content::NoHeader(100 + round));
@@ -72,7 +72,7 @@ impl Victim {
         format!("{:#?}\n{}", self.farm.status(), tail(&self.farm.log()))
     }
 
-    /// Everything gets the verdict that it must have, and lies where it belongs.
+    /// Waits until every file has the required verdict and is at its place.
     fn settles(&self, what: &str) {
         let total = u64::try_from(self.files.len()).unwrap();
         let quiet = || {
@@ -99,7 +99,7 @@ impl Victim {
         );
     }
 
-    /// Nothing that is said at this moment is false: a verdict is the right one, or none.
+    /// Asserts that no current answer is false: a verdict is correct, or there is none.
     fn says_nothing_false(&self, what: &str) {
         for (name, content) in &self.files {
             let file = self.farm.root().join(name);
@@ -118,7 +118,7 @@ impl Victim {
         }
     }
 
-    /// While this goes wrong, files come and change.
+    /// Adds and changes files during a failure.
     fn through(&mut self, what: &str, failure: &Failure, enough: usize, lasts: Duration) {
         self.broker.failure(Some(failure.clone()));
         let begun = Instant::now();
@@ -218,14 +218,14 @@ fn a_disk_without_room_costs_no_verdict() {
     }
 }
 
-/// A server that is gone: whoever asks for its files never gets an answer.
+/// A server is gone: requests for its files never get an answer.
 #[test]
 fn a_file_that_never_answers_is_named_and_holds_up_nobody() {
     let test = "a_file_that_never_answers_is_named_and_holds_up_nobody";
     let Some(mut victim) = Victim::new(test) else {
         return;
     };
-    // Whichever look it is: the watcher has several, and the one who reads has others.
+    // Every lookup may be affected: the watcher has several, and the reader has others.
     let looks = (1..=6).map(|one_in| (Kind::Look, one_in));
     for (round, (kind, one_in)) in looks.chain([(Kind::Read, 1)]).enumerate() {
         let round = u64::try_from(round).unwrap();
@@ -246,7 +246,7 @@ fn a_file_that_never_answers_is_named_and_holds_up_nobody() {
             status.unseen.iter().any(|it| it.path == map).then_some(())
         };
         until_or("it is named", named, || victim.explain());
-        // Nobody asks for this one: it is noticed because somebody watches.
+        // No client asks for this file. The watcher must notice it.
         let unasked = format!("unasked-{round}.xodr");
         victim.put(&unasked, Content::Good(2000 + round));
         let result = victim.farm.out().join(format!("{unasked}.xqar"));
@@ -264,7 +264,7 @@ fn a_file_that_never_answers_is_named_and_holds_up_nobody() {
             file: map,
             timeout_ms: Some(60_000),
         };
-        // He does not wait for his time to be over: nobody knows when the file answers.
+        // The answer comes before the timeout, because the file may never answer.
         let said = victim.farm.ask(&ask);
         let is_no_verdict = match &said {
             Some(Response::Unanswered { .. }) => true,
@@ -280,7 +280,7 @@ fn a_file_that_never_answers_is_named_and_holds_up_nobody() {
     }
 }
 
-/// The program of a manifest lies on a server that is gone: the process that runs goes on, and so does everybody.
+/// The program of a manifest is on a lost server. Its process and all others go on.
 #[test]
 fn a_program_that_never_answers_holds_up_nobody() {
     let test = "a_program_that_never_answers_holds_up_nobody";
@@ -329,7 +329,7 @@ fn a_program_that_never_answers_holds_up_nobody() {
         || victim.farm.status()?.unseen.is_empty().then_some(()),
         || victim.explain(),
     );
-    // A change is seen then.
+    // A change is noticed afterwards.
     victim.farm.send_away("polite");
     until_or(
         "it has gone",

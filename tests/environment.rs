@@ -1,4 +1,4 @@
-//! A broker whose program lies in an environment of Python that nobody has activated.
+//! A broker with its program in a Python environment that is not activated.
 
 #![expect(
     clippy::unwrap_used,
@@ -17,7 +17,7 @@ use support::broker::Broker;
 use support::farm::{Farm, copy_program, tail, zoo};
 use support::watchdog::until_or;
 
-/// What a service or cron has.
+/// Search path of a service or of cron.
 const PATH: &str = "/usr/local/bin:/usr/bin:/bin";
 
 fn install(path: &Path, text: &str) {
@@ -25,7 +25,7 @@ fn install(path: &Path, text: &str) {
     std::fs::set_permissions(path, Permissions::from_mode(0o755)).unwrap();
 }
 
-/// A farm, and an environment with a program and an "interpreter", which is a bundle whatever it is given.
+/// A farm, and an environment with a program and an "interpreter", which is always a bundle.
 struct Service {
     farm: Farm,
     program: PathBuf,
@@ -63,7 +63,7 @@ impl Service {
         self
     }
 
-    /// Adds a script by the program of the environment.
+    /// Adds a script with the program of the environment.
     fn add(&self, program: &Path, more: &[&str]) -> (Option<i32>, String) {
         let mut command = Command::new(program);
         command.args(["bundle", "add", "mine"]).args(more);
@@ -75,7 +75,7 @@ impl Service {
         self.farm.base().join("mine.py")
     }
 
-    /// The command of the manifest that was written.
+    /// Returns the command in the written manifest.
     fn command(&self) -> String {
         let manifest = std::fs::read(self.farm.bundles_d().join("mine.json")).unwrap();
         let manifest: serde_json::Value = serde_json::from_slice(&manifest).unwrap();
@@ -85,7 +85,7 @@ impl Service {
             .to_owned()
     }
 
-    /// The version of the bundle that is ready.
+    /// Waits until the bundle is ready and returns its version.
     fn version(&self) -> String {
         let ready = || {
             let mut peers = self.farm.status()?.peers.into_iter();
@@ -98,13 +98,13 @@ impl Service {
         until_or("it is ready", ready, || tail(&self.farm.log()))
     }
 
-    /// Whether the manifest names the interpreter of the environment.
+    /// Checks whether the manifest names the interpreter of the environment.
     fn runs_own_python(&self) -> bool {
         self.command().starts_with(self.python.to_str().unwrap())
     }
 }
 
-/// An interpreter that leaves the script alone and is a bundle of this version.
+/// Returns an interpreter that ignores the script and runs a bundle of this version.
 fn as_a_bundle(version: &str) -> String {
     let zoo = zoo();
     format!(
@@ -194,7 +194,7 @@ fn one_shot_module_is_run_by_the_python_of_the_environment() {
     });
     service.farm.let_in_module("mine", &module);
     assert_eq!(service.version(), "7.1");
-    // What the command writes has the whole path of the same one.
+    // The command writes the whole path of the same interpreter.
     let command = format!("python3 {}", service.script().display());
     let (code, text) = service.add(&service.program, &["--asam", &command]);
     assert_eq!(code, Some(0), "{text}");

@@ -1,4 +1,4 @@
-//! The sample farm: what its README promises is what `qcbus check` says, shows and writes.
+//! The sample farm: `qcbus check` reports, shows and writes what its README promises.
 
 #![expect(
     clippy::unwrap_used,
@@ -19,13 +19,13 @@ use support::cli::{Cli, files_below, issues, places, read_result, sample_farm};
 #[derive(Debug)]
 struct Promise {
     file: String,
-    /// The end of a checker id or of a rule UID.
+    /// End of a checker id or of a rule UID.
     rule: String,
-    /// Rows, with columns where the table names them.
+    /// Rows, with columns if the table contains them.
     places: Vec<(u64, Option<u64>)>,
 }
 
-/// Cells of the table below a heading.
+/// Returns the cells of the table below a heading.
 fn table(heading: &str) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(sample_farm().join("README.md")).unwrap();
     let section = text
@@ -42,7 +42,7 @@ fn table(heading: &str) -> Vec<Vec<String>> {
     .collect()
 }
 
-/// The first word in backticks.
+/// Returns the first text in backticks.
 fn quoted(cell: &str) -> String {
     cell.split('`')
         .nth(1)
@@ -70,7 +70,7 @@ fn numbers(cell: &str) -> Vec<(u64, Option<u64>)> {
         .collect()
 }
 
-/// Whether a line of what was printed is an error of that file.
+/// Checks whether a printed line is an error of that file.
 fn has_error(printed: &str, file: &str) -> bool {
     let place = format!("{file}:");
     let mut lines = printed.lines();
@@ -204,14 +204,14 @@ fn results_lie_where_they_are_looked_for() {
         "one each, and nothing else"
     );
 
-    // A file that lies elsewhere has its place by its path from the root.
+    // The result of a file elsewhere is placed by the file's path from the root.
     let ring = farm.join("maps/ring.xodr");
     cli.qcbus(&["check", &ring.to_string_lossy()]);
     let from_root = ring.strip_prefix("/").unwrap().to_string_lossy();
     let result = format!("qcbus-out/{from_root}.xqar");
     assert!(cli.path().join(&result).exists(), "{result}");
 
-    // Whatever else is given, here or in another run.
+    // The place does not depend on other files in this run or in another.
     for file in ["a/x/m.xodr", "a/y/m.xodr", "b/m.xodr"] {
         cli.write(file, "<OpenDRIVE/>");
     }
@@ -234,7 +234,7 @@ fn two_runs_write_the_same_bytes() {
     let farm = sample_farm();
     let one = cli.check_in(&farm, &["."], "one");
     let two = cli.check_in(&farm, &["."], "two");
-    // Only where the results lie differs, which the last words say.
+    // Only the place of the results differs, which the last line names.
     assert_eq!(one.stdout.replace("/one\n", "/two\n"), two.stdout);
     for file in files_below(&cli.path().join("one")) {
         let read = |run: &str| std::fs::read_to_string(cli.path().join(run).join(&file)).unwrap();

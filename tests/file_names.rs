@@ -1,5 +1,5 @@
-//! What a directory may hold besides plain files with plain names: symbolic links, names that are
-//! no text, and what cannot be looked at. Each is checked, or said, and what is said counts.
+//! Unusual contents of a directory: symbolic links, names that are not valid text, and files that
+//! cannot be read. Each is checked or reported, and each report counts.
 
 #![expect(
     clippy::unwrap_used,
@@ -25,7 +25,7 @@ use support::farm::{Farm, copy_program, tail};
 use support::judge::verdicts_in_journal;
 use support::watchdog::{until_or, until_so};
 
-/// A farm with a gate, and with a directory beside it that nobody watches.
+/// Creates a farm with a gate, and with a directory beside it that is not watched.
 fn farm_with_gate() -> (Farm, PathBuf, PathBuf) {
     let mut farm = Farm::new();
     let gate = farm.base().join("gate");
@@ -36,7 +36,7 @@ fn farm_with_gate() -> (Farm, PathBuf, PathBuf) {
     (farm, gate, beside)
 }
 
-/// The verdict on a file's present bytes.
+/// Waits for the verdict on a file's current bytes.
 fn verdict(farm: &Farm, path: &Path) -> FileVerdict {
     let request = Request::Wait {
         file: path.to_path_buf(),
@@ -55,7 +55,7 @@ fn down(farm: &Farm, mut broker: Broker) {
     broker.wait();
 }
 
-/// Nobody asks: the watcher itself notices.
+/// Waits until the watcher itself notices a change. No client asks.
 fn becomes(farm: &Farm, gate: &Path, name: &str, verdict: Option<Verdict>) {
     let file = farm.out().join(format!("{name}.verdict.json"));
     let said = || {
@@ -87,24 +87,24 @@ fn a_file_behind_a_link_is_judged_whatever_happens_behind_it() {
     let told = verdict(&farm, &link);
     assert_eq!(told.file, link);
     assert_eq!(told.xqar, farm.out().join("a.xodr.xqar"));
-    // Its bytes, not another link to them.
+    // The gate contains the bytes, not another link to them.
     let published = std::fs::symlink_metadata(gate.join("a.xodr")).unwrap();
     assert!(published.is_file());
     assert_eq!(std::fs::read(gate.join("a.xodr")).unwrap(), good);
 
-    // Rewritten in place.
+    // The target is rewritten in place.
     std::fs::write(&target, Content::NoHeader(2).bytes()).unwrap();
     becomes(&farm, &gate, "a.xodr", Some(Verdict::Rejected));
-    // Replaced.
+    // The target is replaced.
     std::fs::write(beside.join("new"), Content::Good(3).bytes()).unwrap();
     std::fs::rename(beside.join("new"), &target).unwrap();
     becomes(&farm, &gate, "a.xodr", Some(Verdict::Accepted));
-    // Pointed elsewhere.
+    // The link points elsewhere.
     std::fs::write(beside.join("bad"), Content::NoHeader(4).bytes()).unwrap();
     std::fs::remove_file(&link).unwrap();
     symlink(beside.join("bad"), &link).unwrap();
     becomes(&farm, &gate, "a.xodr", Some(Verdict::Rejected));
-    // To nothing, and back.
+    // The link points to nothing, and then to a file again.
     std::fs::remove_file(beside.join("bad")).unwrap();
     becomes(&farm, &gate, "a.xodr", None);
     let unseen = || farm.status().is_some_and(|it| it.unseen.len() == 1);
@@ -114,7 +114,7 @@ fn a_file_behind_a_link_is_judged_whatever_happens_behind_it() {
     until_so("nothing is unseen any more", || {
         farm.status().is_some_and(|it| it.unseen.is_empty())
     });
-    // Whoever asks at once is told of what is there now.
+    // A client that asks at once gets the verdict on the current bytes.
     std::fs::write(beside.join("bad"), Content::NoHeader(6).bytes()).unwrap();
     assert_eq!(verdict(&farm, &link).verdict, Verdict::Rejected);
     std::fs::remove_file(&link).unwrap();
@@ -130,7 +130,7 @@ fn a_verdict_on_what_lies_behind_a_link_outlives_the_broker() {
     becomes(&farm, &gate, "a.xodr", Some(Verdict::Accepted));
     farm.settle(1);
     down(&farm, broker);
-    // While nobody watches.
+    // The target changes while no broker watches.
     std::fs::write(beside.join("target"), Content::NoHeader(2).bytes()).unwrap();
     let _broker = farm.serve_ready();
     becomes(&farm, &gate, "a.xodr", Some(Verdict::Rejected));
@@ -140,7 +140,7 @@ fn a_verdict_on_what_lies_behind_a_link_outlives_the_broker() {
 fn a_directory_keeps_its_name_however_many_links_lead_to_it() {
     let (farm, gate, beside) = farm_with_gate();
     std::fs::create_dir(farm.root().join("maps")).unwrap();
-    // Before the name of the directory, and after it.
+    // One link sorts before the name of the directory, the other one after it.
     for link in ["again", "once_more"] {
         symlink("maps", farm.root().join(link)).unwrap();
     }
@@ -165,7 +165,7 @@ fn what_a_linked_file_includes_lies_beside_the_link() {
     let target = cli.write("store/4711", outer);
     cli.write("maps/view.xml", view);
     symlink(&target, cli.path().join("maps/a.xodr")).unwrap();
-    // As a program finds it that opens the path that it is given.
+    // A program that opens the given path finds the same file.
     for named in ["maps", "maps/a.xodr"] {
         let said = check(&cli, &[named]);
         assert_eq!(said.code, Some(0), "{named}: {}", said.whole(&cli));
@@ -176,7 +176,7 @@ fn what_a_linked_file_includes_lies_beside_the_link() {
     assert_eq!(check(&cli, &["maps"]).code, Some(1));
 }
 
-/// A desk with one good file in `maps`.
+/// Creates a cli with one good file in `maps`.
 fn cli_with_a_good_file() -> Cli {
     let cli = Cli::new();
     cli.write("maps/a.xodr", Content::Good(1).bytes());
@@ -204,10 +204,10 @@ fn what_cannot_be_looked_at_is_said_and_counts() {
         let note = format!("note: not looked at: [DESK]/{name}: ");
         let told = cli.tidy(&said.stderr);
         assert_eq!(told.matches(&note).count(), 1, "{told}");
-        // An error weighs more.
+        // An error has a higher priority.
         cli.write("maps/d.xodr", Content::NoHeader(3).bytes());
         assert_eq!(check(&cli, &["maps"]).code, Some(1));
-        // Nothing else to be seen.
+        // There are no other visible files.
         for file in ["maps/a.xodr", "maps/d.xodr"] {
             std::fs::remove_file(cli.path().join(file)).unwrap();
         }
@@ -244,7 +244,7 @@ fn a_file_is_known_by_a_link_to_its_directory_and_judged_once() {
     becomes(&farm, &gate, "2026-11-20/a.xodr", Some(Verdict::Accepted));
     let told = verdict(&farm, &farm.root().join("latest/a.xodr"));
     assert_eq!(told.file, day.join("a.xodr"));
-    // What lies behind the other is nobody's, and that is said.
+    // Files behind the other link are not watched, and the answer says so.
     let request = Request::Wait {
         file: farm.root().join("other/b.xodr"),
         timeout_ms: Some(120_000),
@@ -254,7 +254,7 @@ fn a_file_is_known_by_a_link_to_its_directory_and_judged_once() {
         panic!("{answer:?}");
     };
     assert!(reason.contains("links are not followed"), "{reason}");
-    // Pointed to another day: the same name means another file.
+    // The link points to another day: the same name means another file.
     let next = farm.root().join("2026-11-21");
     std::fs::create_dir(&next).unwrap();
     std::fs::write(next.join("a.xodr"), Content::NoHeader(3).bytes()).unwrap();
@@ -269,15 +269,15 @@ fn a_file_is_known_by_a_link_to_its_directory_and_judged_once() {
     assert!(!published.exists() && farm.settle(2).unseen.len() == 1);
 }
 
-/// Who is nobody: root may look into every directory.
+/// User id of nobody. It is needed because root can read every directory.
 const NOBODY: &str = "65534";
 
 fn rights(path: &Path, mode: u32) {
     std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode)).unwrap();
 }
 
-/// What begins a command as somebody who may not read `closed`: nothing, if this user is one.
-/// `None`: that cannot be done here, and has been said.
+/// Returns the beginning of a command that runs as a user who cannot read `closed`. It is empty if
+/// the current user cannot. Returns `None` with a message if it is impossible here.
 fn as_nobody(test: &str, closed: &Path) -> Option<Vec<&'static str>> {
     if std::fs::read_dir(closed).is_err() {
         return Some(Vec::new());
@@ -298,7 +298,7 @@ fn as_nobody(test: &str, closed: &Path) -> Option<Vec<&'static str>> {
     None
 }
 
-/// A command as somebody else, with a copy of the program where everybody may run it.
+/// Returns a command of another user, with a copy of the program that everybody can run.
 fn command_of(who: &[&str], program: &Path) -> Command {
     copy_program(Path::new(env!("CARGO_BIN_EXE_qcbus")), program);
     let mut words = who.iter().map(OsStr::new).chain([program.as_os_str()]);
@@ -309,7 +309,7 @@ fn command_of(who: &[&str], program: &Path) -> Command {
 
 fn give_to_nobody(path: &Path) {
     let nobody = NOBODY.parse().ok();
-    // Only who may read everything gives anything away.
+    // Only a user who can read everything needs to give files away.
     let _ = std::os::unix::fs::chown(path, nobody, nobody);
 }
 
@@ -337,7 +337,7 @@ fn a_directory_that_may_not_be_read_counts() {
     assert_eq!(told.matches(note).count(), 1, "{told}");
 }
 
-/// A farm of somebody else, and the command that serves it.
+/// Creates a farm of another user, and the command that serves it.
 fn farm_of(who: &[&str]) -> (Farm, Command) {
     let farm = Farm::new();
     let program = farm.base().join("qcbus");
@@ -370,7 +370,7 @@ fn a_closed_directory_costs_no_other_its_events() {
     rights(place.path(), 0o700);
     let Some(who) = who else { return };
     let (farm, mut command) = farm_of(&who);
-    // As every file system has one at its top.
+    // Every file system has such a directory at its top.
     let found = farm.root().join("lost+found");
     std::fs::create_dir(&found).unwrap();
     std::fs::write(found.join("a.xodr"), Content::Good(1).bytes()).unwrap();
@@ -387,7 +387,7 @@ fn a_closed_directory_costs_no_other_its_events() {
     until_so("its file is judged", || {
         farm.out().join("maps/b.xodr.xqar").exists()
     });
-    // And when it may be read, that is noticed at once.
+    // The watcher notices at once that the directory can be read.
     rights(&found, 0o755);
     until_so("the other is judged", || {
         farm.out().join("lost+found/a.xodr.xqar").exists()
@@ -396,7 +396,8 @@ fn a_closed_directory_costs_no_other_its_events() {
     drop(farm.qcbus(&["down"]));
 }
 
-/// A farm whose broker has no more than so many of a kind of limit of inotify.
+/// Starts a broker with a limit of inotify. Returns `None` with a message if the limit cannot be
+/// set here.
 fn serve_with(test: &str, limit: &str, farm: &Farm) -> Option<Broker> {
     let set = format!("echo {limit}");
     let alone = ["--user", "--map-root-user", "sh", "-c"];
@@ -427,7 +428,7 @@ fn without_watches_left_only_what_has_none_is_looked_through() {
     let Some(_broker) = serve_with(test, limit, &farm) else {
         return;
     };
-    // The watched directory and three in it have what there is.
+    // The watched directory and three in it use all available watches.
     wait_for_mode(&farm, "events; 7 directories every 2 s");
     for number in 0..10 {
         farm.write(&format!("{number}/a.xodr"), &Content::Good(number).bytes());
@@ -468,14 +469,14 @@ fn without_events_everything_is_looked_through_and_it_is_said_what_to_do() {
     drop(farm.qcbus(&["down"]));
 }
 
-/// Two names that differ in one byte, which is no text in either.
+/// Two names that differ in one byte, which is not valid text in either.
 const NAMES: [&[u8]; 2] = [b"stra\xDFe.xodr", b"stra\xFEe.xodr"];
 
 fn name(bytes: &[u8]) -> &Path {
     Path::new(OsStr::from_bytes(bytes))
 }
 
-/// A good file and one with an error, under these names.
+/// Writes a good file and one with an error under these names.
 fn put_both(directory: &Path) {
     let [good, bad] = NAMES.map(|it| directory.join(name(it)));
     std::fs::write(good, Content::Good(1).bytes()).unwrap();
@@ -496,7 +497,7 @@ fn names_that_are_no_text_have_a_result_each() {
     let said = check(&cli, &["maps", "-v"]);
     assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
     assert!(said.stdout.contains("of 2 files; 1 accepted, 1 rejected"));
-    // The place of the error, with its line.
+    // The output contains the place of the error with its line.
     assert!(
         said.stdout.contains("bytes:maps/stra%FEe.xodr:"),
         "{}",
@@ -599,7 +600,7 @@ fn a_scenario_with_such_a_path_finds_its_map() {
     assert_eq!(found.count(), 1, "{file:#}");
 }
 
-/// A name that prints a line of its own, one that steers a terminal, and what each is called.
+/// A name with a line of its own and one that controls a terminal, each with its shown form.
 const STEERING: [(&[u8], &str); 2] = [
     (
         b"x.xodr\nimportant.xodr: accepted\n.xodr",
@@ -611,7 +612,7 @@ const STEERING: [(&[u8], &str); 2] = [
     ),
 ];
 
-/// No line is another's, and nothing steers.
+/// Asserts that no line comes from a file name and that no character controls the terminal.
 fn has_only_lines_of_ours(what: &str, text: &str) {
     let steering = |c: char| qcbus_messages::shown::moves(c) && c != '\n';
     assert!(!text.chars().any(steering), "{what}: {text:?}");
@@ -712,7 +713,7 @@ fn what_is_printed_and_lost_is_no_success() {
     let said = String::from_utf8(lost.stderr).unwrap();
     assert_eq!(lost.status.code(), Some(5), "{said}");
     assert!(said.contains("cannot write to stdout"), "{said}");
-    // Whoever reads no further knows so itself.
+    // A program that stops reading the output knows it itself.
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
     let closed = run(writer.into());

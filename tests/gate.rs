@@ -1,5 +1,5 @@
-//! What lies behind the gate is complete and judged as it lies there; results belong to the one who
-//! wrote them, and none stays that nobody remembers.
+//! Every file behind the gate is complete and was judged in this state. Results belong to their
+//! writer, and no forgotten result stays.
 
 #![expect(
     clippy::unwrap_used,
@@ -27,7 +27,7 @@ const CATALOG: &str = "catalogs/vehicles.xosc";
 const ISLAND: &str = "maps/island/island.xodr";
 const ISLAND_ROADS: &str = "maps/island/island_roads.xml";
 
-/// A farm with a gate and these files of the sample farm.
+/// Creates a farm with a gate and these files of the sample farm.
 fn farm_of(names: &[&str], arguments: &[&str]) -> Farm {
     let mut farm = Farm::with(arguments);
     let gate = gate(&farm).to_string_lossy().into_owned();
@@ -36,7 +36,7 @@ fn farm_of(names: &[&str], arguments: &[&str]) -> Farm {
     farm
 }
 
-/// Puts a file of the sample farm there at once.
+/// Puts a file of the sample farm into the farm in one step.
 fn bring(farm: &Farm, name: &str) {
     put(
         farm,
@@ -56,7 +56,7 @@ fn gate(farm: &Farm) -> PathBuf {
     farm.base().join("gate")
 }
 
-/// What is published, in order.
+/// Returns the published names in order.
 fn published(farm: &Farm) -> Vec<String> {
     let files = files_below(&gate(farm)).into_iter();
     let names = files.map(|it| it.to_string_lossy().into_owned());
@@ -79,7 +79,7 @@ fn publishes(farm: &Farm, expected: &[&str]) {
     );
 }
 
-/// A single run accepts everything that lies behind the gate, as it lies there.
+/// Asserts that a single run accepts everything behind the gate in its current state.
 fn is_sound(farm: &Farm) {
     let cli = Cli::new();
     let said = cli.check_in(&gate(farm), &["."], "out");
@@ -106,7 +106,7 @@ fn all_that_is_accepted_is_published_with_what_it_needs() {
     assert_eq!((gate.published, gate.held_back), (15, 0), "{gate:?}");
 }
 
-/// Behind the gate there are no symbolic links, so the same words lead to another map there.
+/// There are no symbolic links behind the gate, so the same path leads to another map there.
 #[test]
 fn scenario_whose_map_is_reached_by_the_parent_of_a_link_is_held_back() {
     let farm = farm_of(&[], &[]);
@@ -131,7 +131,7 @@ fn scenario_whose_map_is_reached_by_the_parent_of_a_link_is_held_back() {
     assert!(said.contains("link/../m.xodr"), "{said}");
 }
 
-/// Scripts wait for the verdict, and then run what lies behind the gate.
+/// Scripts wait for the verdict and then run the file behind the gate.
 #[test]
 fn accepted_file_lies_behind_the_gate_when_the_answer_comes() {
     let farm = farm_of(&[], &[]);
@@ -178,7 +178,7 @@ fn a_scenario_goes_with_its_map_and_comes_back_with_it() {
     let _broker = farm.serve_ready();
     publishes(&farm, &[CATALOG, MAP, SCENARIO]);
     is_sound(&farm);
-    // The map is rejected, and so is the scenario, whoever is asked.
+    // The map is rejected, and so is the scenario, in every answer.
     put(&farm, MAP, &Content::NoHeader(1).bytes());
     assert_eq!(farm.verdict(SCENARIO).verdict, Verdict::Rejected);
     assert_eq!(farm.verdict(MAP).verdict, Verdict::Rejected);
@@ -194,12 +194,12 @@ fn a_scenario_goes_with_its_map_and_comes_back_with_it() {
         (&map["verdict"], &map["errors"]),
         (&"rejected".into(), &1.into())
     );
-    // Another map that is accepted.
+    // Another accepted map replaces it.
     put(&farm, MAP, &Content::Good(2).bytes());
     publishes(&farm, &[CATALOG, MAP, SCENARIO]);
     let there = std::fs::read(gate(&farm).join(MAP)).unwrap();
     assert_eq!(there, Content::Good(2).bytes());
-    // No map at all: what was published with it does not stay.
+    // The map is missing: the file that was published with it does not stay.
     std::fs::remove_file(farm.root().join(MAP)).unwrap();
     until_so("the map has gone", || !gate(&farm).join(MAP).exists());
     bring(&farm, MAP);
@@ -256,7 +256,7 @@ fn a_map_outside_is_named_and_by_option_refused() {
     }
 }
 
-/// Kills a broker whose farm has come to rest.
+/// Waits until the farm is at rest, and kills its broker.
 fn stopped(farm: &Farm, mut broker: Broker, total: usize) {
     farm.settle(total);
     broker.kill();
@@ -274,7 +274,7 @@ fn a_start_clears_the_gate_of_what_nobody_claims() {
     )
     .unwrap();
     std::fs::remove_file(gate(&farm).join(CATALOG)).unwrap();
-    // It is changed while nobody watches.
+    // The map is changed while no broker watches.
     put(&farm, MAP, &Content::NoHeader(1).bytes());
     let broker = farm.serve_ready();
     publishes(&farm, &[CATALOG]);
@@ -374,7 +374,7 @@ fn results_and_gate_are_apart() {
     }
 }
 
-/// Another broker beside that of the farm, with everything of its own but what is given.
+/// Returns the command of another broker with its own directories, except for the given ones.
 fn another(farm: &Farm, shared: &[(&str, &Path)]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
     let other = farm.base().join("other");
@@ -408,7 +408,7 @@ fn gate_results_and_state_are_held_by_one_broker() {
             assert!(said.contains(words), "{words}: {said}");
         }
     }
-    // Nor does a single run write among them.
+    // A single run must not write there, either.
     let cli = Cli::new();
     cli.write("a.xodr", Content::Good(1).bytes());
     let out = farm.out().to_string_lossy().into_owned();
@@ -419,7 +419,7 @@ fn gate_results_and_state_are_held_by_one_broker() {
     assert_eq!(published(&farm), [MAP]);
 }
 
-/// Names of results, verdict files and reports.
+/// Returns the names of results, verdict files and reports.
 fn results(out: &Path) -> Vec<String> {
     let files = files_below(out).into_iter();
     let names = files.map(|it| it.to_string_lossy().into_owned());
@@ -453,7 +453,7 @@ fn earlier_results_of_a_run_do_not_look_current() {
         results(&out),
         ["else/c.xodr.xqar", "in/Result.xqar", "in/b.xodr.xqar"]
     );
-    // A run that never comes to a verdict leaves none of an earlier one.
+    // A run without any verdict leaves no earlier result behind.
     cli.write("config.xml", "<Config/>");
     let said = cli.qcbus(&[
         "check",
@@ -479,7 +479,7 @@ fn earlier_results_of_a_run_do_not_look_current() {
     assert!(foreign.exists());
 }
 
-/// The journal as a file; the broker must be dead.
+/// Returns the files of the journal. The broker must be dead.
 fn journal_files(farm: &Farm) -> Vec<PathBuf> {
     ["", "-wal", "-shm"]
         .map(|suffix| {
@@ -492,8 +492,8 @@ fn journal_files(farm: &Farm) -> Vec<PathBuf> {
         .collect()
 }
 
-/// As a broker leaves it that is killed between writing results and recording them: everything is
-/// written, and the journal is the one from before.
+/// Simulates a broker that is killed between writing results and recording them: everything is
+/// written, but the journal is the earlier one.
 fn killed_before_the_journal(farm: &Farm, change: impl Fn()) {
     let before = farm.base().join("before");
     std::fs::create_dir(&before).unwrap();
@@ -520,7 +520,7 @@ fn comes_to(farm: &Farm, expected: &[&str]) {
     );
 }
 
-/// Everything that belongs to a file.
+/// Returns all output files of a file.
 fn all_of(name: &str) -> [String; 3] {
     ["json", "verdict.json", "xqar"].map(|suffix| format!("{name}.{suffix}"))
 }
@@ -559,7 +559,7 @@ fn a_verdict_that_the_journal_does_not_know_is_given_anew() {
         put(&farm, "a.xodr", &Content::NoHeader(2).bytes());
         assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Rejected);
     });
-    // Exactly the file of the old verdict is back, so that the journal seems to be right.
+    // The exact file of the old verdict is back, so that the journal seems to be correct.
     put(&farm, "a.xodr", &good);
     let _broker = farm.serve_ready();
     farm.settle(1);
@@ -579,7 +579,7 @@ fn nothing_stays_when_the_journal_was_moved_away() {
         std::fs::remove_file(file).unwrap();
     }
     std::fs::remove_file(farm.root().join(MAP)).unwrap();
-    // Not ours, or that of another broker.
+    // These files are foreign or belong to another broker.
     let kept = ["Result.xqar", "nested/x.xodr.xqar", "x.verdict.json"];
     let result = std::fs::read(farm.out().join(format!("{CATALOG}.xqar"))).unwrap();
     for name in kept {

@@ -1,5 +1,5 @@
-//! Hidden directories hold what copy tools, snapshots and volumes keep for themselves: nothing in them is
-//! judged or published, unless somebody names them.
+//! Hidden directories contain private files of copy tools, snapshots and volumes. No file in them
+//! is judged or published, unless the directory is named explicitly.
 
 #![expect(
     clippy::unwrap_used,
@@ -21,7 +21,7 @@ use support::farm::{Farm, tail};
 use support::judge::verdicts_in_journal;
 use support::watchdog::{until_or, until_so};
 
-/// A farm with a gate.
+/// Creates a farm with a gate.
 fn farm() -> Farm {
     let mut farm = Farm::new();
     let gate = farm.gate().to_string_lossy().into_owned();
@@ -29,7 +29,7 @@ fn farm() -> Farm {
     farm
 }
 
-/// Puts a file into the watched directory, with the directories on its way.
+/// Puts a file into the watched directory and creates missing directories.
 fn put(farm: &Farm, name: &str, content: &Content) {
     let path = farm.root().join(name);
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -44,7 +44,7 @@ fn ask(farm: &Farm, file: &Path) -> Option<Response> {
     })
 }
 
-/// The verdict on a file that lies anywhere.
+/// Returns the verdict on a file at any place.
 fn verdict_at(farm: &Farm, file: &Path) -> FileVerdict {
     let answer = ask(farm, file);
     let Some(Response::Verdict(verdict)) = answer else {
@@ -72,7 +72,7 @@ fn down(farm: &Farm, mut broker: Broker) {
     broker.wait();
 }
 
-/// Where copy tools and file servers keep files of their own.
+/// Directories in which copy tools and file servers keep their own files.
 const OF_OTHERS: [&str; 5] = [
     ".~tmp~",
     ".snapshot/hourly.0",
@@ -84,7 +84,7 @@ const OF_OTHERS: [&str; 5] = [
 #[test]
 fn files_in_hidden_directories_are_neither_judged_nor_published() {
     let farm = farm();
-    // Some are there at the start, and some come later.
+    // Some files are there at the start, and some come later.
     for (number, directory) in (0..).zip(OF_OTHERS) {
         put(
             &farm,
@@ -103,7 +103,7 @@ fn files_in_hidden_directories_are_neither_judged_nor_published() {
     put(&farm, "maps/a.xodr", &Content::Good(20));
     farm.settle(1);
     is_published(&farm, &["maps/a.xodr"]);
-    // As `rsync --delay-updates` ends.
+    // `rsync --delay-updates` ends like this.
     let (aside, place) = (
         farm.root().join(".~tmp~/b.xodr"),
         farm.root().join("b.xodr"),
@@ -114,7 +114,7 @@ fn files_in_hidden_directories_are_neither_judged_nor_published() {
     assert!(reason.contains("hidden directory"), "{reason}");
     std::fs::rename(aside, place).unwrap();
     assert_eq!(farm.verdict("b.xodr").verdict, Verdict::Accepted);
-    // A directory that gets a hidden name takes its files with it, and brings them back.
+    // A directory that gets a hidden name takes its files away, and later brings them back.
     let (maps, hidden) = (farm.root().join("maps"), farm.root().join(".maps"));
     std::fs::rename(&maps, &hidden).unwrap();
     is_published(&farm, &["b.xodr"]);
@@ -150,11 +150,11 @@ fn hidden_directory_that_is_watched_itself_is_judged() {
     farm.settle(1);
     put(&farm, ".work/later.xodr", &Content::Good(2));
     assert_eq!(farm.verdict(".work/later.xodr").verdict, Verdict::Accepted);
-    // Two directories are watched, so that results lie below the names of both.
+    // Two directories are watched, so results are below the names of both.
     is_published(&farm, &["farm/.work/a.xodr", "farm/.work/later.xodr"]);
 }
 
-/// Replaces what a volume shows, as Kubernetes does it.
+/// Replaces the contents of a volume, as Kubernetes does it.
 fn swap(volume: &Path, generation: &str, content: &Content) {
     let directory = volume.join(generation);
     std::fs::create_dir_all(&directory).unwrap();
@@ -196,7 +196,7 @@ fn file_of_a_kubernetes_volume_is_judged_once_for_each_generation() {
     );
 }
 
-/// A scenario that may be run, on a map that lies in a hidden directory.
+/// Creates an acceptable scenario on a map in a hidden directory.
 fn scenario_on_a_hidden_map(farm: &Farm) {
     put(farm, CATALOG, &Content::Catalog(1, Mark::Clean));
     put(farm, ".work/map.xodr", &Content::Good(2));
@@ -216,7 +216,7 @@ fn map_in_a_hidden_directory_is_read_and_published_with_its_scenario() {
     assert_eq!(farm.verdict("s.xosc").verdict, Verdict::Accepted);
     is_published(&farm, &all);
     farm.settle(2);
-    // Nothing is published on a map that the scenario does not fit.
+    // A scenario is not published with a map that it does not fit.
     put(&farm, ".work/map.xodr", &Content::Elsewhere(4));
     assert_eq!(farm.verdict("s.xosc").verdict, Verdict::Rejected);
     is_published(&farm, &[CATALOG]);
@@ -225,7 +225,8 @@ fn map_in_a_hidden_directory_is_read_and_published_with_its_scenario() {
     is_published(&farm, &all);
 }
 
-/// The journal of a version that judged files in hidden directories, as a `.qcignore` makes one.
+/// The journal is from a version that judged files in hidden directories. A `.qcignore` simulates
+/// it.
 #[test]
 fn results_of_hidden_directories_are_withdrawn_at_the_start() {
     let farm = farm();

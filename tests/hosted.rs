@@ -1,4 +1,4 @@
-//! One-shot modules of ASAM's framework on the bus: brought by a manifest, by a command, or by a configuration alone.
+//! ASAM modules on the bus: added by a manifest, by a command, or by a configuration alone.
 
 #![expect(
     clippy::unwrap_used,
@@ -23,10 +23,10 @@ use support::watchdog::{until, until_or};
 
 const MANNERS: &str = include_str!("../bundles/asam-adapter/tests/guests/manners.sh");
 
-/// Finds something in every file.
+/// Script that finds something in every file.
 const FINDS: &str = r#"{ begin; checker one completed "$(issue 1 "wrong in $input")"; checker two completed; end; } > "$result""#;
 
-/// A module that is polite over small files and does this over real ones.
+/// Installs a module that is polite for small files and runs this script for real ones.
 fn install(path: &Path, script: &str) {
     install_text(path, &format!("#!/bin/sh\n{MANNERS}\n{script}\n"));
 }
@@ -57,7 +57,7 @@ fn bundle<'r>(results: &'r Results, name: &str) -> &'r CheckerBundle {
     found.unwrap_or_else(|| panic!("no bundle {name}"))
 }
 
-/// How its checkers ended, each with the number of its issues.
+/// Returns the status of each checker with the number of its issues.
 fn endings(bundle: &CheckerBundle) -> Vec<(String, Option<Status>, usize)> {
     let checkers = bundle.checkers.iter();
     checkers
@@ -67,13 +67,13 @@ fn endings(bundle: &CheckerBundle) -> Vec<(String, Option<Status>, usize)> {
 
 const OWN: &str = "check_qcbus_asam_module_is_known";
 
-/// What a guest that has found one thing has said.
+/// Returns the expected endings of a guest that has found one issue.
 fn found_one() -> Vec<(String, Option<Status>, usize)> {
     let done = |id: &str, issues| (id.to_owned(), Some(Status::Completed), issues);
     vec![done("one", 1), done("two", 0), done(OWN, 0)]
 }
 
-/// A desk with a guest and its manifest.
+/// A cli with a guest and its manifest.
 struct Table {
     cli: Cli,
     program: PathBuf,
@@ -121,7 +121,7 @@ fn a_manifest_of_asams_framework_is_all_that_is_needed() {
     assert_eq!(issue.rule_uid, "guest.example:xodr:1.0.0:rule");
     assert_eq!(*guest.checkers[0].description, *"what one checks");
     assert!(said.stdout.contains("wrong in"), "{}", said.stdout);
-    // Nothing of it is left.
+    // No private directory is left.
     assert_eq!(rooms(&table.cli.path().join("tmp")), Vec::<PathBuf>::new());
 }
 
@@ -173,7 +173,7 @@ fn a_configuration_alone_brings_what_is_on_the_path() {
     assert_eq!(said.code, Some(0), "{}", said.whole(&table.cli));
     let results = table.cli.result("out/Result.xqar");
     assert!(endings(bundle(&results, "qc_guest")).len() == 3);
-    // What does not look like a module is not run, whatever a configuration says.
+    // A program that does not look like a module is not run, even if a configuration names it.
     std::fs::rename(&table.program, table.cli.path().join("guest")).unwrap();
     let said = named("guest");
     assert_eq!(said.code, Some(3), "{}", said.whole(&table.cli));
@@ -262,7 +262,7 @@ fn what_a_manifest_says_of_its_run_counts() {
     }
 }
 
-/// A farm with a guest beside it, whose private directories lie there, too.
+/// Creates a farm with a guest beside it. The guest's private directories are there, too.
 fn farm_with(script: &str) -> (Farm, PathBuf, Broker) {
     let farm = Farm::new();
     let program = farm.base().join("guest");
@@ -340,7 +340,7 @@ fn it_is_added_looked_at_upgraded_and_removed_as_any_bundle() {
     assert_eq!(code, Some(0), "{rules}");
     assert!(rules.contains("what two checks"), "{rules}");
 
-    // A program that is replaced judges again.
+    // A replaced program judges again.
     install(&program, "polite");
     until_or(
         "the newer program has judged it again",
@@ -366,7 +366,7 @@ fn program_that_was_not_learned_judges_nothing() {
     assert_eq!(code, Some(0), "{text}");
     farm.write("a.xodr", &Content::Good(1).bytes());
     assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Rejected);
-    // It cannot be learned, and finds nothing any more.
+    // The new program cannot be learned and finds nothing any more.
     let fails = MANNERS.replacen("polite; exit 0", "exit 3", 1);
     assert_ne!(fails, MANNERS);
     install_text(&program, &format!("#!/bin/sh\n{fails}\npolite\n"));
@@ -382,7 +382,7 @@ fn program_that_was_not_learned_judges_nothing() {
     );
     let health = farm.qcbus(&["status", "--health"]);
     assert_eq!(health.status.code(), Some(1), "{}", told(&health).1);
-    // The former one is back.
+    // The previous program is back.
     install(&program, FINDS);
     let back = || (farm.verdict("b.xodr").verdict == Verdict::Rejected).then_some(());
     until_or("it judges again", back, || farm.log());
@@ -402,7 +402,7 @@ fn what_is_of_no_use_is_taken_out_again() {
     );
 }
 
-/// Private directories that there are.
+/// Returns the existing private directories.
 fn rooms(tmp: &Path) -> Vec<PathBuf> {
     let roots = std::fs::read_dir(tmp).unwrap().flatten();
     let own = roots.filter(|it| it.file_name().to_string_lossy().starts_with("qcbus-asam-"));
@@ -416,7 +416,7 @@ fn rooms(tmp: &Path) -> Vec<PathBuf> {
 
 #[test]
 fn whoever_is_killed_the_file_is_judged_and_nothing_is_left() {
-    // Until it is told to go on a run takes for ever, with children that have gone their own way.
+    // A run takes for ever until the file GO exists. Some of its children have left its session.
     let script = r#"[ -e "GO" ] || { setsid sh -c "sleep 86399.MARK & sleep 86399.MARK" & sleep 86399.MARK; }
         polite"#;
     for victim in ["--runner", "asam-adapter"] {
@@ -498,7 +498,7 @@ fn a_one_shot_module_can_be_a_shadow() {
     let _broker = farm.serve_ready();
     let program = farm.base().join("qc_guest");
     install(&program, FINDS);
-    // As the manifests of ASAM's own modules have it.
+    // The manifests of ASAM's own modules have such commands.
     let command = format!("cd $ASAM_QC_FRAMEWORK_WORKING_DIR && {}", program.display());
     let said = farm.qcbus(&["bundle", "add", "--shadow", "guest", "--asam", &command]);
     let text = String::from_utf8([said.stdout, said.stderr].concat()).unwrap();
@@ -525,7 +525,7 @@ fn a_one_shot_module_can_be_a_shadow() {
     );
 }
 
-/// A module that reads plain files only must not reject a good one because it is packed.
+/// A module that reads only plain files must not reject a good file because it is packed.
 #[test]
 fn a_packed_map_is_handed_over_unpacked_and_its_findings_name_it() {
     let script = r#"grep -q "<OpenDRIVE" "$input" || exit 3
@@ -547,7 +547,7 @@ fn a_packed_map_is_handed_over_unpacked_and_its_findings_name_it() {
     }
 }
 
-/// Counts the issues of a result, and writes down one of its parameters.
+/// Script that counts the issues of a result, and writes one of its parameters to a file.
 const REPORTS: &str = r#"config="$ASAM_QC_FRAMEWORK_CONFIG_FILE"
 value() { sed -n "s/.*name=\"$1\" value=\"\([^\"]*\)\".*/\1/p" "$config" | head -n 1; }
 grep -c "<Issue " "$(value strInputFile)" > "$(value strReportFile)"
@@ -612,7 +612,7 @@ fn a_report_module_that_fails_is_told_and_holds_up_nobody() {
     assert!(!farm.out().join("a.xodr.guestReport").exists());
 }
 
-/// Lets a report module in that does this.
+/// Adds a report module that runs this script.
 fn let_report_in(farm: &Farm, script: &str) {
     let program = farm.base().join("report");
     std::fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();

@@ -1,4 +1,4 @@
-//! ASAM's own modules, hosted, say what they say by themselves.
+//! ASAM's own modules report the same when they are hosted as when they run alone.
 
 #![expect(
     clippy::unwrap_used,
@@ -17,7 +17,7 @@ use support::asam_venv;
 use support::cli::{Cli, files_below, read_result};
 use support::inside::skip;
 
-/// Of all cases so many are tried, evenly spread, unless `QCBUS_ALL_CASES` is set.
+/// Number of cases that are tried, evenly spread. `QCBUS_ALL_CASES` selects all cases.
 const SOME: usize = 13;
 
 /// A module: its program, the name of its section in its code, its kind of files.
@@ -40,7 +40,7 @@ impl Module {
         file.extension().is_some_and(|it| *it == *self.kind)
     }
 
-    /// The name under which it joins.
+    /// Returns the name under which the module joins.
     fn joined_as(&self) -> String {
         match self.name.as_str() {
             "xodrBundle" | "xoscBundle" => format!("asam.{}", self.name),
@@ -49,7 +49,8 @@ impl Module {
     }
 }
 
-/// One module more, where one is at hand: program, name of its section and kind of files, separated by spaces.
+/// Variable with one further module, if available: program, name of its section and kind of files,
+/// separated by spaces.
 const ANOTHER: &str = "QCBUS_ANOTHER_MODULE";
 
 fn modules(programs: &Path) -> Vec<Module> {
@@ -69,19 +70,19 @@ fn modules(programs: &Path) -> Vec<Module> {
     modules
 }
 
-/// Files in one run: as many as a slow machine does before the watchdog bites.
+/// Number of files in one run: a slow machine can do so many before the watchdog ends it.
 const IN_ONE_RUN: usize = 20;
 
-/// What a checker says: its status and what it found.
+/// Output of a checker: its status and its findings.
 type Said = BTreeSet<(String, String, String)>;
 
-/// What a bundle says. Pooling adds rows and columns to places that have none, so that those are left out.
+/// Returns the output of a bundle, without rows and columns, because pooling adds such places.
 fn said(bundle: &CheckerBundle) -> Said {
     let mut all = Said::new();
     for checker in &bundle.checkers {
         let id = checker.id.to_string();
         let status = match checker.status {
-            // With a reason that is no answer, pooling says the same of both.
+            // If the reason of a skip is no answer, pooling reports the same for both.
             Some(Status::Skipped) => "skipped".to_owned(),
             other => format!("{other:?}"),
         };
@@ -107,7 +108,7 @@ fn place(locations: &Locations) -> String {
     format!("{description} {}", places.join(" "))
 }
 
-/// Python shows where an object lies in memory, which is elsewhere each time.
+/// Removes the memory addresses of Python objects, because they differ each time.
 fn without_addresses(text: &str) -> String {
     let mut pieces = text.split(" at 0x");
     let mut whole = pieces.next().unwrap_or_default().to_owned();
@@ -117,7 +118,7 @@ fn without_addresses(text: &str) -> String {
     whole
 }
 
-/// What a module says of a file when it is run by hand; `None` when it fails.
+/// Returns the output of a module for a file when it is run by hand, or `None` if it fails.
 fn alone(cli: &Cli, module: &Module, file: &Path) -> Option<Said> {
     let directory = cli.path().join("alone");
     std::fs::create_dir_all(&directory).unwrap();
@@ -138,7 +139,7 @@ fn alone(cli: &Cli, module: &Module, file: &Path) -> Option<Said> {
     succeeded.then(|| said(&read_result(&result).bundles[0]))
 }
 
-/// What a module said hosted, without the checker that is ours.
+/// Returns the output of a hosted module, without qcbus's own checker.
 fn hosted(cli: &Cli, module: &Module, input: &Path) -> Said {
     let result = cli.path().join("out");
     let results = read_result(&result.join(format!("{}.xqar", input.display())));
@@ -146,7 +147,7 @@ fn hosted(cli: &Cli, module: &Module, input: &Path) -> Said {
     let bundle = results.bundles.iter().find(|it| it.name == name);
     let bundle = bundle.unwrap_or_else(|| panic!("{name} has not judged {input:?}"));
     let mut said = said(bundle);
-    // One that is not there says nothing by itself, so that the broker's words are all there is.
+    // A missing bundle reports nothing itself, so the broker's text is the only information.
     let absent = bundle
         .checkers
         .iter()
@@ -156,11 +157,11 @@ fn hosted(cli: &Cli, module: &Module, input: &Path) -> Said {
     said
 }
 
-/// In what a module is different hosted.
+/// Returns the differences between a hosted module and the same module alone.
 fn differences(cli: &Cli, module: &Module, input: &Path) -> Vec<String> {
     let hosted = hosted(cli, module, input);
     let Some(alone) = alone(cli, module, &cli.path().join(input)) else {
-        // What gives no result alone must not have one here.
+        // A module that gives no result alone must not give one here.
         let silent = hosted.iter().all(|(_, what, _)| what == "Some(Error)");
         let differs = (!silent).then(|| format!("{}: it fails alone: {hosted:?}", input.display()));
         return differs.into_iter().collect();
@@ -225,7 +226,7 @@ fn hosted_modules_say_what_they_say_by_themselves() {
     );
 }
 
-/// The files that are tried.
+/// Returns the files that are tried.
 fn inputs(cli: &Cli) -> Vec<PathBuf> {
     let root = cli.path().join("cases");
     let mut all: Vec<PathBuf> = files_below(&root)

@@ -1,5 +1,5 @@
-//! Input that was made to break something. Each file gets an issue at a place or a clear error;
-//! the file beside it is judged as ever, and nothing else happens.
+//! Input that was made to break something. Each file gets an issue at a place or a clear error. The
+//! file beside it is judged as usual, and nothing else happens.
 
 #![expect(
     clippy::unwrap_used,
@@ -24,7 +24,7 @@ use support::inside::skip;
 use support::watchdog::until_or;
 
 /// Checks a directory with a hostile file and a good one. The hostile one must be rejected with an
-/// issue that says `text` and lies at `place`; the other must be accepted.
+/// issue that contains `text` and is at `place`. The other one must be accepted.
 fn is_rejected(cli: &Cli, name: &str, text: &str, place: (u64, u64)) {
     cli.write("in/good.xodr", Content::Good(1).bytes());
     let said = cli.qcbus(&["check", "in", "-v", "--out", "out"]);
@@ -145,7 +145,7 @@ fn truncated_gzip() {
 
 #[test]
 fn wrong_encoding_declaration() {
-    // It says UTF-16 and is not.
+    // The file declares UTF-16 but is not encoded in it.
     let text = "<?xml version=\"1.0\" encoding=\"UTF-16\"?>\n<OpenDRIVE/>\n";
     hostile("x.xodr", text, "UTF-16", (1, 31));
 }
@@ -223,7 +223,7 @@ fn include_outside_the_root() {
 
 #[test]
 fn something_that_never_ends_its_answer() {
-    // A pipe that nobody writes to: opening it waits for ever.
+    // A pipe without a writer: opening it waits for ever.
     let cli = Cli::new();
     cli.write("in/good.xodr", Content::Good(1).bytes());
     let status = std::process::Command::new("mkfifo")
@@ -259,7 +259,7 @@ fn unreadable_file() {
     );
 }
 
-/// Small hostile files, for a broker that must outlive them.
+/// Returns small hostile files for a broker that must survive them.
 fn zoo_of_files() -> Vec<(&'static str, Vec<u8>)> {
     vec![
         ("empty.xodr", Vec::new()),
@@ -324,7 +324,7 @@ fn a_broker_outlives_all_of_them_at_once() {
 fn files_removed_while_they_are_read() {
     let farm = Farm::new();
     let mut broker = farm.serve_ready();
-    // Large enough to be on its way for a while.
+    // The map is large enough to be in work for a while.
     let large = large_map(4 << 20);
     for round in 0..12 {
         let name = format!("{round}.xodr");
@@ -373,7 +373,7 @@ fn large_map(bytes: usize) -> Vec<u8> {
     large.into_bytes()
 }
 
-/// As long as names may be: there is no room for `.xqar` behind it.
+/// Returns a name of this length. There is no room for `.xqar` after the longest names.
 fn long_name(length: usize) -> String {
     let name = "x".repeat(length - ".xodr".len());
     format!("{name}.xodr")
@@ -401,7 +401,7 @@ fn a_name_too_long_for_a_result_holds_up_nobody() {
             .any(|it| it.text.contains("stays undetermined")),
         "{notices:#?}"
     );
-    // Withdrawing what could never be written is done at once, and nothing waits behind it.
+    // A result that could never be written is withdrawn at once and delays no other work.
     std::fs::remove_file(farm.root().join(&long)).unwrap();
     farm.settle(0);
     for number in 0..60 {
@@ -427,7 +427,7 @@ fn a_directory_where_the_result_belongs_holds_up_nobody() {
     assert!(!farm.out().join("a.xodr.verdict.json").exists());
     std::fs::remove_file(farm.root().join("a.xodr")).unwrap();
     farm.settle(0);
-    // With room there, the file is judged like any other.
+    // The directory is removed, so the file is judged like any other.
     std::fs::remove_dir(in_the_way).unwrap();
     farm.write("a.xodr", &Content::Good(2).bytes());
     assert_eq!(farm.verdict("a.xodr").verdict, Content::Good(2).verdict());

@@ -1,7 +1,6 @@
-//! Who writes into the watched directory puts there whatever the system has: pipes, devices, files of the
-//! kernel, files on which somebody has a lease, and swaps one for the other all the time. The files of
-//! others are judged as ever, and the broker stops when it is told to. So it does with few descriptors, and
-//! with a clock that jumps.
+//! Hostile files in the watched directory: pipes, devices, files of the kernel and files with a
+//! lease, which are swapped all the time. The files of others are judged as usual, and the broker
+//! stops when it is told to. The same holds with few descriptors and with a clock that jumps.
 
 #![expect(
     clippy::unwrap_used,
@@ -82,7 +81,7 @@ fn files_that_turn_into_pipes_hold_up_nobody() {
     assert!(broker.wait().success());
 }
 
-/// What a scenario refers to goes, and becomes a pipe: that is not the same as nothing, and the author is told so.
+/// A map disappears and becomes a pipe. That is not a missing map, and the author is told.
 #[test]
 fn a_map_that_becomes_a_pipe_is_not_said_to_be_missing() {
     let farm = Farm::new();
@@ -109,7 +108,7 @@ fn a_map_that_becomes_a_pipe_is_not_said_to_be_missing() {
     assert!(broker.wait().success());
 }
 
-/// Whoever waits for the verdict on what can have none is told why, and at once.
+/// A client that waits for an impossible verdict gets the reason at once.
 #[test]
 fn who_waits_for_what_is_no_file_is_told_so() {
     let farm = Farm::new();
@@ -127,14 +126,14 @@ fn who_waits_for_what_is_no_file_is_told_so() {
         ("loop.xodr", "leads back to itself"),
         ("outside.xodr", "a symbolic link to the directory"),
     ] {
-        // No limit: it ends because there is an answer.
+        // There is no timeout: the command ends because there is an answer.
         let path = at(name);
         let told = farm.qcbus(&["wait", path.to_str().unwrap()]);
         let said = String::from_utf8_lossy(&told.stderr);
         assert_eq!(told.status.code(), Some(2), "{name}: {said}");
         assert!(said.contains(why), "{name}: {said}");
     }
-    // What is not there may come.
+    // A missing file may still appear.
     farm.wait_in_vain(&at("gone.xodr"), &[], "there is no such file");
     assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
     assert!(broker.wait().success());
@@ -169,19 +168,19 @@ fn maps_that_the_kernel_makes_up_hold_up_nobody() {
     assert!(broker.wait().success());
 }
 
-/// Somebody has asked to be told before others read the file, and does not answer.
+/// Takes a lease: its holder is asked before others read the file, and does not answer.
 #[expect(unsafe_code, reason = "no crate wraps leases")]
 fn lease(file: &File) -> bool {
     use std::os::fd::AsRawFd;
-    // SAFETY: a bare system call on a descriptor that is open.
+    // SAFETY: a bare system call on an open descriptor.
     unsafe { libc::fcntl(file.as_raw_fd(), libc::F_SETLEASE, libc::F_WRLCK) == 0 }
 }
 
 #[test]
 fn leases_hold_up_nobody() {
-    // The kernel asks for the lease back by this signal, which would end the process.
+    // The kernel requests the lease back by this signal, which would end the process.
     #[expect(unsafe_code, reason = "no other call keeps the default action away")]
-    // SAFETY: nothing is called when the signal comes.
+    // SAFETY: no function is called when the signal arrives.
     unsafe {
         libc::signal(libc::SIGIO, libc::SIG_IGN);
     }
@@ -229,8 +228,8 @@ fn leases_hold_up_nobody() {
     assert!(broker.wait().success());
 }
 
-/// A process of the same user that was stopped at the wrong moment, in a debugger for instance, keeps the lock by which
-/// one after the other takes shared memory.
+/// A process of the same user was stopped at the wrong moment, for instance in a debugger. It holds
+/// the lock that serializes the allocation of shared memory.
 #[test]
 fn a_stopped_process_keeps_no_bundle_of_others_from_joining() {
     let farm = Farm::new();
@@ -267,7 +266,8 @@ fn few_descriptors_are_said_and_enough_for_every_file() {
     assert!(status.notices.iter().any(said), "{:#?}", status.notices);
 }
 
-/// Builds what makes the clock jump; `None`, and said, where that cannot be.
+/// Builds the library that makes the clock jump. Returns `None` with a message if that is
+/// impossible.
 fn clock(farm: &Farm) -> Option<PathBuf> {
     let library = farm.base().join("libclock.so");
     let compiler = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());

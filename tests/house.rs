@@ -1,4 +1,4 @@
-//! The rules of the house: who may know whom, and what may not be in the tree.
+//! Rules of the repository: allowed dependencies of crates, and forbidden contents.
 
 #![expect(
     clippy::unwrap_used,
@@ -16,10 +16,10 @@ use std::path::{Path, PathBuf};
 
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, Package};
 
-/// What is said, and nothing done: open to all.
+/// Crates that only define data formats. Every crate may use them.
 const IDL: &[&str] = &["qcbus-document", "qcbus-formats", "qcbus-messages"];
 
-/// Which crates of ours a crate may link, besides [`IDL`]. `None`: any.
+/// Crates of this workspace that a crate may link, besides [`IDL`]. `None`: any.
 const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-document", Some(&[])),
     ("qcbus-formats", Some(&[])),
@@ -31,34 +31,34 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-broker", Some(PROCESS)),
     ("qcbus-sdk", Some(PROCESS)),
     ("qcbus-opendrive", Some(&[])),
-    // A scenario lies on a map, and its values have the types that its schema gives them.
+    // A scenario refers to a map, and its values have the types of its schema.
     (
         "qcbus-openscenario",
         Some(&["qcbus-opendrive", "qcbus-schema"]),
     ),
     ("qcbus-schema", Some(&[])),
-    // What the schema rules of all bundles have in common: for bundles, from their parts.
+    // This crate has the common part of all schema rules: for bundles, from their parts.
     ("qcbus-schema-rule", Some(&["qcbus-sdk", "qcbus-schema"])),
     ("qcbus-xodr", Some(BUNDLE)),
     ("qcbus-xosc", Some(BUNDLE)),
     ("qcbus-modular", Some(BUNDLE)),
-    // A bundle that has others run: it makes their files and confines them.
+    // This bundle runs other bundles: it creates their files and confines them.
     (
         "qcbus-asam-adapter",
         Some(&["qcbus-sdk", "qcbus-disk", "qcbus-confine"]),
     ),
     ("qcbus-reporter-sdk", Some(PROCESS)),
-    // What a report draws of a road network.
+    // This crate draws a road network for a report.
     ("qcbus-plan", Some(&["qcbus-opendrive"])),
     ("qcbus", None),
     ("qcbus-zoo", None),
     ("qcbus-benches", None),
 ];
 
-/// What every kind of process is made of.
+/// Parts of every kind of process.
 const PROCESS: &[&str] = &["qcbus-bus", "qcbus-confine", "qcbus-disk", "qcbus-ingest"];
 
-/// What a bundle may link: its sdk, the models and the schema rule.
+/// Crates that a bundle may link: its sdk, the models and the schema rule.
 const BUNDLE: &[&str] = &[
     "qcbus-sdk",
     "qcbus-opendrive",
@@ -67,23 +67,25 @@ const BUNDLE: &[&str] = &[
     "qcbus-schema-rule",
 ];
 
-/// What the name of a reporter's crate begins with. One more needs no row in [`MAY_KNOW`].
+/// Prefix of the crate name of a reporter. A further reporter needs no row in [`MAY_KNOW`].
 const A_REPORTER: &str = "qcbus-report-";
 
-/// What a reporter may link: its sdk, the model of road networks, and what draws them.
+/// Crates that a reporter may link: its sdk, the model of road networks, and their drawing.
 const REPORTER: &[&str] = &["qcbus-reporter-sdk", "qcbus-plan", "qcbus-opendrive"];
 
-/// Among the crates of [`IDL`], who may know whom: the lowest knows nobody.
+/// Allowed dependencies among the crates of [`IDL`]: the lowest crate has none.
 const INSIDE_IDL: &[(&str, &[&str])] = &[
     ("qcbus-document", &[]),
     ("qcbus-formats", &[]),
     ("qcbus-messages", &["qcbus-document", "qcbus-formats"]),
 ];
 
-/// Models read images and nothing else; ingest counts beside them, it writes the images.
+/// Models that read images and nothing else. Their tests may also use ingest, because it writes the
+/// images.
 const ONLY_DOCUMENT: &[&str] = &["qcbus-opendrive", "qcbus-schema"];
 
-/// Foreign crates that few may name, so that they can be exchanged. Benches compare with them.
+/// Foreign crates that only a few crates may name, so that they can be replaced. The benches
+/// compare with them.
 const SANDBOXED: &[(&str, &[&str])] = &[
     ("iceoryx2", &["qcbus-bus", "qcbus-benches"]),
     ("iceoryx2-cal", &["qcbus-bus"]),
@@ -96,11 +98,11 @@ const SANDBOXED: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// No file of code is longer than what one head holds.
+/// Maximum number of lines of a source file, so that it stays readable.
 const MAX_LINES: usize = 800;
 
 fn metadata() -> Metadata {
-    // Without dependencies nothing is resolved, so nothing is downloaded either.
+    // Without dependencies nothing is resolved and nothing is downloaded.
     MetadataCommand::new().no_deps().exec().unwrap()
 }
 
@@ -148,7 +150,7 @@ fn nobody_links_what_they_may_not_know() {
                 wrong.push(format!("{} links {other}", package.name));
             }
         }
-        // Tests may read files to have something to work on, and know no more than that.
+        // Tests may read files as input, but must not use any other crate in addition.
         for other in linked(package, &[DependencyKind::Development]).intersection(&ours) {
             let reads = IDL.contains(other) || *other == "qcbus-ingest";
             if !reads && !allowed.contains(other) {
@@ -243,7 +245,7 @@ fn no_test_is_switched_off() {
 
 #[test]
 fn no_file_knows_the_machine_it_was_written_on() {
-    // In pieces, so that this file is not found.
+    // The paths are split, so that this file does not match itself.
     let homes = [["/wo", "rk/"], ["/ro", "ot/"]].map(|halves| halves.concat());
     let mut wrong = Vec::new();
     for file in files(&root()) {
@@ -263,12 +265,12 @@ fn no_file_knows_the_machine_it_was_written_on() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Whether a path may begin after `before`: not in the middle of another one.
+/// Checks whether a path may begin after `before`. It must not be in the middle of another one.
 fn starts_a_path(before: &str) -> bool {
     !before.ends_with(|c: char| c.is_alphanumeric() || matches!(c, '.' | '_' | '-' | '}'))
 }
 
-/// Lines of code with their numbers: comments are free to name anything.
+/// Returns the lines of code with their numbers. Comments may name anything.
 fn code(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let numbered = text.lines().enumerate();
     numbered
@@ -286,8 +288,8 @@ fn sources(directory: &Path) -> Vec<(PathBuf, String)> {
     .collect()
 }
 
-/// All files below, in order, without what is built and what git keeps: a directory, or a file in a
-/// further work tree.
+/// Returns all files below in order, without build output and git's own files: a directory, or a
+/// file in a further work tree.
 fn files(directory: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut open = vec![directory.to_owned()];

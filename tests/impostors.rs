@@ -1,4 +1,4 @@
-//! Whoever says to be somebody else is not believed: nobody is killed for it, and no verdict changes.
+//! Impostors are not trusted: no process is killed because of them, and no verdict changes.
 
 #![expect(
     clippy::unwrap_used,
@@ -24,7 +24,7 @@ fn peer_of(farm: &Farm, name: &str) -> Option<PeerStatus> {
     status.peers.into_iter().find(|it| it.name == name)
 }
 
-/// A standard bundle that runs.
+/// Waits for a running standard bundle and returns it.
 fn bundle_of(farm: &Farm) -> PeerStatus {
     until_or(
         "the bundle runs",
@@ -44,7 +44,7 @@ fn is_said(farm: &Farm, text: &str) {
     });
 }
 
-/// Joins and lies.
+/// Joins with false statements.
 async fn lie(farm: &Farm, hello: Hello) -> Result<Peer, JoinError> {
     let instance = Instance::at(farm.instance());
     let patient = PeerOptions {
@@ -74,14 +74,14 @@ async fn the_bundle_of_another_instance_is_not_killed_for_a_lie() {
     let (here, elsewhere) = (Farm::new(), Farm::new());
     let _brokers = [here.serve_ready(), elsewhere.serve_ready()];
     let victim = bundle_of(&elsewhere);
-    // With a launch, because a broker kills nobody who was not started by one.
+    // The hello has a launch, because a broker kills only processes that were started by one.
     let refused = lie(&here, hello("liar", victim.pid, Some(1 << 40))).await;
     let Err(JoinError::Refused(why)) = refused else {
         panic!("it was let in: {:?}", refused.err());
     };
     assert!(why.contains("does not prove it"), "{why}");
     is_said(&here, "`liar` says that a broker has started it");
-    // By hand it may join, and the broker knows which process it is.
+    // The process may join by hand, and the broker knows which process it is.
     let mut liar = lie(&here, hello("liar", victim.pid, None)).await.unwrap();
     until_or(
         "the liar is known",
@@ -95,7 +95,7 @@ async fn the_bundle_of_another_instance_is_not_killed_for_a_lie() {
             .any(|it| it.about.as_deref() == Some("liar"))
             .then_some(())
     };
-    // What it says goes out only while it listens.
+    // Its messages are sent only while it polls.
     while ended().is_none() {
         let _ = tokio::time::timeout(Duration::from_millis(20), liar.next()).await;
     }
@@ -129,7 +129,7 @@ fn nobody_takes_the_place_of_a_standard_bundle() {
     farm.write("bad.xodr", &Content::NoHeader(1).bytes());
     assert_eq!(farm.verdict("bad.xodr").verdict, Verdict::Rejected);
     let bundle = bundle_of(&farm);
-    // While it runs, and while it does not: the impostor finds nothing wrong with anything.
+    // The impostor tries it with and without a running bundle. It never finds an error.
     let first = Impostor::start(&farm, "slow", "xodrBundle", &[]);
     is_said(&farm, "the broker itself starts `xodrBundle`");
     drop(first);
@@ -152,7 +152,7 @@ fn nobody_takes_the_place_of_a_standard_bundle() {
 fn a_child_joins_under_the_name_of_its_manifest_only() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
-    // A bundle that a manifest has brought in, and that says to be a standard one.
+    // This bundle comes from a manifest and claims to be a standard bundle.
     farm.let_in("slow", "--name xodrBundle");
     is_said(&farm, "`xodrBundle` says that a broker has started it");
     farm.write("bad.xodr", &Content::NoHeader(1).bytes());
@@ -175,7 +175,7 @@ fn who_proves_nothing_does_not_judge() {
     assert_eq!(farm.verdict("good.xodr").verdict, Verdict::Accepted);
 }
 
-/// The process that the broker has started: it starts the one that joins.
+/// Returns the process that the broker has started. This process starts the one that joins.
 fn launcher_of(bundle: &PeerStatus) -> u32 {
     let stat = std::fs::read_to_string(format!("/proc/{}/stat", bundle.pid)).unwrap();
     let (_, rest) = stat.rsplit_once(')').unwrap();
@@ -190,7 +190,7 @@ fn children_prove_themselves_to_the_next_broker() {
     broker.kill();
     let _next = farm.serve_ready();
     let now = bundle_of(&farm);
-    // A confined process joins nobody else, so its keeper has started another one.
+    // A confined process joins no other broker, so its launcher has started another one.
     let found = (launcher_of(&now), now.restarts);
     assert_eq!(found, (launcher, 0), "{}", farm.log());
     let status = farm.status().unwrap();

@@ -1,5 +1,5 @@
-//! Bundles are killed in the middle of their work. Nothing is lost, and nothing is accepted that
-//! was not checked.
+//! Bundles are killed in the middle of their work. No work is lost, and no unchecked file is
+//! accepted.
 
 #![expect(
     clippy::unwrap_used,
@@ -20,7 +20,7 @@ use support::farm::{Farm, shm_segments, tail, zoo};
 use support::processes::signal_pid;
 use support::watchdog::until_or;
 
-/// A bundle as the status shows it, once `wanted` holds.
+/// Waits until `wanted` holds for a bundle in the status, and returns the bundle.
 fn peer(farm: &Farm, name: &str, wanted: impl Fn(&PeerStatus) -> bool) -> PeerStatus {
     until_or(
         &format!("{name} gets there"),
@@ -39,7 +39,7 @@ fn kill(peer: &PeerStatus, signal: Signal) {
     signal_pid(i32::try_from(peer.pid).unwrap(), signal);
 }
 
-/// Why checkers of a bundle ended in error, in the result of a file.
+/// Returns the reasons why checkers of a bundle ended in error, from the result of a file.
 fn errors(farm: &Farm, name: &str, bundle: &str) -> Vec<String> {
     let results = farm.result(name);
     let bundles = results.bundles.iter().filter(|it| it.name == bundle);
@@ -64,7 +64,7 @@ fn a_standard_bundle_that_is_killed_in_a_job_does_it_again() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     let first = peer(&farm, "xodrBundle", |it| it.state == "ready");
-    // Stopped before the file comes: it is certain that the job is not done when the kill comes.
+    // The bundle is stopped before the file arrives, so it cannot finish before the kill.
     kill(&first, Signal::STOP);
     for number in 0..3 {
         farm.write(&format!("{number}.xodr"), &Content::Good(number).bytes());
@@ -103,7 +103,7 @@ fn a_slow_bundle_is_killed_again_and_again_and_every_job_is_complete() {
     assert!(peer(&farm, "slow", |_| true).restarts >= 3);
 }
 
-/// A bundle that nobody supervises; killed with the test.
+/// A bundle that is not supervised. It is killed at the end of the test.
 struct StartedManually(Child);
 
 impl StartedManually {
@@ -131,14 +131,14 @@ impl Drop for StartedManually {
 fn a_bundle_that_nobody_starts_again_leaves_errors_behind_until_it_is_back() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
-    // Never through with a job, so the kill comes in the middle of one.
+    // The bundle never finishes a job, so it is killed in the middle of one.
     let bundle = StartedManually::start(&farm, "600000");
     peer(&farm, "slow", |it| it.state == "ready");
     farm.write("a.xodr", &Content::Good(1).bytes());
     farm.write("bad.xodr", &Content::NoHeader(2).bytes());
     peer(&farm, "slow", |it| it.active > 0);
     drop(bundle);
-    // The job ends by itself; what did not run is listed, and nothing is accepted.
+    // The job ends by itself. The missing checkers are listed, and the file is not accepted.
     let verdict = farm.verdict("a.xodr");
     assert_eq!(verdict.verdict, Verdict::Undetermined);
     assert!(
@@ -163,10 +163,10 @@ fn a_bundle_that_nobody_starts_again_leaves_errors_behind_until_it_is_back() {
     );
     let said = farm.qcbus(&["wait", &farm.root().join("a.xodr").to_string_lossy()]);
     assert_eq!(said.status.code(), Some(3));
-    // The next jobs go on, and are not accepted either: the bundle has not said good-bye.
+    // The next jobs go on without acceptance, because the bundle has not left properly.
     farm.write("next.xodr", &Content::Good(3).bytes());
     assert_eq!(farm.verdict("next.xodr").verdict, Verdict::Undetermined);
-    // It comes back: all becomes complete, also what was judged without it.
+    // The bundle is back: all results become complete, including those that were made without it.
     let _bundle = StartedManually::start(&farm, "1");
     farm.write("after.xodr", &Content::Good(4).bytes());
     for name in ["after.xodr", "next.xodr", "a.xodr", "bad.xodr"] {
@@ -181,10 +181,11 @@ fn a_bundle_that_nobody_starts_again_leaves_errors_behind_until_it_is_back() {
     }
 }
 
-/// A bundle that hangs when its broker is killed: the next knows nothing of it. (One that is merely
-/// stopped would be sent SIGHUP by the system, because its process group has lost its parent.)
+/// Creates a bundle that hangs when its broker is killed, so that the next one does not know it.
+/// (The system would send SIGHUP to a bundle that is only stopped, because its process group has
+/// lost its parent.)
 ///
-/// Returned with the process that keeps it, which is the one that the broker has started.
+/// Returns it with its launcher, which is the process that the broker has started.
 fn frozen(farm: &Farm) -> (PeerStatus, u32) {
     let mut broker = farm.serve_ready();
     farm.let_in("hangs_after_hello", "");
@@ -222,7 +223,7 @@ fn what_hung_when_its_broker_was_killed_is_killed_by_the_next() {
     farm.send_away("hangs_after_hello");
     let _broker = farm.serve_ready();
     has_gone(&farm, &frozen);
-    // Whichever of the two comes first takes the other along.
+    // The first of the two that is killed ends the other one, too.
     let words = [frozen.pid, launcher]
         .map(|pid| format!("process {pid}, which an earlier broker had started"));
     let is_said = || words.iter().any(|it| farm.log().contains(it));
@@ -238,7 +239,7 @@ fn what_hung_when_its_broker_was_killed_does_not_outlive_the_next() {
     has_gone(&farm, &frozen);
 }
 
-/// Somebody cleans up after a crash and takes the one directory that knew of the shared memory.
+/// A cleanup after a crash removes the only directory that knew of the shared memory.
 #[test]
 fn shared_memory_that_nobody_knows_of_any_more_is_given_back() {
     let (farm, other) = (Farm::new(), Farm::new());
@@ -248,7 +249,7 @@ fn shared_memory_that_nobody_knows_of_any_more_is_given_back() {
     assert!(!shm_segments(&prefixes[0]).is_empty());
     broker.kill();
     std::fs::remove_dir_all(farm.instance()).unwrap();
-    // Whatever comes next gives it back, of whichever instance: it may be a broker of another test.
+    // The next process of any instance releases it. This may be a broker of another test.
     farm.write("good.xodr", &Content::Good(1).bytes());
     let file = farm.root().join("good.xodr");
     let mut check = Command::new(env!("CARGO_BIN_EXE_qcbus"));

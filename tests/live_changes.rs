@@ -1,4 +1,4 @@
-//! Bundles come and go while the broker runs: the next result has their checkers, or has not.
+//! Bundles join and leave while the broker runs: the next result has their checkers, or not.
 
 #![expect(
     clippy::unwrap_used,
@@ -23,11 +23,11 @@ const POLITE: [&str; 2] = [
     "check_polite_no_blank_values",
 ];
 
-/// A bundle that was started by hand; killed with the test.
+/// A bundle that was started by hand. It is killed at the end of the test.
 struct StartedManually(Child);
 
 impl StartedManually {
-    /// `qcbus bundle run PROGRAM ARGUMENTS`, as a person types it.
+    /// Runs `qcbus bundle run PROGRAM ARGUMENTS`, as a person types it.
     fn start(farm: &Farm, animal: &[&str]) -> StartedManually {
         let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
         command.args(["bundle", "run"]).arg(zoo()).args(animal);
@@ -55,7 +55,7 @@ impl Drop for StartedManually {
     }
 }
 
-/// Checkers of a bundle in the result of a file that has just come in.
+/// Writes a file and returns the checkers of a bundle in its result.
 fn checkers_of(farm: &Farm, bundle: &str, number: u64) -> Vec<String> {
     let name = format!("{number}.xodr");
     farm.write(&name, &Content::Good(number).bytes());

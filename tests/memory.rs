@@ -1,5 +1,5 @@
-//! Shared memory that is small, or full, or used by many at once; limits of a process that are low;
-//! and what is left of checks that were killed.
+//! Shared memory that is small, full or used by many at once; low limits of a process; and the
+//! remains of killed checks.
 
 #![expect(
     clippy::unwrap_used,
@@ -22,7 +22,7 @@ use support::processes::signal_pid;
 use support::watchdog::until_so;
 use tempfile::TempDir;
 
-/// Runs a test with a shared memory of its own of so many MiB.
+/// Runs a test with a private shared memory of this size in MiB.
 fn with_memory(test: &str, mib: u64, body: impl FnOnce()) {
     if is_inside() {
         return body();
@@ -33,7 +33,7 @@ fn with_memory(test: &str, mib: u64, body: impl FnOnce()) {
     }
 }
 
-/// A directory with files, in which checks are run that find no instances but each other's.
+/// A directory with files. Checks in it find only each other's instances.
 struct Place(TempDir);
 
 impl Place {
@@ -66,7 +66,7 @@ impl Place {
         said(&self.command(arguments).output().unwrap())
     }
 
-    /// Half files below the directory of results.
+    /// Counts the unfinished files below the directory of results.
     fn half_files(&self) -> usize {
         let entries = std::fs::read_dir(self.at("out"))
             .into_iter()
@@ -79,10 +79,10 @@ impl Place {
     }
 }
 
-/// How it ended and all that it said.
+/// Returns the exit code and the whole output.
 fn said(output: &Output) -> (Option<i32>, String) {
     let text = [&*output.stdout, b"\n", &*output.stderr].concat();
-    // Lines are broken where the terminal ends.
+    // Lines are wrapped at the width of the terminal.
     let words = String::from_utf8_lossy(&text)
         .split_whitespace()
         .collect::<Vec<_>>()
@@ -90,7 +90,7 @@ fn said(output: &Output) -> (Option<i32>, String) {
     (output.status.code(), words)
 }
 
-/// A map of so many bytes, of which the image is several times as large.
+/// Creates a map of this size in bytes. Its image is several times as large.
 fn dense(bytes: usize) -> Vec<u8> {
     let head = "<OpenDRIVE><header revMajor=\"1\" revMinor=\"7\"/><userData code=\"x\">";
     let many = "<a b=\"1\"/>\n".repeat(bytes / 11);
@@ -117,8 +117,8 @@ fn a_map_that_never_fits_is_undetermined_at_once() {
     });
 }
 
-/// The image of this map was refused because an estimate of its size was, and because a quarter of
-/// the memory was kept.
+/// The image of this map was once refused. The reasons were an estimate of its size, and a quarter
+/// of the memory that was kept free.
 #[test]
 fn a_map_that_just_fits_is_checked() {
     with_memory("a_map_that_just_fits_is_checked", 64, || {
@@ -141,7 +141,7 @@ fn what_may_fit_later_is_waited_for_with_a_bound() {
         assert_eq!(code, Some(3), "{said}");
         assert!(said.contains("nothing became free for 1 seconds"), "{said}");
 
-        // So full that not even a broker starts.
+        // The memory is so full that a broker cannot start.
         fill(60);
         let (code, said) = place.run(&bounded);
         assert_eq!(code, Some(5), "{said}");
@@ -192,7 +192,7 @@ fn many_checks_at_once_in_a_small_memory_all_end_with_a_verdict() {
     );
 }
 
-/// Whether `nohup` has started this process, whose children go on when a terminal is closed.
+/// Checks whether `nohup` has started this process. Its children survive a closed terminal.
 fn ignores_hangups() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let mut lines = status.lines();
@@ -307,7 +307,7 @@ fn a_low_limit_of_addresses_is_said_or_enough() {
     let (code, text) = limited(600 << 20, &["serve", "inbox", "--instance-dir", "i"]);
     assert_eq!(code, Some(5), "{text}");
     assert!(text.contains("`ulimit -v unlimited`"), "{text}");
-    // A larger image than the first slots take.
+    // This image is larger than the first slots.
     place.write("large.xodr", &dense(5_000_000));
     let (code, text) = limited(2 << 30, &["check", "large.xodr", "--out", "out"]);
     assert_eq!(code, Some(3), "{text}");
@@ -348,7 +348,8 @@ fn a_killed_check_leaves_nothing_that_the_next_does_not_remove() {
     identity.truncate(18);
     killed.kill().unwrap();
     killed.wait().unwrap();
-    // As it leaves them when it is killed in the middle of a file: its own, and one that lives.
+    // A check that is killed in the middle of a file leaves such a file. One is its own, the other
+    // one belongs to a living process.
     std::fs::create_dir_all(place.at("out")).unwrap();
     let half = place
         .at("out")
@@ -363,7 +364,7 @@ fn a_killed_check_leaves_nothing_that_the_next_does_not_remove() {
     assert_eq!(code, Some(0), "{said}");
     assert_eq!((half.exists(), living.exists()), (false, true));
     assert_eq!(place.half_files(), 1);
-    // Its bundles go by themselves, a moment after it.
+    // The bundles end by themselves, a moment after the check.
     until_so("its shared memory is gone", || {
         assert_eq!(place.run(&arguments).0, Some(0));
         private().is_empty() && shm_segments(&identity).is_empty()
@@ -374,7 +375,7 @@ fn until_some<T>(look: impl FnMut() -> Option<T>) -> T {
     support::watchdog::until("a private instance", look)
 }
 
-/// When a process was started (proc(5), the 22nd field).
+/// Returns the start time of a process (proc(5), the 22nd field).
 fn started(pid: u32) -> String {
     let stat = std::fs::read_to_string(Path::new("/proc").join(pid.to_string()).join("stat"));
     let stat = stat.unwrap();

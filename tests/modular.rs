@@ -1,5 +1,5 @@
 //! Modular scenarios from end to end: expanded and packed on the command line, judged by a broker,
-//! judged again when a library changes.
+//! and judged again after a library changes.
 
 #![expect(
     clippy::unwrap_used,
@@ -31,7 +31,7 @@ fn text(name: &str) -> String {
     String::from_utf8(sample(name)).unwrap()
 }
 
-/// The sample's modular scenario, its library and its map.
+/// Creates a cli with the sample's modular scenario, its library and its map.
 fn cli() -> Cli {
     let cli = Cli::new();
     for name in [MAIN, LIBRARY, MAP] {
@@ -71,7 +71,7 @@ fn what_is_packed_expands_to_the_same() {
         "the sample's archive is up to date"
     );
 
-    // What it is expanded to is a plain scenario, and expanding that changes nothing.
+    // The expanded scenario is a plain one, and expanding it again changes nothing.
     cli.write("modular/plain.xosc", &plain);
     assert_eq!(cli.qcbus(&["expand", "modular/plain.xosc"]).stdout, plain);
     let said = cli.qcbus(&["check", "modular/plain.xosc"]);
@@ -89,7 +89,7 @@ fn nothing_is_written_but_what_was_asked_for() {
     after.sort();
     assert_eq!(files(&cli), after);
 
-    // A reference that leads nowhere: no output, and an older one stays as it is.
+    // A reference without a target: there is no output, and an older output stays unchanged.
     cli.write(
         "modular/lost.xosc",
         text(MAIN).replace("moves.xosc", "mooves.xosc"),
@@ -174,7 +174,7 @@ fn many_at_once_do_not_disturb_each_other() {
     assert!((1..8).all(|number| read(number) == read(0)));
 }
 
-/// A farm with the sample's modular scenario, its library and its map.
+/// Creates a farm with the sample's modular scenario, its library and its map.
 fn farm() -> Farm {
     let farm = Farm::new();
     for name in ["maps", "modular"] {
@@ -217,7 +217,7 @@ fn a_library_that_changes_has_its_users_judged_again() {
         becomes(&farm, MAIN, verdict, part);
         becomes(&farm, "modular/second.xosc", verdict, part);
     };
-    // A fault that only the expanded scenario has: the library's own scenario runs for a minute.
+    // Only the expanded scenario has this fault: the library's own scenario runs for a minute.
     let faulty = text(LIBRARY).replace(
         "dynamicsDimension=\"time\" value=\"3\"",
         "dynamicsDimension=\"tiem\" value=\"3\"",
@@ -257,7 +257,7 @@ fn findings_name_the_file_that_has_the_fault() {
         })
         .collect();
     assert!(said.iter().any(|it| it.contains(&of_library)), "{said:#?}");
-    // Both groups take it: one finding, and both references.
+    // Both groups use it, so there is one finding with both references.
     let found = issues(&results).filter(|(_, it)| it.description.contains("tiem"));
     let places: Vec<Vec<(u64, u64)>> = found.map(|(_, it)| support::cli::places(it)).collect();
     assert_eq!(places.len(), 1, "{places:?}");
@@ -301,7 +301,7 @@ fn a_library_on_the_search_path_counts_wherever_it_lies() {
     let renamed = text(LIBRARY).replace("name=\"brake\" maximum", "name=\"halt\" maximum");
     std::fs::write(library.join("moves.xosc"), renamed).unwrap();
     becomes(&farm, MAIN, "rejected", "has no maneuver group `brake`");
-    // One that comes to lie nearer is the one that is meant.
+    // A library that appears at a nearer place takes precedence.
     farm.write(LIBRARY, &sample(LIBRARY));
     becomes(&farm, MAIN, "accepted", "");
 }

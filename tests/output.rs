@@ -1,4 +1,4 @@
-//! What `qcbus check` prints and writes besides results, and with what it ends.
+//! Further output of `qcbus check` besides results, and its exit codes.
 
 #![expect(
     clippy::unwrap_used,
@@ -65,7 +65,7 @@ fn a_line_for_programs_is_found_by_a_problem_matcher() {
     let cli = cli();
     let said = cli.qcbus(&["check", "in", "--output-format", "concise", "-q"]);
     for line in said.stdout.lines() {
-        // What docs/ci.md gives to editors: PATH:ROW:COLUMN: LEVEL: TEXT [RULE]
+        // docs/ci.md promises this format to editors: PATH:ROW:COLUMN: LEVEL: TEXT [RULE]
         let (place, rest) = line.split_once(": ").unwrap();
         let parts: Vec<&str> = place.rsplitn(3, ':').collect();
         assert!(
@@ -404,7 +404,7 @@ fn rules_are_found_by_what_people_remember_of_them() {
     );
 }
 
-/// As a hook and an editor call it.
+/// Runs a check as hooks and editors call it.
 fn hook(cli: &Cli, further: &[&str]) -> Said {
     let call = ["check", "--force-exclude", "--output-format", "concise"];
     cli.qcbus(&[&call, further].concat())

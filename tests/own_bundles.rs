@@ -1,4 +1,4 @@
-//! Bundles of one's own on a broker that runs: added, upgraded, taken back. What the commands answer is so.
+//! The user's own bundles on a running broker: added, upgraded, removed. The answers are true.
 
 #![expect(
     clippy::unwrap_used,
@@ -29,7 +29,7 @@ fn told(said: &Output) -> (Option<i32>, String) {
     (said.status.code(), String::from_utf8(text).unwrap())
 }
 
-/// Puts a program at a path in one step, as whoever installs a newer one does.
+/// Puts a program at a path in one step, as an installation of a newer one does.
 fn install(path: &Path, text: &str) {
     let aside = path.with_extension("new");
     std::fs::write(&aside, format!("#!/bin/sh\n{text}\n")).unwrap();
@@ -37,7 +37,7 @@ fn install(path: &Path, text: &str) {
     std::fs::rename(&aside, path).unwrap();
 }
 
-/// A bundle called `mine`, of a version.
+/// Returns a bundle called `mine` with a version.
 fn mine(version: &str) -> String {
     let zoo = zoo();
     format!(
@@ -46,7 +46,7 @@ fn mine(version: &str) -> String {
     )
 }
 
-/// A farm with the program of `mine` beside it.
+/// Creates a farm with the program of `mine` beside it.
 fn farm_with_mine(version: &str) -> (Farm, PathBuf) {
     let farm = Farm::with(&["--absence-limit", "1s"]);
     let program = farm.base().join("mine");
@@ -54,7 +54,7 @@ fn farm_with_mine(version: &str) -> (Farm, PathBuf) {
     (farm, program)
 }
 
-/// The checkers of a bundle, with its version, in the result of a file that has just come in.
+/// Writes a file and returns the checkers of a bundle in its result, with the bundle's version.
 fn judges(farm: &Farm, bundle: &str, number: u64) -> Option<(String, Vec<String>)> {
     let name = format!("{number}.xodr");
     farm.write(&name, &Content::Good(number).bytes());
@@ -106,13 +106,13 @@ fn what_does_not_become_ready_is_taken_out_again_and_stops_nobody() {
         ("exit 3", "exit code 3", 2),
         ("exec /nowhere/at/all", "127", 2),
         ("exec sleep 600", "it has not said hello within 1 s", 3),
-        // It says hello under another name than that of its manifest.
+        // It says hello under a name that differs from its manifest.
         (&mine("1.0.0").replace("--name mine", "--name other"), "", 2),
     ];
     for (number, (script, why, expected)) in (0..).zip(cases) {
         install(&program, script);
         let (code, text) = add(&farm, "mine", &program, &["--timeout", "1s"]);
-        // On a slow machine the time may be over before the program has ended.
+        // On a slow machine the timeout may expire before the program has ended.
         assert!(
             code == Some(expected) || code == Some(3),
             "{script}: {text}"
@@ -135,7 +135,7 @@ fn with_keep_it_stays_and_its_files_are_undetermined() {
     assert!(text.contains("qcbus bundle remove mine"), "{text}");
     farm.write("a.xodr", &Content::Good(1).bytes());
     assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Undetermined);
-    // A better program at its path is noticed without a word.
+    // A better program at the same path is noticed without a command.
     install(&program, &mine("1.0.1"));
     until_or(
         "the better program judges",
@@ -172,7 +172,7 @@ fn a_program_that_is_replaced_is_noticed_by_itself() {
     assert_eq!(add(&farm, "mine", &program, &[]).0, Some(0));
     assert_eq!(judges(&farm, "mine", 1), polite("1.0.0"));
     install(&program, &mine("2.0.0"));
-    // What was judged by the one before is judged again.
+    // Files judged by the previous program are judged again.
     until_or(
         "the newer program has judged it again",
         || {
@@ -198,7 +198,7 @@ fn an_upgrade_to_a_broken_program_leaves_the_one_that_works() {
     let manifest = || std::fs::read_to_string(farm.bundles_d().join("mine.json")).unwrap();
     let written = manifest();
 
-    // Another program, by either command: neither answer is about the process that goes on.
+    // Both commands get another program. Neither answer is about the process that goes on.
     let broken = farm.base().join("broken");
     install(&broken, "exit 3");
     let (code, text) = upgrade(&farm, &[broken.to_str().unwrap()]);
@@ -218,7 +218,7 @@ fn an_upgrade_to_a_broken_program_leaves_the_one_that_works() {
     assert_eq!(judges(&farm, "mine", 1), polite("1.0.0"));
     assert_eq!(pid(), before, "it was not even started anew");
 
-    // The same path.
+    // The broken program is at the same path.
     install(&program, "exit 4");
     let (code, text) = upgrade(&farm, &[]);
     assert_eq!(code, Some(2), "{text}");
@@ -340,7 +340,7 @@ fn a_script_in_python_is_run_by_the_interpreter_that_is_found_here() {
     assert_eq!(missing.code, Some(2), "{}", missing.whole(&cli));
 }
 
-/// As a stranger does it: outside of the workspace, by what the command says.
+/// The test works like an outside user: outside of the workspace, as the command instructs.
 #[test]
 fn a_new_bundle_in_rust_is_built_tested_and_judges() {
     let farm = Farm::new();
@@ -355,7 +355,7 @@ fn a_new_bundle_in_rust_is_built_tested_and_judges() {
     assert_eq!(code, Some(0), "{text}");
     let (code, text) = new("mine");
     assert_eq!(code, Some(2), "nothing is written over: {text}");
-    // Below the target directory of the workspace, so that it is built once.
+    // The target is below the target directory of the workspace, so that it is built once.
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("own-bundle");
     let cargo = |words: &[&str]| {
         let mut command = std::process::Command::new(env!("CARGO"));

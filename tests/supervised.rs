@@ -1,4 +1,4 @@
-//! A broker under the eyes of a service manager, a terminal and other users.
+//! Tests a broker under a service manager, in a terminal and with other users.
 
 #![expect(
     clippy::unwrap_used,
@@ -32,7 +32,7 @@ fn serve_as_a_job(farm: &Farm) -> Broker {
     Broker::start(command.process_group(0), &farm.log_path())
 }
 
-/// As a terminal does that closes: whoever is in the group of the broker gets it.
+/// Sends SIGHUP to the process group of the broker, as a closing terminal does.
 fn hang_up(broker: &Broker) {
     let group = Pid::from_raw(broker.pid().cast_signed()).unwrap();
     kill_process_group(group, Signal::HUP).unwrap();
@@ -72,7 +72,7 @@ fn hangup_reloads_and_broker_and_bundles_go_on() {
     assert_eq!(broker.wait().code(), Some(0), "{}", tail(&farm.log()));
 }
 
-/// Whether a process has a handler for SIGHUP.
+/// Checks whether a process has a handler for SIGHUP.
 fn catches_hangup(pid: u32) -> bool {
     let status = std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
     let mut lines = status.lines();
@@ -108,10 +108,10 @@ fn closed_log_does_not_end_the_broker() {
     broker.wait().unwrap();
 }
 
-/// Whoever owns nothing.
+/// User id of a user without any files.
 const NOBODY: u32 = 65534;
 
-/// A command as another user; nothing where this test may not be one.
+/// Runs a command as another user. Returns `None` if the test must not change the user.
 fn as_nobody(program: &Path, arguments: &[&str]) -> Option<Output> {
     if !rustix::process::geteuid().is_root() {
         eprintln!("SKIPPED: only root can be another user");
@@ -128,7 +128,7 @@ fn status_for_nobody(program: &Path, instance: &Path) -> Option<Output> {
     as_nobody(program, &["status", "--instance-dir", instance])
 }
 
-/// A farm that others can look into, with a copy of the program that they can run.
+/// Returns a farm that other users can read, with a copy of the program that they can run.
 fn open_farm() -> (Farm, PathBuf) {
     let farm = Farm::new();
     std::fs::set_permissions(farm.base(), Permissions::from_mode(0o755)).unwrap();
@@ -160,7 +160,7 @@ fn another_user_is_told_whose_broker_it_is() {
 #[test]
 fn user_without_a_broker_is_told_of_one_of_another_user() {
     let (farm, program) = open_farm();
-    // The name tells this broker from those of other tests.
+    // The name distinguishes this broker from those of other tests.
     let name = format!("test-{}", std::process::id());
     let directory = farm.base().join(&name);
     let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
@@ -184,7 +184,7 @@ fn user_without_a_broker_is_told_of_one_of_another_user() {
     assert!(why.contains(&of_root), "{why}");
 }
 
-/// What `status --health` says, and with what it ends.
+/// Returns the exit code and the output of `status --health`.
 fn health(farm: &Farm) -> (Option<i32>, String) {
     let said = farm.qcbus(&["status", "--health"]);
     (said.status.code(), String::from_utf8(said.stdout).unwrap())
@@ -320,7 +320,7 @@ fn doctor_looks_at_the_running_broker() {
 #[test]
 fn doctor_asks_the_broker_where_modules_have_their_directories() {
     let farm = Farm::new();
-    // A directory that nobody can make, not even root.
+    // No user can create this directory, not even root.
     let blocked = farm.base().join("file/tmp");
     std::fs::write(farm.base().join("file"), "").unwrap();
     let mut command = farm.serve_command();
@@ -340,7 +340,7 @@ fn doctor_asks_the_broker_where_modules_have_their_directories() {
     assert!(said.contains("ok   temporary files"), "{said}");
 }
 
-/// One-shot modules have their private directories below `TMPDIR`.
+/// The private directories of ASAM modules are below `TMPDIR`.
 #[test]
 fn service_may_write_to_its_temporary_directory() {
     let unit = include_str!("../docs/qcbus.service");

@@ -1,6 +1,6 @@
-//! A clock that jumps: loaded before a program's libraries, it moves the time of day by as many seconds as
-//! the file says that `QCBUS_TEST_CLOCK` names. All other clocks go on. Built by the test that needs it,
-//! with nothing but the compiler.
+//! A clock that jumps: a library that is loaded before those of a program. It moves the time of day
+//! by the number of seconds in the file that `QCBUS_TEST_CLOCK` names. All other clocks stay
+//! unchanged. The test that needs it builds it with the compiler alone.
 
 use std::ffi::{c_char, c_int, c_long};
 
@@ -22,14 +22,14 @@ unsafe extern "C" {
 const CLOCK_GETTIME: c_long = 228;
 #[cfg(target_arch = "aarch64")]
 const CLOCK_GETTIME: c_long = 113;
-/// The time of day.
+/// Clock id of the time of day.
 const REALTIME: c_int = 0;
 
 /// # Safety
-/// As `clock_gettime(2)` wants it: `time` is to be written to.
+/// `time` must be valid for writing, as `clock_gettime(2)` requires.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn clock_gettime(clock: c_int, time: *mut Time) -> c_int {
-    // SAFETY: the system is asked what the caller asked, with the caller's memory.
+    // SAFETY: the system gets the caller's request, with the caller's memory.
     let answer = unsafe { syscall(CLOCK_GETTIME, c_long::from(clock), time) };
     if answer == 0 && clock == REALTIME {
         // SAFETY: the system has just written to it.
@@ -38,11 +38,11 @@ pub unsafe extern "C" fn clock_gettime(clock: c_int, time: *mut Time) -> c_int {
     answer as c_int
 }
 
-/// Seconds, without memory of our own: this is called from anywhere.
+/// Returns the seconds of the jump. It allocates no memory, because it is called from anywhere.
 fn jump() -> Option<i64> {
     let mut bytes = [0_u8; 32];
-    // SAFETY: the name ends with a zero, the path is the environment's, and no more is read than there is
-    // room for.
+    // SAFETY: the name ends with a zero, the path belongs to the environment, and no more is read
+    // than there is room for.
     let read = unsafe {
         let path = getenv(c"QCBUS_TEST_CLOCK".as_ptr());
         if path.is_null() {

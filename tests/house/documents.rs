@@ -1,4 +1,4 @@
-//! What documents say is checked: paths, rules, code, the sample farm and the words of the glossary.
+//! Checks of the documents: paths, rules, code, the sample farm and the words of the glossary.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ fn paths_named_in_documents_exist() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Words that once meant several things, and the directory whose word each is now, if anybody's.
+/// Words that once had several meanings, with the only directory that may define each, if any.
 const SETTLED_WORDS: &[(&str, &str)] = &[
     ("Place", "bundles/sdk"),
     ("Places", "nowhere"),
@@ -82,8 +82,7 @@ fn the_words_of_the_glossary_mean_one_thing() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Structs, enums and type aliases that are no part of a trait or a process test, each with the
-/// files that define it.
+/// Returns the structs and enums outside of process tests, each with the files that define it.
 fn defined_types(root: &Path) -> BTreeMap<String, Vec<PathBuf>> {
     let mut found: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
     for (file, text) in sources(root) {
@@ -118,7 +117,7 @@ fn rules_named_in_documents_exist() {
         .filter(|file| file.extension().is_some_and(|suffix| suffix == "md"))
         .map(|file| file.file_stem().unwrap().to_string_lossy().into_owned())
         .collect();
-    // How rules' names begin; what else begins so is taken for one.
+    // Every name that begins like the name of a rule counts as a rule.
     let first_words = |name: &str| name.split('_').take(2).collect::<Vec<_>>().join("_");
     let beginnings: BTreeSet<String> = rules.iter().map(|rule| first_words(rule)).collect();
     let mut wrong = Vec::new();
@@ -179,13 +178,13 @@ fn the_farm_and_its_table_agree() {
         .into_iter()
         .map(|file| file.strip_prefix(&farm).unwrap().to_owned())
         .filter(|file| file.extension().is_some_and(|suffix| suffix != "md"))
-        // Included by another file, no file to check.
+        // These files are included by other files and are not checked themselves.
         .filter(|file| file.extension().is_some_and(|suffix| suffix != "xml"))
         .collect();
     assert_eq!(named, there);
 }
 
-/// What is written in backticks and begins with a directory of ours.
+/// Returns the paths in backticks that begin with a directory of the repository.
 fn named_paths(text: &str, root: &Path) -> BTreeSet<String> {
     let quoted = text.split('`').skip(1).step_by(2);
     let plain = |word: &&str| {

@@ -1,11 +1,11 @@
-//! The broker is read in pieces that a head holds.
+//! Limits for the size of functions and files of the broker, so that they stay readable.
 
 use super::{root, sources};
 
-/// Lines of a function, with its signature and its last brace.
+/// Maximum number of lines of a function, with its signature and its last brace.
 const LONGEST_FUNCTION: usize = 60;
 
-/// Lines of a file, which nine in ten keep to.
+/// Number of lines that nine in ten files must not exceed.
 const LONG_FILE: usize = 400;
 
 #[test]
@@ -31,7 +31,7 @@ fn functions_and_files_of_the_broker_are_short() {
     assert!(nine_in_ten, "more than one in ten:\n{}", long.join("\n"));
 }
 
-/// The lines on which functions begin, and their names.
+/// Returns the lines on which functions begin, and their names.
 fn functions<'l>(lines: &[&'l str]) -> Vec<(usize, &'l str)> {
     let name = |line: &&'l str| {
         let (before, after) = line.split_once("fn ")?;
@@ -47,11 +47,11 @@ fn functions<'l>(lines: &[&'l str]) -> Vec<(usize, &'l str)> {
         .collect()
 }
 
-/// How long the function is that begins here: it ends with a brace as far to the left as it begins.
+/// Returns the length of the first function. Its last brace is indented like its first line.
 fn length(lines: &[&str]) -> usize {
     let ends = |line: &&str| line.ends_with(['{', ';', '}']);
     let signature = lines.iter().position(ends).unwrap_or_default();
-    // In one line, or only declared.
+    // The function is on one line or only declared.
     if !lines[signature].ends_with('{') {
         return signature + 1;
     }

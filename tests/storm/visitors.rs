@@ -1,4 +1,4 @@
-//! What the driver does to the configuration, to animals, and to the bundle of one's own.
+//! Actions of the driver on the configuration, the misbehaving bundles and the custom bundle.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -11,7 +11,7 @@ use super::failures::{self, ANIMALS, GUEST_LIMITS, GUESTS};
 use super::verdicts::JUDGE;
 use crate::support::farm::zoo;
 
-/// How modules behave towards who starts them.
+/// Shell functions of well-behaved modules.
 const MANNERS: &str = include_str!("../../bundles/asam-adapter/tests/guests/manners.sh");
 
 impl Driver {
@@ -27,7 +27,7 @@ impl Driver {
             && !self.animals.contains(&animal)
         {
             let arguments = if animal == "slow" { "--millis 5" } else { "" };
-            // What has no weight must change nothing, whatever it does.
+            // A shadow has no weight, so it must never change anything.
             if !animal.starts_with("reporter") && self.dice.below(3) == 0 {
                 self.farm.let_in_as_shadow(animal, arguments);
                 self.tally.note("shadow comes", animal);
@@ -39,7 +39,7 @@ impl Driver {
         }
     }
 
-    /// A one-shot module comes, with weight or without.
+    /// Adds an ASAM module, as a required bundle or as a shadow.
     fn guest(&mut self) {
         let Some((name, _)) = self.dice.pick(GUESTS).copied() else {
             return;
@@ -63,7 +63,7 @@ impl Driver {
         self.tally.note("module comes", name);
     }
 
-    /// Where the programs of modules lie.
+    /// Returns the directory of the programs of modules.
     pub fn guests(&self) -> PathBuf {
         self.farm.base().join("guests")
     }
@@ -94,25 +94,25 @@ impl Driver {
         std::fs::write(self.farm.base().join("config.xml"), text).unwrap();
     }
 
-    /// Somebody asks for the configuration and the manifests to be read again, though nothing is new.
-    /// The driver does not wait for the answer: the broker may stand still until the driver lets it go.
+    /// Requests a reload of the unchanged configuration and manifests. The driver does not wait for
+    /// the answer, because the broker may be stopped until the driver continues it.
     pub fn reload(&mut self) {
         let instance = self.farm.instance();
         std::thread::spawn(move || drop(ask_broker(&instance, &Request::Reload)));
         self.tally.note("reload", "");
     }
 
-    /// The program of the bundle of one's own: a link to the zoo's, or to one in Python, which can be taken away.
+    /// Returns the custom bundle's program: a removable link to the zoo program or one in Python.
     fn program(&self) -> PathBuf {
         self.farm.base().join("program/zoo")
     }
 
-    /// Starts the bundle in Python, when that is to be tried.
+    /// Returns the script that starts the bundle in Python, if it is tested.
     fn python(&self) -> PathBuf {
         self.farm.base().join("judge")
     }
 
-    /// The bundle of one's own, in its next version.
+    /// Installs the custom bundle in its next version.
     pub fn install(&mut self) {
         self.install_guests();
         std::fs::create_dir_all(self.farm.base().join("program")).unwrap();
@@ -131,7 +131,7 @@ impl Driver {
         self.upgrade();
     }
 
-    /// It gets another version, if anybody wants it.
+    /// Gives the custom bundle another version, unless its manifest is removed.
     pub fn upgrade(&mut self) {
         if self.removed_until.is_some() {
             return;
@@ -143,7 +143,7 @@ impl Driver {
         self.tally.note("upgrade", &version.to_string());
     }
 
-    /// Nobody wants the bundle of one's own for a while.
+    /// Removes the manifest of the custom bundle for a while.
     pub fn remove(&mut self) {
         if self.removed_until.is_some() {
             return;
@@ -155,7 +155,7 @@ impl Driver {
         self.tally.note("manifest goes", JUDGE);
     }
 
-    /// It is wanted again.
+    /// Restores the manifest of the custom bundle.
     pub fn want_again(&mut self) {
         if self.removed_until.take().is_some() {
             self.upgrade();
@@ -171,7 +171,7 @@ impl Driver {
         }
     }
 
-    /// The program goes from the disk for a while, mostly with the process that runs.
+    /// Removes the program from the disk for a while, usually together with the running process.
     pub fn vanish(&mut self) {
         if self.gone_until.is_some() {
             return;
@@ -207,7 +207,7 @@ impl Driver {
         }
     }
 
-    /// Whether the driver had a hand in the death of a bundle that the broker killed at this time.
+    /// Checks whether the driver may have caused the broker's kill of a bundle at this time.
     pub fn was_stopped(&self, name: &str, at: Duration) -> bool {
         let hand = |stop: &Stop| {
             let whose = stop.name.is_none_or(|it| it == name);
@@ -217,16 +217,16 @@ impl Driver {
     }
 }
 
-/// An interpreter that has the package `qcbus`: the bundle of one's own is one in Python then.
+/// Interpreter with the package `qcbus`. If set, the custom bundle runs in Python.
 const PYTHON: &str = "QCBUS_STORM_PYTHON";
 
-/// A time in which a bundle could not go on.
+/// A period in which a bundle could not run.
 pub struct Stop {
-    /// Which bundle; all of them if it is not said.
+    /// Name of the bundle, or `None` for all bundles.
     pub name: Option<&'static str>,
     pub from: Duration,
     pub to: Duration,
 }
 
-/// So long after a process was stopped, or the shared memory was full, it may be killed for it.
+/// Time in which a process may still be killed for a stop or a full shared memory.
 const AFTERMATH: Duration = Duration::from_secs(10);

@@ -1,18 +1,18 @@
-//! ASAM's result file as its schema describes it, told element by element, so that what we write
-//! is held against something else than our own reader.
+//! Describes ASAM's result file element by element, as its schema does. The output is therefore
+//! compared with more than the project's own reader.
 
 use roxmltree::{Document, Node};
 
 /// One element of the format.
 struct Shape {
     name: &'static str,
-    /// Attributes that must be there.
+    /// Required attributes.
     required: &'static [&'static str],
-    /// Attributes that may be there.
+    /// Optional attributes.
     optional: &'static [&'static str],
-    /// Children, in the order in which they must come.
+    /// Children in their required order.
     children: &'static [&'static str],
-    /// Whether children come in any order.
+    /// Whether the order of the children is free.
     any_order: bool,
 }
 
@@ -76,7 +76,7 @@ const SHAPES: &[Shape] = &[
     },
 ];
 
-/// Every way in which this is no result file as ASAM's current schema and readers demand it.
+/// Returns all violations of ASAM's current schema and readers in a result file.
 pub fn complaints(text: &str) -> Vec<String> {
     let document = match Document::parse(text) {
         Ok(document) => document,
@@ -112,7 +112,7 @@ fn element(node: Node<'_, '_>, found: &mut Vec<String>) {
     let name = node.tag_name().name();
     let shape = match SHAPES.iter().find(|shape| shape.name == name) {
         Some(shape) => shape,
-        // What is in it is nobody's business but the one's who wrote it.
+        // The content of this element is private to its author.
         None if name == "DomainSpecificInfo" => {
             if node.attribute("name").is_none() {
                 found.push("DomainSpecificInfo without a name".to_owned());
@@ -185,7 +185,7 @@ fn values(node: Node<'_, '_>, found: &mut Vec<String>) {
     }
 }
 
-/// What ASAM's reader demands beyond its schema.
+/// Checks the requirements of ASAM's reader beyond its schema.
 fn checker(node: Node<'_, '_>, found: &mut Vec<String>) {
     let children = |name| node.children().filter(move |it| it.has_tag_name(name));
     let id = node.attribute("checkerId").unwrap_or_default();
@@ -215,7 +215,7 @@ fn unique(node: Node<'_, '_>, name: &str, attribute: &str, found: &mut Vec<Strin
     }
 }
 
-/// `entity:standard:x.y.z:set.name`, sets may be nested.
+/// Checks the form `entity:standard:x.y.z:set.name`. Sets may be nested.
 fn is_rule_uid(uid: &str) -> bool {
     let parts: Vec<&str> = uid.split(':').collect();
     let [entity, standard, version, name] = parts[..] else {

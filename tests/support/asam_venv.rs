@@ -1,4 +1,4 @@
-//! ASAM's own modules, as they are published, in a virtual environment below `target`.
+//! Installs ASAM's published modules in a virtual environment below `target`.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -9,15 +9,15 @@ use rustix::fs::{FlockOperation, flock};
 /// The published packages.
 const PACKAGES: [&str; 2] = ["asam-qc-opendrive", "asam-qc-openscenarioxml"];
 
-/// The directory of their programs, made when it is missing.
+/// Returns the directory of their programs, and creates it if it is missing.
 ///
 /// # Errors
-/// Why it cannot be had here: no Python, or no network.
+/// If it cannot be created: no Python, or no network.
 pub fn programs() -> Result<PathBuf, String> {
     let target = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target");
     let target = target.canonicalize().map_err(|error| error.to_string())?;
     let venv = target.join("asam-venv");
-    // Several tests may come at the same time.
+    // Several tests may need the directory at the same time.
     let lock = File::create(target.join("asam-venv.lock")).map_err(|error| error.to_string())?;
     flock(&lock, FlockOperation::LockExclusive).map_err(|error| error.to_string())?;
     let ready = venv.join("ready");

@@ -1,4 +1,4 @@
-//! A broker as a process: started, asked, killed.
+//! A broker as a process: start, requests, kill.
 
 use std::process::{Child, Command, Stdio};
 
@@ -13,7 +13,7 @@ pub struct Broker {
 }
 
 impl Broker {
-    /// Starts it; its log is appended to `log`.
+    /// Starts the broker and appends its log to `log`.
     pub fn start(command: &mut Command, log: &std::path::Path) -> Broker {
         let log = std::fs::OpenOptions::new()
             .create(true)
@@ -29,28 +29,28 @@ impl Broker {
         Broker { child }
     }
 
-    /// Its process id.
+    /// Returns the process id.
     pub fn pid(&self) -> u32 {
         self.child.id()
     }
 
-    /// Whether it runs.
+    /// Checks whether the broker is running.
     pub fn is_alive(&mut self) -> bool {
         self.child.try_wait().unwrap().is_none()
     }
 
-    /// Kills it as a crash does.
+    /// Kills the broker, as in a crash.
     pub fn kill(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 
-    /// Sends it a signal.
+    /// Sends a signal to the broker.
     pub fn signal(&self, signal: Signal) {
         signal_pid(i32::try_from(self.child.id()).unwrap(), signal);
     }
 
-    /// Waits for its end.
+    /// Waits until the broker ends.
     pub fn wait(&mut self) -> std::process::ExitStatus {
         super::watchdog::until("the broker ends", || self.child.try_wait().unwrap())
     }

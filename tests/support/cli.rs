@@ -1,4 +1,4 @@
-//! A desk: a directory of one's own in which commands are typed as a person types them.
+//! A private directory in which tests run commands as a user does.
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -10,37 +10,37 @@ use tempfile::TempDir;
 
 use super::watchdog;
 
-/// A desk.
+/// A private directory for commands.
 #[derive(Debug)]
 pub struct Cli {
     dir: TempDir,
 }
 
-/// What a command said.
+/// Output of a command.
 #[derive(Debug)]
 pub struct Said {
-    /// Its exit code; `None` when a signal ended it.
+    /// Exit code, or `None` when a signal ended the command.
     pub code: Option<i32>,
-    /// Results.
+    /// Results on stdout.
     pub stdout: String,
-    /// Talk.
+    /// Messages on stderr.
     pub stderr: String,
 }
 
 impl Cli {
-    /// An empty one.
+    /// Creates an empty directory.
     pub fn new() -> Cli {
         let dir = TempDir::with_prefix("qcbus-test-").unwrap();
         std::fs::create_dir(dir.path().join(".run")).unwrap();
         Cli { dir }
     }
 
-    /// Where commands are typed.
+    /// Returns the directory in which commands run.
     pub fn path(&self) -> &Path {
         self.dir.path()
     }
 
-    /// Puts a file there, with the directories on its way.
+    /// Writes a file, and creates its parent directories.
     pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
         let path = self.path().join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -48,7 +48,7 @@ impl Cli {
         path
     }
 
-    /// What a manifest says is to be run.
+    /// Returns the command in a manifest.
     pub fn command_in(&self, manifest: &str) -> String {
         let bytes = std::fs::read(self.path().join(manifest)).unwrap();
         let manifest: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
@@ -56,12 +56,12 @@ impl Cli {
         command.as_str().unwrap().to_owned()
     }
 
-    /// Types `qcbus …` and waits for its end.
+    /// Runs `qcbus …` and waits for its end.
     pub fn qcbus(&self, arguments: &[&str]) -> Said {
         self.run(Command::new(env!("CARGO_BIN_EXE_qcbus")).args(arguments))
     }
 
-    /// Types `qcbus check …` in another directory; results go into a directory of the desk.
+    /// Runs `qcbus check …` in another directory. The results go into `out` in this directory.
     pub fn check_in(&self, directory: &Path, paths: &[&str], out: &str) -> Said {
         let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
         command.arg("check").args(paths);
@@ -96,19 +96,19 @@ impl Cli {
         }
     }
 
-    /// A result file, relative to the desk.
+    /// Reads a result file, relative to this directory.
     pub fn result(&self, name: &str) -> Results {
         read_result(&self.path().join(name))
     }
 
-    /// What was said, without what differs from desk to desk.
+    /// Returns an output without the path of this directory, which differs between tests.
     pub fn tidy(&self, text: &str) -> String {
         text.replace(&*self.path().to_string_lossy(), "[DESK]")
     }
 }
 
 impl Said {
-    /// All of it, for a snapshot or a failure.
+    /// Returns the whole output, for a snapshot or a failure message.
     pub fn whole(&self, cli: &Cli) -> String {
         let Said {
             code,
@@ -126,7 +126,7 @@ impl Said {
     }
 }
 
-/// Ends with the test, also when it panics.
+/// A child process that is killed at the end of the test, also after a panic.
 struct Running(Child);
 
 impl Drop for Running {
@@ -149,17 +149,17 @@ pub fn read_result(path: &Path) -> Results {
     xqar::read(&bytes).unwrap()
 }
 
-/// All checkers of a result.
+/// Returns all checkers of a result.
 pub fn checkers(results: &Results) -> impl Iterator<Item = &Checker> {
     results.bundles.iter().flat_map(|bundle| &bundle.checkers)
 }
 
-/// All issues of a result with their checkers.
+/// Returns all issues of a result with their checkers.
 pub fn issues(results: &Results) -> impl Iterator<Item = (&Checker, &Issue)> {
     checkers(results).flat_map(|checker| checker.issues.iter().map(move |issue| (checker, issue)))
 }
 
-/// Row and column of every place of an issue.
+/// Returns row and column of every place of an issue.
 pub fn places(issue: &Issue) -> Vec<(u64, u64)> {
     let all = issue.locations.iter().flat_map(|it| &it.places);
     all.filter_map(|place| match place {
@@ -169,14 +169,14 @@ pub fn places(issue: &Issue) -> Vec<(u64, u64)> {
     .collect()
 }
 
-/// The sample farm.
+/// Returns the path of the sample farm.
 pub fn sample_farm() -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/farm"))
         .canonicalize()
         .unwrap()
 }
 
-/// All files below a directory, relative to it, in order; none, if it is not there.
+/// Returns the relative paths of all files below a directory, sorted. None if it is missing.
 pub fn files_below(directory: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut open = vec![directory.to_path_buf()];

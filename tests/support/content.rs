@@ -1,56 +1,56 @@
-//! Files whose verdict is known: the oracle.
+//! Files with known verdicts: the oracle.
 
 use qcbus_messages::Verdict;
 
 use super::dice::Dice;
 
-/// What a file contains. The number makes the bytes of every file differ from all others.
+/// Content of a file. The number makes the bytes of every file unique.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Content {
-    /// A short straight road: nothing wrong with it.
+    /// A short straight road without faults.
     Good(u64),
     /// A road network without a header.
     NoHeader(u64),
-    /// A header that does not say which version it is.
+    /// A road network whose header has no version.
     NoVersion(u64),
-    /// Something else than a road network.
+    /// A file that is not a road network.
     WrongRoot(u64),
-    /// The first bytes of something.
+    /// The first bytes of a file.
     Torn(Vec<u8>),
-    /// A road with the word that `judges_strictly` rejects, and nothing else wrong.
+    /// A road with the word that `judges_strictly` rejects, without other faults.
     Marked(u64),
-    /// A road, and another one that comes from a part.
+    /// A road, and another one included from a part.
     Including(u64, String),
-    /// A road for others to include, with the word or without. No file to check.
+    /// A road that other files include, with or without the word. It is not checked itself.
     Part(u64, Mark),
-    /// A good map, but not one that scenarios here can use: its road has another id.
+    /// A good map that the scenarios here cannot use, because its road has another id.
     Elsewhere(u64),
-    /// A catalog, with the word or without.
+    /// A catalog, with or without the word.
     Catalog(u64, Mark),
     /// A good catalog that lacks the vehicle of the scenarios.
     OtherCatalog(u64),
-    /// A scenario on a map; its vehicles come from the catalogs in [`CATALOGS`].
+    /// A scenario on a map. Its vehicles come from the catalogs in [`CATALOGS`].
     Scenario(u64, String),
 }
 
-/// Whether the word that `judges_strictly` rejects is there.
+/// Whether a file contains the word that `judges_strictly` rejects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mark {
-    /// It is not.
+    /// Without the word.
     Clean,
-    /// It is.
+    /// With the word.
     Marked,
 }
 
-/// The word that `judges_strictly` rejects.
+/// Word that `judges_strictly` rejects.
 const MARK: &str = "forbidden";
-/// Where scenarios take their vehicles from.
+/// Directory of the catalogs with the vehicles of the scenarios.
 pub const CATALOGS: &str = "catalogs";
-/// The one file there.
+/// Only file in that directory.
 pub const CATALOG: &str = "catalogs/vehicles.xosc";
 
 impl Content {
-    /// A map that stands alone; every second one is good.
+    /// Returns a map that depends on no other file. Every second one is good.
     pub fn any(dice: &mut Dice) -> Content {
         let number = dice.roll() >> 8;
         match dice.below(8) {
@@ -62,10 +62,10 @@ impl Content {
         }
     }
 
-    /// What is left of it when writing stops in the middle.
+    /// Returns the part that remains when writing stops in the middle.
     pub fn torn(&self, dice: &mut Dice) -> Content {
         let bytes = self.bytes();
-        // Without its last tag, so that no part is a whole.
+        // The last tag is never included, so that no part is complete.
         let end = bytes
             .iter()
             .rposition(|byte| *byte == b'<')
@@ -75,7 +75,7 @@ impl Content {
         Content::Torn(text[..usize::try_from(end).unwrap()].to_vec())
     }
 
-    /// A road whose plan view is included from `view.xml`, and what must be in there.
+    /// Returns a road that includes its plan view from `view.xml`, and the content of that file.
     pub fn road_in_two_parts() -> (String, String) {
         let whole = String::from_utf8(Content::Good(1).bytes()).unwrap();
         let (begin, end) = (
@@ -89,7 +89,7 @@ impl Content {
         )
     }
 
-    /// The bytes.
+    /// Returns the bytes.
     pub fn bytes(&self) -> Vec<u8> {
         let text = match self {
             Content::Good(number) => road(HEADER, &name(*number, Mark::Clean), ""),
@@ -124,7 +124,7 @@ impl Content {
         text.into_bytes()
     }
 
-    /// What must be found, whatever its parts are.
+    /// Returns the expected verdict, independent of its parts.
     pub fn verdict(&self) -> Verdict {
         if self.checker().is_none() {
             Verdict::Accepted
@@ -133,7 +133,7 @@ impl Content {
         }
     }
 
-    /// The checker that must find it, or how its name ends: each standard has one of its own.
+    /// Returns the checker that must find the fault, or its suffix. Each standard has its own.
     pub fn checker(&self) -> Option<&'static str> {
         match self {
             Content::NoHeader(_) => Some("check_asam_xodr_xml_fileheader_is_present"),
@@ -153,7 +153,7 @@ impl Content {
         }
     }
 
-    /// The checker, or how its name ends, that finds a fault in whatever refers to this.
+    /// Returns the checker, or its suffix, that finds a fault in files that refer to this.
     pub fn spoils(&self) -> Option<&'static str> {
         match self {
             Content::Marked(_)
@@ -165,7 +165,8 @@ impl Content {
         }
     }
 
-    /// What else its verdict depends on, by name; those may depend on more.
+    /// Returns the names of the files that the verdict depends on. These may depend on further
+    /// files.
     pub fn parts(&self) -> Vec<String> {
         match self {
             Content::Including(_, part) => vec![part.clone()],
@@ -174,7 +175,7 @@ impl Content {
         }
     }
 
-    /// The files that it rests on, by name: their verdicts are part of its own.
+    /// Returns the names of the files that it rests on. Their verdicts are part of its own.
     pub fn rests_on(&self) -> Vec<String> {
         match self {
             Content::Scenario(..) => self.parts(),
@@ -182,7 +183,7 @@ impl Content {
         }
     }
 
-    /// The standard bundle that must judge a file of this name.
+    /// Returns the standard bundle that is required for a file of this name.
     pub fn bundle(name: &str) -> &'static str {
         if name.ends_with(".xosc") {
             "xoscBundle"
@@ -192,7 +193,7 @@ impl Content {
     }
 }
 
-/// The checker of `judges_strictly` that finds the word.
+/// Checker of `judges_strictly` that finds the word.
 pub const STRICT: &str = "check_zoo_0";
 
 const XML: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
@@ -200,7 +201,7 @@ const HEADER: &str = "<header revMajor=\"1\" revMinor=\"8\"/>";
 const CATALOG_TEXT: &str = include_str!("catalog.xml");
 const SCENARIO_TEXT: &str = include_str!("scenario.xml");
 
-/// A name that no other file has, with the word or without.
+/// Returns a unique name, with or without the word.
 fn name(number: u64, mark: Mark) -> String {
     match mark {
         Mark::Clean => format!("n{number}"),

@@ -1,4 +1,4 @@
-//! Random numbers that a printed seed brings back.
+//! Random numbers that can be reproduced with a printed seed.
 
 use std::time::Duration;
 
@@ -7,12 +7,12 @@ use std::time::Duration;
 pub struct Dice(u64);
 
 impl Dice {
-    /// From a seed.
+    /// Creates a generator from a seed.
     pub fn new(seed: u64) -> Dice {
         Dice(seed)
     }
 
-    /// The next number.
+    /// Returns the next number.
     pub fn roll(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut x = self.0;
@@ -21,24 +21,24 @@ impl Dice {
         x ^ (x >> 31)
     }
 
-    /// A number below `end`, which is not 0.
+    /// Returns a number below `end`, which must not be 0.
     pub fn below(&mut self, end: u64) -> u64 {
         self.roll() % end
     }
 
-    /// One of several.
+    /// Returns one of several items, or `None` if there are none.
     pub fn pick<'t, T>(&mut self, all: &'t [T]) -> Option<&'t T> {
         let count = u64::try_from(all.len()).unwrap();
         (count > 0).then(|| &all[usize::try_from(self.below(count)).unwrap()])
     }
 
-    /// Up to `limit` milliseconds.
+    /// Returns a duration of up to `limit` milliseconds.
     pub fn millis(&mut self, limit: u64) -> Duration {
         Duration::from_millis(self.below(limit + 1))
     }
 }
 
-/// The seed asked for with `QCBUS_CHAOS_SEED`, or one that nobody has seen.
+/// Returns the seed in `QCBUS_CHAOS_SEED`, or a new random one.
 pub fn seed() -> u64 {
     use std::hash::{BuildHasher, RandomState};
     std::env::var("QCBUS_CHAOS_SEED")

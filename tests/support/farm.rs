@@ -1,5 +1,5 @@
-//! A farm: a watched directory with everything that a broker beside it needs, in a directory of
-//! its own. Whatever was started for it is killed when it is dropped, also when a test panics.
+//! A farm for tests: a watched directory with everything that a broker needs, in a directory of its
+//! own. On drop, all its processes are killed, also after a panic.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -15,16 +15,16 @@ use super::broker::Broker;
 use super::processes::{self, Process};
 use super::watchdog;
 
-/// A farm.
+/// A farm for tests.
 #[derive(Debug)]
 pub struct Farm {
     dir: TempDir,
-    /// Further arguments of `qcbus serve`.
+    /// Additional arguments of `qcbus serve`.
     pub arguments: Vec<String>,
 }
 
 impl Farm {
-    /// An empty one.
+    /// Creates an empty farm.
     pub fn new() -> Farm {
         let dir = TempDir::with_prefix("qcbus-test-").unwrap();
         for name in ["farm", "bundles.d"] {
@@ -36,7 +36,7 @@ impl Farm {
         }
     }
 
-    /// With further arguments of `qcbus serve`.
+    /// Creates a farm with additional arguments of `qcbus serve`.
     pub fn with(arguments: &[&str]) -> Farm {
         let mut farm = Farm::new();
         farm.arguments
@@ -44,52 +44,52 @@ impl Farm {
         farm
     }
 
-    /// Where everything lies.
+    /// Returns the directory that contains everything.
     pub fn base(&self) -> &Path {
         self.dir.path()
     }
 
-    /// The watched directory.
+    /// Returns the watched directory.
     pub fn root(&self) -> PathBuf {
         self.dir.path().join("farm")
     }
 
-    /// The results' directory.
+    /// Returns the results directory.
     pub fn out(&self) -> PathBuf {
         self.dir.path().join("out")
     }
 
-    /// Where accepted files are published, if the broker is told so.
+    /// Returns the directory for published files, if the broker has a gate.
     pub fn gate(&self) -> PathBuf {
         self.dir.path().join("gate")
     }
 
-    /// The instance's runtime directory.
+    /// Returns the runtime directory of the instance.
     pub fn instance(&self) -> PathBuf {
         self.dir.path().join("instance")
     }
 
-    /// The manifests' directory.
+    /// Returns the directory of the manifests.
     pub fn bundles_d(&self) -> PathBuf {
         self.dir.path().join("bundles.d")
     }
 
-    /// The journal.
+    /// Returns the path of the journal.
     pub fn journal(&self) -> PathBuf {
         self.out().join(".qcbus/journal.sqlite")
     }
 
-    /// The broker's log.
+    /// Returns the path of the broker's log.
     pub fn log_path(&self) -> PathBuf {
         self.dir.path().join("serve.log")
     }
 
-    /// What the brokers have said so far.
+    /// Returns the log of all brokers so far.
     pub fn log(&self) -> String {
         std::fs::read_to_string(self.log_path()).unwrap_or_default()
     }
 
-    /// The command that serves this farm.
+    /// Returns the command that serves this farm.
     pub fn serve_command(&self) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
         command
@@ -141,8 +141,8 @@ impl Farm {
         command.env("NO_COLOR", "1").output().unwrap()
     }
 
-    /// Waits for a verdict that does not come, until the broker says why. On a slow machine it may not know
-    /// so soon: the next wait is twice as long, and each must end because its time is over.
+    /// Waits for a verdict that does not come, until the broker reports `why`. A slow broker may
+    /// report it late. Each wait must time out, and is twice as long as the last one.
     pub fn wait_in_vain(&self, file: &Path, further: &[&str], why: &str) -> Output {
         let file = file.to_str().unwrap();
         let last = std::cell::RefCell::new(String::new());
@@ -161,12 +161,12 @@ impl Farm {
         })
     }
 
-    /// Asks the broker, if there is one.
+    /// Sends a request to the broker. Returns `None` if no broker runs.
     pub fn ask(&self, request: &Request) -> Option<Response> {
         ask_broker(&self.instance(), request).ok()
     }
 
-    /// The broker's status, if there is one.
+    /// Returns the broker's status, or `None` if no broker runs.
     pub fn status(&self) -> Option<Status> {
         match self.ask(&Request::Status)? {
             Response::Status(status) => Some(*status),
@@ -174,7 +174,7 @@ impl Farm {
         }
     }
 
-    /// The verdict on a file's present bytes, whatever dies meanwhile.
+    /// Waits for the verdict on a file's current bytes, also if processes die meanwhile.
     pub fn verdict(&self, name: &str) -> FileVerdict {
         let file = self.root().join(name);
         let explain = || format!("{name}\n{:#?}\n{}", self.status(), self.log());
@@ -194,7 +194,7 @@ impl Farm {
         )
     }
 
-    /// Waits until everything that is there has its verdict and nothing is under way.
+    /// Waits until all files have their verdict and no work is left.
     pub fn settle(&self, total: usize) -> Status {
         let total = u64::try_from(total).unwrap();
         let settled = |status: &Status| {
@@ -210,36 +210,36 @@ impl Farm {
         )
     }
 
-    /// Puts a file there at once.
+    /// Writes a file in one call.
     pub fn write(&self, name: &str, bytes: &[u8]) {
         std::fs::write(self.root().join(name), bytes).unwrap();
     }
 
-    /// The result of a file.
+    /// Reads the result of a file.
     pub fn result(&self, name: &str) -> Results {
         let path = self.out().join(format!("{name}.xqar"));
         let bytes = std::fs::read(&path).unwrap_or_else(|it| panic!("{}: {it}", path.display()));
         xqar::read(&bytes).unwrap()
     }
 
-    /// The verdict file of a file.
+    /// Reads the verdict file of a file.
     pub fn verdict_file(&self, name: &str) -> serde_json::Value {
         let path = self.out().join(format!("{name}.verdict.json"));
         let bytes = std::fs::read(&path).unwrap_or_else(|it| panic!("{}: {it}", path.display()));
         serde_json::from_slice(&bytes).unwrap()
     }
 
-    /// Lets an animal in.
+    /// Adds a misbehaving bundle or reporter of the zoo.
     pub fn let_in(&self, animal: &str, arguments: &str) {
         self.let_in_by(&zoo(), animal, arguments);
     }
 
-    /// Lets an animal in that has no weight in any verdict.
+    /// Adds a misbehaving bundle as a shadow, without weight in any verdict.
     pub fn let_in_as_shadow(&self, animal: &str, arguments: &str) {
         self.let_in_with(&zoo(), animal, arguments, true);
     }
 
-    /// Lets an animal in whose program lies elsewhere.
+    /// Adds a misbehaving bundle with another program.
     pub fn let_in_by(&self, program: &Path, animal: &str, arguments: &str) {
         self.let_in_with(program, animal, arguments, false);
     }
@@ -263,27 +263,27 @@ impl Farm {
         self.let_in_module(animal, &module);
     }
 
-    /// Lets in what a manifest brings that has this module, under a name.
+    /// Adds a manifest with this module under a name.
     pub fn let_in_module(&self, animal: &str, module: &serde_json::Value) {
         let manifest = serde_json::json!({ "module": [module] });
         let path = self.bundles_d().join(format!("{animal}.json"));
-        // Renamed into place: a manifest that is half there is refused, with a notice.
+        // The manifest is renamed into place, because a half-written one is refused with a notice.
         let unfinished = self.bundles_d().join(format!(".{animal}"));
         std::fs::write(&unfinished, manifest.to_string()).unwrap();
         std::fs::rename(&unfinished, &path).unwrap();
     }
 
-    /// Sends an animal away.
+    /// Removes a misbehaving bundle.
     pub fn send_away(&self, animal: &str) {
         let _ = std::fs::remove_file(self.bundles_d().join(format!("{animal}.json")));
     }
 
-    /// All processes of this instance.
+    /// Returns all processes of this instance.
     pub fn processes(&self) -> Vec<Process> {
         processes::of_directory(&self.instance())
     }
 
-    /// What the shared memory of this instance begins with; there must have been a broker.
+    /// Returns the name prefix of this instance's shared memory. A broker must have been started.
     pub fn shm_prefix(&self) -> String {
         let path = self.instance().join("id");
         watchdog::until("the instance has an identity", || {
@@ -295,7 +295,7 @@ impl Farm {
 }
 
 impl Farm {
-    /// What killed processes leave is swept by the next broker of their instance; here none comes.
+    /// Removes shared memory of killed processes. No next broker of the instance does it here.
     fn clear_shared_memory(&self) {
         let Ok(prefix) = std::fs::read_to_string(self.instance().join("id")) else {
             return;
@@ -318,7 +318,7 @@ impl Farm {
 
 impl Drop for Farm {
     fn drop(&mut self) {
-        // What dies may have been about to start something.
+        // A dying process may just have started another one, so this is repeated.
         for _ in 0..3 {
             for process in self.processes() {
                 process.signal(Signal::KILL);
@@ -328,27 +328,27 @@ impl Drop for Farm {
     }
 }
 
-/// What lies in /dev/shm under a name that begins like this.
+/// Returns the entries of /dev/shm with this prefix.
 pub fn shm_segments(prefix: &str) -> Vec<String> {
     let entries = std::fs::read_dir("/dev/shm").unwrap().flatten();
     let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
     names.filter(|name| name.starts_with(prefix)).collect()
 }
 
-/// Copies a program that is to be run at once, by another process: were it open for writing in this one while another
-/// test starts something, which then has it open, too, it could not be run ("text file busy").
+/// Copies a program by another process. If this process had the copy open for writing, a child of
+/// another test could inherit it. The program could then not be run ("text file busy").
 pub fn copy_program(from: &Path, to: &Path) {
     let copied = Command::new("cp").arg(from).arg(to).status();
     assert!(copied.unwrap().success(), "{} is copied", from.display());
 }
 
-/// The end of a log.
+/// Returns the end of a log.
 pub fn tail(log: &str) -> String {
     let lines: Vec<&str> = log.lines().collect();
     lines[lines.len().saturating_sub(60)..].join("\n")
 }
 
-/// The zoo's program, built when it is first needed, beside the program under test.
+/// Returns the zoo program, next to the program under test. It is built on first use.
 pub fn zoo() -> PathBuf {
     static ZOO: OnceLock<PathBuf> = OnceLock::new();
     ZOO.get_or_init(build_zoo).clone()
@@ -360,12 +360,12 @@ fn build_zoo() -> PathBuf {
         return beside;
     }
     let mut build = Command::new(env!("CARGO"));
-    // As `cargo test --workspace` has built it: the same features, so nothing is compiled twice. The
-    // program comes with the test that runs it.
+    // These are the features of `cargo test --workspace`, so nothing is compiled twice. The program
+    // is built together with the test that runs it.
     let words = "test -q --no-run --workspace --test animals --manifest-path";
     build.args(words.split(' '));
     build.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/../../Cargo.toml"));
-    // target/PROFILE/zoo
+    // The path is target/PROFILE/zoo.
     if beside.parent().is_some_and(|it| it.ends_with("release")) {
         build.arg("--release");
     }

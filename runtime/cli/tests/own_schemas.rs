@@ -1,4 +1,4 @@
-//! Schemas of the user, all the way: command line, configuration, bundle, result file.
+//! The user's own schemas from end to end: command line, configuration, bundle, result file.
 
 #![expect(
     clippy::unwrap_used,
@@ -13,7 +13,7 @@ use tempfile::TempDir;
 
 const MAP: &str = "<OpenDRIVE>\n<header revMajor=\"1\" revMinor=\"7\"/>\n<road/>\n</OpenDRIVE>\n";
 const CHECKER: &str = "check_asam_xodr_xml_valid_schema";
-/// A schema that knows a header and nothing else.
+/// Schema that knows only a header.
 const OWN: &str = r#"<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema">
 <xs:element name="OpenDRIVE"><xs:complexType><xs:sequence>
 <xs:element name="header" type="xs:anyType"/>
@@ -21,7 +21,7 @@ const OWN: &str = r#"<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema">
 </xs:schema>"#;
 const BROKEN: &str = "<xs:schema xmlns:xs=\"http://www.w3.org/2001/XMLSchema\">\n<xs:import namespace=\"x\"/>\n</xs:schema>";
 
-/// A folder with a map and two folders of schemas, one of them broken.
+/// Creates a folder with a map and two folders of schemas, one of them broken.
 fn cli() -> TempDir {
     let cli = TempDir::new().unwrap();
     let write = |name: &str, text: &str| {
@@ -35,7 +35,7 @@ fn cli() -> TempDir {
     cli
 }
 
-/// A broker that does not outlive a test that fails.
+/// A broker that ends together with its test, even if the test fails.
 struct Broker<'d> {
     process: Child,
     cli: &'d Path,
@@ -64,9 +64,9 @@ impl<'d> Broker<'d> {
             .unwrap()
     }
 
-    /// The result for the map as it is now.
+    /// Returns the result for the current map.
     fn judge(&mut self) -> String {
-        // Until the broker is there, `wait` says so with exit code 4.
+        // `wait` returns the exit code 4 until the broker is there.
         while self
             .ask(&["wait", "map.xodr", "-q", "--timeout", "60s"])
             .status
@@ -228,7 +228,7 @@ fn a_broken_schema_of_a_configuration_is_the_checkers_error_unless_the_flag_says
 fn other_schemas_make_a_running_broker_judge_again() {
     let cli = cli();
     let check = |schemas: &[&str]| {
-        // One broker after the other over one state.
+        // The brokers run one after the other on the same state.
         let mut broker = Broker::serve(cli.path(), schemas);
         let found = broker.judge();
         broker.down();

@@ -1,4 +1,4 @@
-//! Measures building an image against quick-xml's own loop with attributes, on a generated map.
+//! Benchmark of building an image against quick-xml's own loop with attributes, on a generated map.
 //!
 //! `cargo run --release -p qcbus-ingest --example build_speed -- [MEGABYTES]`
 
@@ -78,7 +78,7 @@ fn quick_xml_loop(text: &str) -> usize {
     }
 }
 
-/// Roads with geometries, elevations and lanes, about as dense as exported city maps.
+/// Creates roads with geometries, elevations and lanes, about as dense as exported city maps.
 fn map(len: usize) -> String {
     let mut text = String::with_capacity(len + 4096);
     text.push_str("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<OpenDRIVE>\n    <header revMajor=\"1\" revMinor=\"7\" name=\"generated\"/>\n");

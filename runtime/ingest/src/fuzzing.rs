@@ -9,11 +9,11 @@ use qcbus_messages::{Absence, DocumentRole};
 use crate::modular::{ExpandedImage, Expansion, Piece, SearchPath, expand, pack};
 use crate::{Limits, Reader, Source, Walking, gather, prepare_bytes, references};
 
-/// Whatever the bytes are and whatever the name promises: there is an image, it is valid, its
-/// places can be found, and it does not outgrow its bound.
+/// Checks arbitrary bytes under names of every kind. An image exists, it is valid, its places can
+/// be found, and it does not exceed its bound.
 ///
 /// # Panics
-/// When one of these does not hold.
+/// If one of these conditions is violated.
 #[expect(clippy::panic, reason = "a fuzz body reports by panicking")]
 pub fn ingest(bytes: &[u8]) {
     let limits = Limits {
@@ -44,7 +44,7 @@ pub fn ingest(bytes: &[u8]) {
     }
 }
 
-/// Documents of an archive in memory. Nothing else is read.
+/// Documents of an archive in memory. No other files are read.
 struct Shelf {
     reader: Reader,
     images: Vec<Vec<u8>>,
@@ -89,20 +89,20 @@ impl Source for Shelf {
     }
 }
 
-/// What became of an archive.
+/// Outcome of an archive.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Outcome {
     /// The expanded scenario.
     Expanded(String),
-    /// What was in the way, at least.
+    /// At least one reason why the archive cannot be expanded.
     Stopped(String),
 }
 
-/// Whatever lies in an archive: it is expanded or the reason is said; what it is expanded to is
-/// well-formed, the image of it is valid and is the same tree, and expanding it again changes nothing.
+/// Expands any archive, or returns the reason why it cannot be expanded. The expanded text is
+/// well-formed, its image is valid and the same tree, and expanding it again changes nothing.
 ///
 /// # Panics
-/// When one of these does not hold.
+/// If one of these conditions is violated.
 pub fn archive(bytes: &[u8]) -> Outcome {
     let limits = Limits {
         max_archive: 1 << 22,
@@ -144,7 +144,7 @@ pub fn archive(bytes: &[u8]) -> Outcome {
     }
 }
 
-/// An archive of these files, expanded as [`archive`] does.
+/// Packs these files into an archive and expands it as [`archive`] does.
 ///
 /// # Panics
 /// As [`archive`].
@@ -194,7 +194,7 @@ fn sound(expansion: &Expansion<'_>, image: &[u8]) -> String {
     text
 }
 
-/// What a document says: names, attributes, characters, and how deep.
+/// Returns the contents of a document: names, attributes, characters, and their depth.
 fn tree(document: Document<'_>) -> Vec<String> {
     let depth = |node: Node<'_>| node.ancestors().count();
     let nodes = (0..document.len()).filter_map(|index| document.node(index));

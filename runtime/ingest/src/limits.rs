@@ -26,7 +26,7 @@ pub struct Limits {
     pub max_includes: u32,
     /// Maximum size of a document image, in bytes.
     pub max_image: u64,
-    /// Maximum number of faults recorded in one document. Reading stops at the last of them.
+    /// Maximum number of faults recorded in one document. Reading stops at the first one beyond it.
     pub max_faults: u32,
 }
 

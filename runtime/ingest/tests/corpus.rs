@@ -1,4 +1,4 @@
-//! Files of other people, when they are at hand: each builds, and faults are where they belong.
+//! Files of other projects, if they are available: each builds, and faults are at their places.
 
 #![expect(clippy::print_stdout, reason = "a skipped test says so")]
 
@@ -31,7 +31,7 @@ fn cases(below: &str) -> Vec<PathBuf> {
     files
 }
 
-/// Start tags counted by hand: `<` and a letter, outside of comments and CDATA sections.
+/// Counts start tags by hand: `<` and a letter, outside of comments and CDATA sections.
 fn count_tags(text: &str) -> usize {
     let (mut count, mut rest) = (0, text);
     while let Some(at) = rest.find('<') {

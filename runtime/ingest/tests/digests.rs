@@ -1,4 +1,4 @@
-//! A document is bound to the bytes on disk, however late their digest is taken.
+//! A document is bound to the bytes on disk, even if their digest is computed late.
 
 use std::fs;
 use std::io::Write;
@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 
-/// Larger than what is hashed at once when it is read.
+/// Size above the limit for hashing during the read.
 const LARGE: usize = 3 << 20;
 
 fn map(encoding: &str) -> String {
@@ -28,7 +28,7 @@ fn zipped(text: &str) -> Result<Vec<u8>, std::io::Error> {
     packed.finish()
 }
 
-/// Files of all sorts, by name.
+/// Returns files of all sorts by name.
 fn files() -> Result<Vec<(&'static str, Vec<u8>)>, std::io::Error> {
     let latin = |text: &str| text.chars().map(|c| c as u8).collect::<Vec<u8>>();
     let wide = |text: &str| text.encode_utf16().flat_map(u16::to_le_bytes).collect();
@@ -71,7 +71,7 @@ fn the_digest_is_of_the_bytes_on_disk_whatever_they_are() -> Outcome {
         let path = dir.path().join(name);
         fs::write(&path, &bytes)?;
         is_bound(&prepared(&path, &limits)?, &bytes)?;
-        // In any order.
+        // The order does not matter.
         let other = prepared(&path, &limits)?;
         let digest: [u8; 32] = Sha256::digest(&bytes).into();
         let content = other.files()[0].content.as_ref();

@@ -1,4 +1,4 @@
-//! The set of documents of a file, and what is said of those that cannot be had.
+//! The set of documents of a file, and the reports about missing ones.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -14,7 +14,7 @@ use qcbus_ingest::{
 };
 use qcbus_messages::{Absence, DocumentRole, MissingDocument};
 
-/// Files in memory; what is not there is not there.
+/// Files in memory. All other files are missing.
 #[derive(Default)]
 struct Shelf {
     files: HashMap<PathBuf, &'static str>,

@@ -1,4 +1,4 @@
-//! Input made to harm: it ends in an error or in faults, soon, and within bounds.
+//! Malicious input: it ends in an error or in faults, soon, and within bounds.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -11,7 +11,7 @@ use flate2::write::GzEncoder;
 use qcbus_document::{Document, FaultCode};
 use qcbus_ingest::{IngestError, Limits, prepare, prepare_bytes};
 
-/// The codes of the image's faults, after a full validation, and the image's length.
+/// Returns the codes of the image's faults after a full validation, and the image's length.
 fn codes_within(name: &str, bytes: Vec<u8>, limits: &Limits) -> (Vec<FaultCode>, usize) {
     let prepared = prepare_bytes(Path::new(name), bytes, limits);
     let image = prepared.build();

@@ -1,4 +1,5 @@
-//! `<include>` of OpenDRIVE: spliced at its place, and each way to fail is a fault with its place.
+//! `<include>` of OpenDRIVE: it is spliced at its place, and each failure is a fault with its
+//! place.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -186,7 +187,7 @@ fn nothing_outside_of_the_boundary_is_read() {
     }
 }
 
-/// A simulator that opens such a path gets nothing, though its words alone would lead to a file.
+/// A simulator that opens such a path gets no file, although its text alone leads to one.
 #[test]
 fn include_is_missing_where_the_system_cannot_follow_it() {
     let files = |written: &str| format!("<OpenDRIVE><include file='{written}'/></OpenDRIVE>");

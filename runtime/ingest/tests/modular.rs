@@ -1,4 +1,4 @@
-//! Modular scenarios: what they are expanded to, and that nothing in an archive can upset that.
+//! Modular scenarios: their expansion, and its robustness against arbitrary archives.
 
 #![expect(
     clippy::panic,
@@ -247,7 +247,7 @@ fn a_chain_that_is_too_deep_is_stopped() {
 
 #[test]
 fn what_would_grow_without_bound_is_stopped() {
-    // Each level takes the one below it four times: 4^11 groups.
+    // Each level uses the one below it four times: 4^11 groups.
     let four: String = (0..4).map(|_| referring("NEXT", "")).collect();
     let mut files = vec![(
         "main.xosc".to_owned(),
@@ -409,7 +409,7 @@ fn scenario() -> impl Strategy<Value = String> {
     prop::collection::vec(one, 0..4).prop_map(|groups| main_with(&groups.concat()))
 }
 
-/// A scenario that has at least one plain group `G` and one `H`.
+/// Generates a scenario that has at least one plain group `G` and one `H`.
 fn library() -> impl Strategy<Value = String> {
     let content = || prop::collection::vec(element(), 1..4);
     (scenario(), content(), content()).prop_map(|(scenario, one, other)| {

@@ -1,4 +1,4 @@
-//! What other files a scenario refers to.
+//! References of a scenario to other files.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -52,7 +52,8 @@ fn maps_are_relative_to_the_scenario() {
     }
 }
 
-/// A directory with `s/x.xosc` to refer from, `maps/deep/`, a link to it, and `maps/a.xodr`.
+/// Creates a directory with `s/x.xosc` to refer from, `maps/deep/`, a link to it, and
+/// `maps/a.xodr`.
 fn directories() -> (tempfile::TempDir, PathBuf) {
     let directory = tempfile::tempdir().unwrap();
     let root = directory.path().canonicalize().unwrap();
@@ -76,7 +77,7 @@ fn path_leads_where_the_system_follows_it() {
         ("link/../a.xodr", "s/link/../a.xodr"),
         #[cfg(unix)]
         ("link/a.xodr", "s/link/a.xodr"),
-        // Nothing can be opened through what is not there, or is a file.
+        // No file can be opened through a missing directory or through a file.
         ("../gone/../maps/a.xodr", "gone/../maps/a.xodr"),
         ("../gone/../../maps/a.xodr", "gone/../../maps/a.xodr"),
         ("../maps/a.xodr/../a.xodr", "maps/a.xodr/../a.xodr"),
@@ -89,7 +90,7 @@ fn path_leads_where_the_system_follows_it() {
     }
 }
 
-/// It was there when the scenario was read, and may be there again when the map is opened.
+/// The directory existed when the scenario was read. It may exist again when the map is opened.
 #[test]
 fn directory_of_the_scenario_is_one_though_it_is_moved_away() {
     let (_directory, root) = directories();

@@ -1,4 +1,4 @@
-//! What XML 1.0 forbids is a fault with its place; what it allows is none.
+//! A construct that XML 1.0 forbids is a fault with its place. An allowed construct is none.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -18,7 +18,7 @@ fn image(text: &str) -> Vec<u8> {
     image
 }
 
-/// Code, row and column of each fault.
+/// Returns the code, row and column of each fault.
 fn faults(text: &str) -> Vec<(FaultCode, u32, u32)> {
     let image = image(text);
     let document = Document::open(&image).unwrap();

@@ -1,4 +1,5 @@
-//! Two builds of the programme beside each other, in turn and on one machine: what a change costs.
+//! Comparison of two builds of the program, alternating on one machine: it shows the cost of a
+//! change.
 //!
 //! `cargo build --release -p qcbus && QCBUS_BESIDE=…/qcbus cargo bench -p qcbus-benches --bench beside`;
 //! `QCBUS_ROUNDS=1000` for more than 400 small files.
@@ -13,14 +14,14 @@ use qcbus_benches::farm::{Farm, program};
 use qcbus_benches::figures::{digits, head, millis, quantile, row, size};
 use qcbus_benches::maps::map;
 
-/// Small files one after the other, unless told otherwise.
+/// Default number of small files, one after the other.
 const ROUNDS: u64 = 400;
-/// How often many files are judged at once.
+/// Number of bursts of many files.
 const BURSTS: u64 = 9;
-/// How often a process is started.
+/// Number of starts of a process.
 const CHECKS: u64 = 40;
 
-/// The other one, and this one.
+/// Values of the other build and of this one.
 type Pair<T> = [T; 2];
 
 fn main() -> Result<()> {
@@ -50,7 +51,7 @@ fn main() -> Result<()> {
     whole_processes(&programs, &mut out)
 }
 
-/// A line of the table: medians, and how they compare.
+/// Writes a line of the table: medians and their ratios.
 fn compare(what: &str, mut times: Pair<Vec<f64>>, out: &mut impl Write) -> Result<()> {
     let pairs = times[0].iter().zip(&times[1]);
     let mut ratios: Vec<f64> = pairs.map(|(other, this)| this / other).collect();
@@ -61,7 +62,7 @@ fn compare(what: &str, mut times: Pair<Vec<f64>>, out: &mut impl Write) -> Resul
     Ok(())
 }
 
-/// Whose turn is first changes, so that neither always follows the other.
+/// Returns the order of the two builds. It alternates, so that neither always comes first.
 fn in_turn(round: u64) -> Pair<usize> {
     if round.is_multiple_of(2) {
         [0, 1]

@@ -1,4 +1,4 @@
-//! The bus by itself: jobs per second and the time from queued to done, with peers that only answer.
+//! The bus alone: jobs per second and the time from queued to done, with peers that only answer.
 //!
 //! `cargo bench -p qcbus-benches --bench bus`
 
@@ -62,7 +62,7 @@ struct Measured {
     p99: f64,
 }
 
-/// Every job is a document of its own, sent to every peer, and done when all have answered.
+/// Measures jobs. Each has its own document for every peer, and is done when all have answered.
 async fn jobs(bundles: usize, bytes: usize, in_flight: usize) -> Result<Measured> {
     let mut broker = Broker::with(bundles).await?;
     let documents = broker.host.documents();

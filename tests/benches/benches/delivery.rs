@@ -1,5 +1,5 @@
-//! What it takes to hand a document to several processes: over the bus, over Unix sockets, and
-//! over Unix sockets with bincode's decoding behind them.
+//! Costs of delivering a document to several processes: over the bus, over Unix sockets, and over
+//! Unix sockets with subsequent decoding by bincode.
 //!
 //! `cargo bench -p qcbus-benches --bench delivery`
 
@@ -60,15 +60,15 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// How often a document of this size is sent.
+/// Returns how often a document of this size is sent.
 fn rounds(bytes: usize) -> u64 {
     if bytes > 10_000_000 { 20 } else { 200 }
 }
 
-/// Publishing, and from there to the answer of the last reader, who looks at both ends; medians in
-/// microseconds. Filling is no part of it, and would leave every cache cold behind it: so only the
-/// ends are written. Lending 100 MB takes milliseconds in which everyone falls asleep; so that
-/// every size starts from the same state, `rest` waits before each send.
+/// Measures publishing, and the time until the last reader, who reads both ends, has answered.
+/// Returns medians in microseconds. Filling is not measured and would leave every cache cold, so
+/// only the ends are written. Lending 100 MB takes milliseconds, in which all processes fall
+/// asleep. With `rest` it waits before each send, so that every size starts from the same state.
 async fn over_the_bus(consumers: usize, bytes: usize, rest: bool) -> Result<(f64, f64)> {
     let mut broker = Broker::with(consumers).await?;
     let documents = broker.host.documents();
@@ -94,7 +94,7 @@ async fn over_the_bus(consumers: usize, bytes: usize, rest: bool) -> Result<(f64
     Ok((quantile(&mut published, 0.5), quantile(&mut delivered, 0.5)))
 }
 
-/// From the first byte written to the answer of the last reader; median in microseconds.
+/// Measures from the first byte written to the answer of the last reader; median in microseconds.
 fn over_sockets(consumers: usize, bytes: &[u8], decode: bool) -> Result<f64> {
     let dir = tempfile::TempDir::new()?;
     let place = dir.path().join("s");
@@ -116,7 +116,7 @@ fn over_sockets(consumers: usize, bytes: &[u8], decode: bool) -> Result<f64> {
         rounds(bytes.len()) / 2
     };
     for _ in 0..rounds {
-        // As for the bus.
+        // The pause is the same as for the bus.
         std::thread::sleep(Duration::from_millis(15));
         let start = Instant::now();
         for (_, stream) in &mut readers {
@@ -135,7 +135,7 @@ fn over_sockets(consumers: usize, bytes: &[u8], decode: bool) -> Result<f64> {
     Ok(quantile(&mut times, 0.5))
 }
 
-/// A reader of sockets: takes everything into its own memory, decodes it if asked to, answers.
+/// Runs a socket reader: it copies everything into its memory, may decode it, and answers.
 fn receive(socket: &Path, decode: bool) -> Result<()> {
     let mut stream = UnixStream::connect(socket)?;
     let mut bytes = Vec::new();
@@ -157,7 +157,7 @@ fn receive(socket: &Path, decode: bool) -> Result<()> {
     }
 }
 
-/// A document as somebody would send it who does not read in place.
+/// A document in the form for readers that do not read in place.
 #[derive(Serialize, Deserialize)]
 struct Tree {
     names: Vec<String>,

@@ -1,5 +1,5 @@
-//! The whole thing with the real programme: file closed → verdict with a warm broker, where that
-//! time goes, and `check` of one file as a process.
+//! The whole system with the real program: the time from file closed to verdict with a warm broker,
+//! its parts, and `check` of one file as a process.
 //!
 //! `cargo build --release -p qcbus && cargo bench -p qcbus-benches --bench farm`
 
@@ -27,7 +27,7 @@ fn main() -> Result<()> {
     whole_processes(&program, &mut out)
 }
 
-/// Files as people have them, when they are at hand, named from the workspace's root.
+/// Real files, if they are available. Their paths start at the workspace's root.
 const REAL: [(&str, &str); 5] = [
     (
         "straight_500m.xodr",
@@ -51,7 +51,7 @@ const REAL: [(&str, &str); 5] = [
     ),
 ];
 
-/// Name, bytes as a function of the round, rounds.
+/// A kind of file: name, bytes as a function of the round, number of rounds.
 struct Case {
     name: String,
     ending: &'static str,
@@ -92,7 +92,7 @@ fn cases() -> Vec<Case> {
                 } else {
                     "xodr"
                 },
-                // A comment at the end makes every copy another file.
+                // A comment at the end makes every copy a different file.
                 make: Box::new(move |number| {
                     let mut bytes = bytes.clone();
                     bytes.extend(format!("<!-- {number} -->\n").bytes());
@@ -101,7 +101,7 @@ fn cases() -> Vec<Case> {
                 rounds: 100,
             }),
             Err(error) => {
-                // Not everybody has them.
+                // The file may be missing on this machine.
                 let _ = writeln!(std::io::stderr(), "skipped {name}: {error}");
             }
         }
@@ -132,7 +132,7 @@ fn warm(program: &Path, out: &mut impl Write) -> Result<()> {
     Ok(())
 }
 
-/// As the broker logs them, in order, and what ends with each.
+/// Stages in the order in which the broker logs them, with the work that ends at each.
 const STAGES: [(&str, &str); 10] = [
     ("settled", "seen and settled"),
     ("taken", "waiting for a reader"),
@@ -216,8 +216,8 @@ fn of_day(time: SystemTime) -> f64 {
     (since.as_secs() % 86_400) as f64 + f64::from(since.subsec_nanos()) / 1e9
 }
 
-/// A process with all its children: bundles that outlive it for a moment are waited for as well,
-/// because this bench is their next of kin.
+/// Measures a process with all its children. It also waits for bundles that outlive the process for
+/// a moment, because this bench is their subreaper.
 fn whole_processes(program: &Path, out: &mut impl Write) -> Result<()> {
     rustix::process::set_child_subreaper(Some(rustix::process::getpid()))?;
     let columns = ["file", "runs", "wall p50 ms", "wall best ms", "CPU mean ms"];
@@ -256,8 +256,8 @@ fn whole_processes(program: &Path, out: &mut impl Write) -> Result<()> {
     Ok(())
 }
 
-/// User and system time of all children that have ended and been waited for, in hundredths of a
-/// second: exact enough over many runs.
+/// Returns the user and system time of all ended and reaped children. The unit is a hundredth of a
+/// second, which is exact enough over many runs.
 fn cpu_of_children() -> Result<Duration> {
     let stat = std::fs::read_to_string("/proc/self/stat")?;
     let (_, rest) = stat.rsplit_once(')').ok_or("no process status")?;

@@ -1,4 +1,4 @@
-//! Building an image against what a parser alone takes, and what a reader of an image pays.
+//! The cost of building an image compared with a parser alone, and the cost of reading an image.
 //!
 //! `cargo bench -p qcbus-benches --bench image`
 
@@ -34,7 +34,7 @@ fn measure(bytes: usize, runs: usize) -> Result<Figures> {
     let prepared = prepare_bytes(Path::new("map.xodr"), text.clone().into_bytes(), &limits);
     let mut image = vec![1; prepared.upper_bound()];
     let used = prepared.build_into(&mut image)?;
-    // In turn, so that what disturbs the machine disturbs everyone.
+    // The measurements alternate, so that disturbances of the machine affect all of them.
     let [mut own, mut build, mut dom, mut prepare] = [Duration::MAX; 4];
     for _ in 0..runs {
         own = own.min(best_of(1, || quick_xml_loop(&text)));

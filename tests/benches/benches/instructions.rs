@@ -1,10 +1,10 @@
-//! Instructions of the hot paths: figures that are the same on a busy machine.
+//! Instructions of the hot paths: these figures are the same on a busy machine.
 //!
-//! `cargo bench -p qcbus-benches --bench instructions` runs every path under callgrind with n and with
-//! 2n repetitions: the difference is what n take, without the start, the input and what is made once.
-//! It prints them beside those of `docs/evidence/instructions.tsv`, and a rise in words.
-//! `QCBUS_BLESS=1` writes that file anew. It fails only where a path cannot be run, never because of a
-//! figure; without valgrind it says so and ends.
+//! `cargo bench -p qcbus-benches --bench instructions` runs every path under callgrind with n and
+//! with 2n repetitions. The difference is the cost of n repetitions, without the start, the input
+//! and one-time work. It prints the figures beside those of `docs/evidence/instructions.tsv`, and
+//! reports a rise in words. `QCBUS_BLESS=1` writes that file anew. It fails only if a path cannot
+//! be run, never because of a figure. Without valgrind it reports this and ends.
 
 use std::collections::BTreeMap;
 use std::hint::black_box;
@@ -25,10 +25,10 @@ use qcbus_messages::{BUILD_DATE, FromPeer, JobId, codec};
 use qcbus_schema::{SHIPPED, Version};
 use qcbus_sdk::{Bundle, Issue, Listener, Loaded, Outcome, Plan, check};
 
-/// A path through our code that every file takes, or every finding.
+/// A path through the project's code that every file or every finding takes.
 struct HotPath {
     name: &'static str,
-    /// Runs it so many times on input that is always the same.
+    /// Runs the path this many times on the same input.
     repeat: fn(u32) -> Result<()>,
 }
 
@@ -75,16 +75,18 @@ const PATHS: [HotPath; 10] = [
     },
 ];
 
-/// Bytes of the map and of the scenario.
+/// Size in bytes of the map and of the scenario.
 const BYTES: usize = 300_000;
 /// Repetitions of the shorter run.
 const TIMES: u32 = 2;
-/// From this many percent on a rise is said in words.
+/// Percentage from which a rise is reported in words.
 const WORTH_A_WORD: f64 = 3.0;
-/// Not counted: valgrind's processor has no instructions for SHA-256, real ones do. What takes its place
-/// is most of what reading a file costs there, and would hide the rest.
+/// Function that is not counted: valgrind's processor has no instructions for SHA-256, real ones
+/// do. Its replacement takes most of the instructions of reading a file there, and would hide the
+/// rest.
 const HASH: &str = "sha2::sha256::compress256";
-/// How this program is told to run one path: its place in [`PATHS`] and how many times.
+/// Variable that tells this program to run one path: its index in [`PATHS`] and the number of
+/// repetitions.
 const RUN_ONE: &str = "QCBUS_INSTRUCTIONS_OF";
 
 fn main() -> Result<()> {
@@ -128,7 +130,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Instructions of one repetition. Both runs go side by side: they do not disturb what is counted.
+/// Counts the instructions of one repetition. The parallel runs do not disturb the count.
 fn count(place: usize) -> Result<u64> {
     let dir = tempfile::TempDir::new()?;
     let files = ["once", "twice"].map(|name| dir.path().join(name));
@@ -137,7 +139,7 @@ fn count(place: usize) -> Result<u64> {
         under_callgrind(place, 2 * TIMES, &files[1])?,
     ];
     let mut totals = [0; 2];
-    // Both are waited for before anything is said of one.
+    // Both runs are waited for before a failure of one is reported.
     let outputs = children.map(Child::wait_with_output);
     for ((output, file), total) in outputs.into_iter().zip(&files).zip(&mut totals) {
         let output = output?;
@@ -153,7 +155,7 @@ fn count(place: usize) -> Result<u64> {
 fn under_callgrind(place: usize, times: u32, file: &Path) -> Result<Child> {
     let child = Command::new("valgrind")
         .args(["--tool=callgrind", "--quiet"])
-        // Counting goes on at once, stops where that function begins, and goes on where it ends.
+        // Counting starts at once, stops at the begin of that function, and continues at its end.
         .arg(format!("--toggle-collect={HASH}"))
         .arg("--collect-atstart=yes")
         .arg(format!("--callgrind-out-file={}", file.display()))
@@ -166,14 +168,14 @@ fn under_callgrind(place: usize, times: u32, file: &Path) -> Result<Child> {
     Ok(child)
 }
 
-/// What callgrind counted, as its file says.
+/// Returns the total in a file of callgrind.
 fn total_of(text: &str) -> Option<u64> {
     let mut lines = text.lines().rev();
     let total = lines.find_map(|line| line.strip_prefix("totals:"))?;
     total.trim().parse().ok()
 }
 
-/// What figures depend on besides our code.
+/// Returns a text about everything besides the code that affects the figures.
 fn made_with(valgrind: &str) -> String {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let mut ask = Command::new(rustc);
@@ -185,14 +187,14 @@ fn made_with(valgrind: &str) -> String {
     format!("{version}, {target}, {valgrind}")
 }
 
-/// What a command prints, when it can be run.
+/// Returns the output of a command, if it can be run.
 fn said_by(command: &mut Command) -> Option<String> {
     let output = command.output().ok()?;
     let text = String::from_utf8(output.stdout).ok()?;
     output.status.success().then(|| text.trim().to_owned())
 }
 
-/// The figures in the repository.
+/// Figures in the repository.
 #[derive(Default)]
 struct Last {
     made_with: String,
@@ -200,7 +202,7 @@ struct Last {
 }
 
 impl Last {
-    /// None are no fault: then these are the first.
+    /// Reads the figures. A missing file is no error: then these figures are the first.
     fn read(file: &PathBuf) -> Result<Last> {
         let mut last = Last::default();
         let Ok(text) = std::fs::read_to_string(file) else {
@@ -233,7 +235,7 @@ impl Last {
         ]
     }
 
-    /// What a reader should not overlook.
+    /// Returns the lines that a reader should not overlook.
     fn in_words(&self, now: &[(&str, u64)], made_with: &str) -> Vec<String> {
         let mut lines = Vec::new();
         if !self.made_with.is_empty() && self.made_with != made_with {
@@ -266,7 +268,7 @@ fn bless(file: &Path, made_with: &str, now: &[(&str, u64)]) -> Result<()> {
     Ok(std::fs::write(file, text)?)
 }
 
-/// With a comma for every thousand.
+/// Returns the number with a comma for every thousand.
 fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::new();
@@ -299,7 +301,7 @@ fn image(times: u32) -> Result<()> {
     Ok(())
 }
 
-/// The image of the map.
+/// Returns the image of the map.
 fn map_image() -> Vec<u8> {
     let text = map(BYTES, 1).into_bytes();
     prepare_bytes(Path::new("map.xodr"), text, &Limits::default()).build()
@@ -331,7 +333,7 @@ fn scenario_rules(times: u32) -> Result<()> {
     rules(&qcbus_xosc::BUNDLE, "scenario.xosc", scenario(BYTES), times)
 }
 
-/// All rules that are on by default, from the image, in this thread.
+/// Runs all rules that are on by default, from the image, in this thread.
 fn rules(bundle: &'static Bundle, name: &str, text: String, times: u32) -> Result<()> {
     let loaded = Loaded::from_bytes(Path::new(name), text.into_bytes())?;
     let plan = Plan::by_default(bundle);
@@ -346,7 +348,7 @@ fn rules(bundle: &'static Bundle, name: &str, text: String, times: u32) -> Resul
     Ok(())
 }
 
-/// Hears whether everything was looked at: else the figure would be that of something else.
+/// Checks that every checker has completed. Otherwise the figure would measure something else.
 #[derive(Default)]
 struct Looked {
     ended: usize,
@@ -363,7 +365,7 @@ impl Listener for Looked {
     }
 }
 
-/// What a bundle sends at once.
+/// Returns the findings that a bundle sends at once.
 fn batch() -> FromPeer {
     FromPeer::Issues {
         job: JobId(1),
@@ -388,7 +390,7 @@ fn decode(times: u32) -> Result<()> {
     Ok(())
 }
 
-/// Pools an answer as a broker does, places looked up in the image.
+/// Pools an answer as a broker does, with places looked up in the image.
 fn pooled(document: Document<'_>, bundle: BundleOutcome) -> Result<xqar::Results> {
     let mut lost = 0;
     let input = PoolInput {
@@ -423,7 +425,7 @@ fn pooled(document: Document<'_>, bundle: BundleOutcome) -> Result<xqar::Results
 fn pooling(times: u32) -> Result<()> {
     let image = map_image();
     let document = Document::open(&image)?;
-    // Made once for every repetition, and before: copying is not what is counted.
+    // All answers are created in advance, for every repetition, because copying must not count.
     let answers = vec![answer(); 2 * TIMES as usize];
     for answer in answers.into_iter().take(times as usize) {
         black_box(pooled(document, answer)?);

@@ -1,4 +1,4 @@
-//! Many scenarios on one map: what one of them costs, and how much of that is the map's.
+//! Many scenarios on one map: the cost of one scenario, and the map's part of it.
 //!
 //! `cargo build --release -p qcbus && cargo bench -p qcbus-benches --bench linked`
 
@@ -15,11 +15,12 @@ use qcbus_benches::scenarios::scenario;
 use qcbus_document::Image;
 use qcbus_opendrive::OwnedMap;
 
-/// Scenarios on each map.
+/// Number of scenarios on each map.
 const SCENARIOS: usize = 100;
-/// Sizes of the map in bytes; what a scenario costs more on the larger one is the map's.
+/// Sizes of the map in bytes. The additional cost of a scenario on the larger one comes from the
+/// map.
 const MAPS: [usize; 2] = [10_000, 20_000_000];
-/// Nobody can tell whether a map that was written a moment ago has changed since it was read.
+/// Age of a settled map. A change of a younger map since its reading cannot be detected.
 const SETTLED: Duration = Duration::from_millis(2_200);
 
 fn main() -> Result<()> {
@@ -61,7 +62,7 @@ fn name(bytes: usize, settled: bool) -> String {
     format!("{}{when}", size(bytes))
 }
 
-/// What a bundle saves on every job but the first when it keeps the model of a map.
+/// Measures the time that a cached model of a map saves a bundle on every job but the first.
 fn model(bytes: usize) -> Result<[f64; 3]> {
     let limits = qcbus_ingest::Limits::default();
     let text = map(bytes, 0).into_bytes();
@@ -73,7 +74,7 @@ fn model(bytes: usize) -> Result<[f64; 3]> {
     Ok([build, time(lanes), time(lanes)].map(millis))
 }
 
-/// A map beside a directory of scenarios.
+/// Writes a map beside a directory of scenarios.
 fn write_map(beside: &Path, bytes: usize, settled: bool) -> Result<()> {
     let maps = beside.with_file_name("maps");
     std::fs::create_dir_all(&maps)?;
@@ -84,7 +85,7 @@ fn write_map(beside: &Path, bytes: usize, settled: bool) -> Result<()> {
     Ok(())
 }
 
-/// A small scenario on the map; a comment makes it another file than the others.
+/// Returns a small scenario on the map. A comment makes it different from the others.
 fn on_map(number: usize) -> Vec<u8> {
     let text = scenario(0).replace("town.xodr", "../maps/town.xodr");
     format!("{text}<!-- {number} -->\n").into_bytes()
@@ -107,7 +108,7 @@ fn one_by_one(program: &Path, bytes: usize) -> Result<[f64; 3]> {
     Ok([&mut times, &mut reading, &mut checking].map(|times| quantile(times, 0.5)))
 }
 
-/// All scenarios at once, twice; milliseconds for each.
+/// Measures all scenarios at once, twice. Returns milliseconds for each.
 fn at_once(program: &Path, bytes: usize, settled: bool) -> Result<[f64; 2]> {
     let farm = Farm::start(program, false)?;
     write_map(&farm.watched, bytes, settled)?;
@@ -130,8 +131,8 @@ fn write_scenarios(directory: &Path, prefix: &str) -> Result<Vec<PathBuf>> {
     (0..SCENARIOS).map(write).collect()
 }
 
-/// `check` of all scenarios, five times; milliseconds for each, the start of the processes among
-/// them.
+/// Measures `check` of all scenarios, five times. Returns milliseconds for each, including the
+/// start of the processes.
 fn whole_process(program: &Path, bytes: usize, settled: bool) -> Result<[f64; 2]> {
     let mut times = Vec::new();
     for _ in 0..5 {

@@ -1,14 +1,14 @@
-//! Validation against the shipped schemas: MB/s from the image, whether the time grows with the
-//! size alone, and, with the feature `xsd-schema`, how many times slower that crate is.
+//! Validation against the shipped schemas: MB/s from the image, and whether the time grows only
+//! with the size. With the feature `xsd-schema` it also shows how many times slower that crate is.
 //!
 //! `cargo bench -p qcbus-benches --bench schema`
 //!
-//! `QCBUS_XSDS=DIR cargo bench -p qcbus-benches --bench schema --features xsd-schema`, where DIR is
-//! what `tests/schema/tables_agree.py --keep DIR` makes: the other crate needs the XSDs, which the
-//! project does not hold.
+//! `QCBUS_XSDS=DIR cargo bench -p qcbus-benches --bench schema --features xsd-schema`, where
+//! `tests/schema/tables_agree.py --keep DIR` creates DIR: the other crate needs the XSDs, which the
+//! project does not contain.
 //!
-//! Times are those on the CPU, so that other work on the machine counts little; source bytes count,
-//! not those of the image.
+//! Times are CPU times, so that other work on the machine counts little. Sizes are those of the
+//! source, not of the image.
 
 use std::io::Write;
 use std::path::Path;
@@ -98,7 +98,7 @@ impl Case {
             (Document::open(&small_image)?, Document::open(&large_image)?);
         let mut other = other::Validator::new(self.table)?;
         let [mut half, mut whole, mut theirs] = [f64::INFINITY; 3];
-        // In turn, so that what disturbs the machine disturbs everyone.
+        // The measurements alternate, so that disturbances of the machine affect all of them.
         for turn in 0..RUNS {
             half = half.min(validate(schema, &small_document)?);
             whole = whole.min(validate(schema, &large_document)?);
@@ -133,7 +133,7 @@ fn image(kind: FileKind, text: &str) -> Vec<u8> {
     qcbus_ingest::prepare_bytes(Path::new(name), text.as_bytes().to_vec(), &limits).build()
 }
 
-/// Seconds on the CPU.
+/// Validates a document and returns the seconds on the CPU.
 fn validate(schema: &Schema, document: &Document<'_>) -> Result<f64> {
     let start = on_cpu()?;
     let report = schema.validate(document, Limits::default());
@@ -144,7 +144,7 @@ fn validate(schema: &Schema, document: &Document<'_>) -> Result<f64> {
     }
 }
 
-/// Seconds that this process spent on a CPU.
+/// Returns the seconds that this process has spent on a CPU.
 fn on_cpu() -> Result<f64> {
     let stat = std::fs::read_to_string("/proc/self/schedstat")?;
     let nanoseconds: f64 = stat.split(' ').next().unwrap_or_default().parse()?;
@@ -153,7 +153,7 @@ fn on_cpu() -> Result<f64> {
 
 #[cfg(feature = "xsd-schema")]
 mod other {
-    //! The crate xsd-schema over its own parse.
+    //! Validation with the crate xsd-schema, including its own parsing.
 
     use std::path::PathBuf;
 
@@ -163,7 +163,8 @@ mod other {
         CollectingValidationSink, SchemaValidator, ValidationFlags, drive_quick_xml,
     };
 
-    /// The file that includes the others, by table; the crate's default build knows XSD 1.0 only.
+    /// Main file of each table, which includes the others. The crate's default build knows XSD 1.0
+    /// only.
     const MAIN: [(&str, &str); 3] = [
         ("xodr-1.4", "OpenDRIVE_1.4H.xsd"),
         ("xodr-1.7", "opendrive_17_core.xsd"),
@@ -181,7 +182,8 @@ mod other {
             })))
         }
 
-        /// Seconds on the CPU; infinite where it knows no schema. Compiling the schema does not count.
+        /// Validates a text and returns the seconds on the CPU, or infinity if the table has no
+        /// schema here. Compiling the schema does not count.
         pub(super) fn validate(&mut self, text: &[u8]) -> Result<f64> {
             let Some(main) = &self.0 else {
                 return Ok(f64::INFINITY);
@@ -216,7 +218,7 @@ mod other {
 
 #[cfg(not(feature = "xsd-schema"))]
 mod other {
-    //! Nothing to compare with.
+    //! Replacement if there is no other validator to compare with.
 
     use qcbus_benches::Result;
 

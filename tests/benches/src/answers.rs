@@ -1,18 +1,18 @@
-//! What a bundle says of a map of [`crate::maps`], made up: always the same, whatever rules there are.
+//! Made-up answer of a bundle on a map of [`crate::maps`]: always the same, with any rules.
 
 use qcbus_formats::pool::{BundleOutcome, CheckerOutcome, Ending};
 use qcbus_formats::xqar::{Issue, Level, Location, Locations};
 
-/// Checkers of the bundle, about as many as a standard one has.
+/// Number of checkers of the bundle, about as many as in a standard bundle.
 const CHECKERS: u32 = 200;
-/// One in so many checkers finds something.
+/// One of this many checkers finds something.
 const FINDS: u32 = 10;
-/// Findings of each checker that has any.
+/// Number of findings of each checker that has any.
 const FINDINGS: u32 = 50;
-/// Findings point at the first roads of the map.
+/// Number of roads, the first of the map, that findings point at.
 const ROADS: u32 = 80;
 
-/// The answer of a bundle: 200 checkers, 1,000 findings.
+/// Returns the answer of a bundle: 200 checkers, 1,000 findings.
 pub fn answer() -> BundleOutcome {
     BundleOutcome {
         name: "generatedBundle".to_owned(),
@@ -42,7 +42,7 @@ fn checker(number: u32) -> CheckerOutcome {
     }
 }
 
-/// Findings of one checker, as many as travel in one message.
+/// Returns findings of one checker, as many as travel in one message.
 pub fn findings(count: u32) -> Vec<Issue> {
     let uid = "example.com:xodr:1.7.0:road.generated.rule_0";
     (0..count).map(|it| issue(0, it, uid)).collect()

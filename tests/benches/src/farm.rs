@@ -1,4 +1,4 @@
-//! The real programme: a broker that watches a directory, and clients that wait for verdicts.
+//! The real program: a broker that watches a directory, and clients that wait for verdicts.
 
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
@@ -12,13 +12,13 @@ use qcbus_messages::control::{Request, Response};
 use crate::Result;
 use crate::maps::map;
 
-/// Small maps that are judged before anything is measured.
+/// Number of small maps that are judged before the measurement.
 const WARM_UP: u64 = 10;
 
-/// The `qcbus` that was built beside the bench.
+/// Returns the `qcbus` that was built beside the bench.
 ///
 /// # Errors
-/// When there is none.
+/// If it does not exist.
 pub fn program() -> Result<PathBuf> {
     let own = std::env::current_exe()?;
     let found = own.ancestors().map(|dir| dir.join("qcbus"));
@@ -28,10 +28,10 @@ pub fn program() -> Result<PathBuf> {
         .ok_or("build it first: cargo build --release -p qcbus")?)
 }
 
-/// A broker that watches a directory, warmed up.
+/// A warm broker that watches a directory.
 pub struct Farm {
     broker: Child,
-    /// The directory that it watches.
+    /// Watched directory.
     pub watched: PathBuf,
     socket: PathBuf,
     control: BufReader<UnixStream>,
@@ -41,23 +41,24 @@ pub struct Farm {
 
 /// A file that was written and judged.
 pub struct Delivered {
-    /// Where it lies.
+    /// Path of the file.
     pub path: PathBuf,
-    /// When it had been written.
+    /// Time at which the file was closed.
     pub closed: Instant,
-    /// The same by the clock on the wall.
+    /// The same time by the wall clock.
     pub closed_at: SystemTime,
-    /// When its verdict was there.
+    /// Time at which the verdict arrived.
     pub answered: Instant,
-    /// That verdict.
+    /// The verdict.
     pub verdict: String,
 }
 
 impl Farm {
-    /// Starts a broker and has it judge a few small maps. `log` has it say where its time goes.
+    /// Starts a broker and lets it judge a few small maps. With `log` it logs the times of its
+    /// stages.
     ///
     /// # Errors
-    /// When it cannot be started or does not answer.
+    /// If it cannot be started or does not answer.
     pub fn start(program: &Path, log: bool) -> Result<Farm> {
         let dir = tempfile::TempDir::new()?;
         let (watched, instance) = (dir.path().join("in"), dir.path().join("i"));
@@ -96,16 +97,16 @@ impl Farm {
         Ok(farm)
     }
 
-    /// What the broker has logged so far.
+    /// Returns the lines that the broker has logged so far.
     pub fn said(&self) -> std::sync::MutexGuard<'_, Vec<String>> {
         self.said.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// When the broker logged a stage of a file, in seconds of the day. The log may be a little
-    /// behind the verdict.
+    /// Returns the time at which the broker logged a stage of a file, in seconds of the day. The
+    /// log may be a little behind the verdict.
     ///
     /// # Errors
-    /// When it did not.
+    /// If the stage is not logged.
     pub fn when(&self, stage: &str, path: &Path) -> Result<f64> {
         let (stage, path) = (format!("stage=\"{stage}\""), path.display().to_string());
         for _ in 0..1000 {
@@ -125,11 +126,11 @@ impl Farm {
         Err(format!("no {stage} of {path} in the log").into())
     }
 
-    /// Writes one file and waits for its verdict. A moment of rest before it: a farm is idle when
-    /// a file comes.
+    /// Writes one file and waits for its verdict. It pauses before that, because a farm is idle
+    /// when a file arrives.
     ///
     /// # Errors
-    /// When it cannot be written or gets no verdict.
+    /// If the file cannot be written or gets no verdict.
     pub fn deliver(&mut self, name: &str, bytes: &[u8]) -> Result<Delivered> {
         let path = self.watched.join(name);
         std::thread::sleep(Duration::from_millis(30));
@@ -150,15 +151,15 @@ impl Farm {
     /// Waits for the verdict of a file.
     ///
     /// # Errors
-    /// When there is none within a minute.
+    /// If there is none within a minute.
     pub fn wait(&mut self, file: &Path) -> Result<String> {
         verdict(&ask(&mut self.control, &waiting_for(file))?)
     }
 
-    /// Waits for the verdicts of many files at once, each for a client of its own.
+    /// Waits for the verdicts of many files at once, each with its own client.
     ///
     /// # Errors
-    /// When there is one without within a minute.
+    /// If a file has no verdict within a minute.
     pub fn wait_for_all(&self, files: &[PathBuf]) -> Result<()> {
         let mut clients = Vec::with_capacity(files.len());
         for file in files {
@@ -174,7 +175,7 @@ impl Farm {
     /// Stops the broker.
     ///
     /// # Errors
-    /// When it does not listen any more.
+    /// If it does not listen any more.
     pub fn stop(mut self) -> Result<()> {
         ask(&mut self.control, &Request::Down)?;
         self.broker.wait()?;

@@ -1,6 +1,6 @@
-//! What the figures were measured on.
+//! Description of the machine on which the figures were measured.
 
-/// Processor, cores, memory, kernel and what else was going on, in one line.
+/// Returns the processor, cores, memory, kernel and other load in one line.
 pub fn describe() -> String {
     let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
     let field = |text: &str, name: &str| {

@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-/// An OpenDRIVE map of about `bytes` bytes, at least one road. `number` makes it unlike others.
+/// Creates an OpenDRIVE map of about `bytes` bytes, with at least one road. `number` makes it
+/// different from others.
 pub fn map(bytes: usize, number: u64) -> String {
     let mut text = String::with_capacity(bytes + 8192);
     let _ = writeln!(
@@ -23,13 +24,13 @@ pub fn map(bytes: usize, number: u64) -> String {
     text
 }
 
-/// Parts of the reference line, of this length in metres each.
+/// Number of parts of the reference line, and the length of each in metres.
 const PARTS: u32 = 8;
 const PART: f64 = 12.345_678_9;
-/// By how much each part turns left of the one before it, in radians: one bend, no straight line
-/// that could be written as one.
+/// Angle in radians by which each part turns left of the previous one. The parts form a bend,
+/// because a straight line could be written as one part.
 const BEND: f64 = 0.01;
-/// Roads lie in rows of a grid around the origin, in metres.
+/// Number of roads in a row of the grid around the origin, and the size of a cell in metres.
 const COLUMNS: u32 = 100;
 const CELL: [f64; 2] = [131.415_926_535, 53.141_592_653];
 

@@ -1,5 +1,5 @@
-//! A broker's end of the bus with peers that only answer. Peers are processes of their own: the
-//! bench's own program, started again.
+//! A broker's end of the bus with peers that only answer. The peers are separate processes of the
+//! bench's own program.
 
 use std::path::Path;
 use std::process::{Child, Command};
@@ -15,19 +15,20 @@ use crate::Result;
 
 const PLACE: &str = "QCBUS_BENCH_PLACE";
 
-/// A runtime as broker and bundles use it.
+/// Creates a runtime like that of brokers and bundles.
 ///
 /// # Errors
-/// When the system has no descriptors left.
+/// If the system has no descriptors left.
 pub fn runtime() -> Result<tokio::runtime::Runtime> {
     let mut builder = tokio::runtime::Builder::new_current_thread();
     Ok(builder.enable_all().build()?)
 }
 
-/// If this process was started as a peer, it answers until it is told to go; then `true`.
+/// Checks whether this process was started as a peer. If so, it answers until it is told to leave,
+/// and returns `true`.
 ///
 /// # Errors
-/// When there is no broker.
+/// If there is no broker.
 pub fn was_started_as_peer() -> Result<bool> {
     let Some(place) = std::env::var_os(PLACE) else {
         return Ok(false);
@@ -36,7 +37,7 @@ pub fn was_started_as_peer() -> Result<bool> {
     Ok(true)
 }
 
-/// A peer that answers every job at once, having looked at the first and last byte.
+/// Runs a peer that reads the first and last byte and answers every job at once.
 async fn answer(place: &Path) -> Result<()> {
     let instance = Instance::at(place.to_owned());
     let mut peer = Peer::join(&instance, hello(), PeerOptions::default()).await?;
@@ -81,7 +82,7 @@ fn hello() -> Hello {
     }
 }
 
-/// A broker's end with so many peers that have joined.
+/// A broker's end with joined peers.
 pub struct Broker {
     /// The bus.
     pub host: Host,
@@ -94,7 +95,7 @@ impl Broker {
     /// Starts the peers and waits until they have joined.
     ///
     /// # Errors
-    /// When the bus or a process cannot be started.
+    /// If the bus or a process cannot be started.
     pub async fn with(peers: usize) -> Result<Broker> {
         let dir = tempfile::TempDir::new()?;
         let place = dir.path().join("i");
@@ -122,7 +123,7 @@ impl Broker {
         Ok(broker)
     }
 
-    /// Asks every peer to look at a document.
+    /// Sends every peer a job with a document.
     pub fn send_job(&mut self, number: u64) {
         let job = ToPeer::Job(Job {
             job: JobId(number),
@@ -143,10 +144,10 @@ impl Broker {
         }
     }
 
-    /// The next job that a peer has ended.
+    /// Returns the next job that a peer has ended.
     ///
     /// # Errors
-    /// When a peer says anything else, or has gone.
+    /// If a peer sends anything else, or has gone.
     pub async fn next_done(&mut self) -> Result<JobId> {
         match self.host.next().await {
             HostEvent::Message {
@@ -157,10 +158,10 @@ impl Broker {
         }
     }
 
-    /// Tells the peers to go and waits for their end.
+    /// Tells the peers to leave and waits for their end.
     ///
     /// # Errors
-    /// When a process cannot be waited for.
+    /// If a process cannot be waited for.
     pub async fn end(mut self) -> Result<()> {
         for peer in &self.peers {
             self.host.send(*peer, &ToPeer::Drain);
@@ -178,10 +179,10 @@ impl Broker {
     }
 }
 
-/// Fills and publishes a document of so many bytes.
+/// Fills and publishes a document of this size in bytes.
 ///
 /// # Errors
-/// When there is no room.
+/// If there is no room.
 pub fn publish(documents: &Documents, number: u64, bytes: usize) -> Result<MappedImage> {
     let mut loan = documents.loan(bytes)?;
     loan.fill(number as u8);

@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-/// An OpenSCENARIO 1.3 scenario of about `bytes` bytes: one vehicle that follows long trajectories.
+/// Creates an OpenSCENARIO 1.3 scenario of about `bytes` bytes: one vehicle that follows long
+/// trajectories.
 pub fn scenario(bytes: usize) -> String {
     let mut text = String::with_capacity(bytes + 8192);
     text.push_str(HEAD);
@@ -56,7 +57,7 @@ const TAIL: &str = "          </Maneuver>
 </OpenSCENARIO>
 ";
 
-/// Points of one trajectory.
+/// Number of points of one trajectory.
 const POINTS: u32 = 40;
 
 fn event(text: &mut String, number: u32) {

@@ -1,4 +1,4 @@
-//! Peers that say of themselves what is not so.
+//! Peers that make false statements about themselves.
 
 use std::time::Duration;
 

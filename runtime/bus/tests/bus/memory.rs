@@ -1,4 +1,4 @@
-//! Shared memory: that it is had before it is written to, and how much of it the bus takes.
+//! Shared memory: it is allocated before writing, and the bus takes a known amount.
 
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
@@ -9,7 +9,7 @@ use qcbus_messages::services::{Limits, Services};
 use crate::helper::Helper;
 use crate::support::{Site, join, run, shared_memory_of};
 
-/// Bytes that the segments of this instance have, without what is kept for those who join.
+/// Returns the bytes in the segments of this instance, without the reserve for joining peers.
 fn taken(site: &Site) -> u64 {
     let segments = shared_memory_of(&site.instance).into_iter();
     let bytes = |name: String| {

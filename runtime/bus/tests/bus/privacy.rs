@@ -1,4 +1,4 @@
-//! What the bus makes is nobody's but its user's.
+//! Only the user of the bus can access its files.
 
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::CommandExt;
@@ -14,10 +14,10 @@ use qcbus_messages::{Digest, DocId};
 use crate::helper::Helper;
 use crate::support::{Site, WATCHDOG, identity_of, join, run, shared_memory_named};
 
-/// Somebody who has nothing.
+/// User id without any rights.
 const NOBODY: u32 = 65534;
 
-/// Every entry that a host and its peers have made: what lies in /dev/shm, in the runtime
+/// Returns every entry that a host and its peers have created: in /dev/shm, in the runtime
 /// directory, and below.
 fn entries(site: &Site) -> Vec<PathBuf> {
     let identity = identity_of(&site.instance);
@@ -38,7 +38,7 @@ fn entries(site: &Site) -> Vec<PathBuf> {
     found
 }
 
-/// Those that this process may open for reading, writing or listing, after becoming nobody.
+/// Returns the paths that the user nobody can open for reading, writing or listing.
 fn open_to_nobody(paths: &[PathBuf]) -> String {
     let script = r#"for path in "$@"; do
         ( : < "$path" ) 2> /dev/null && echo "reads $path"
@@ -72,7 +72,8 @@ fn what_the_bus_makes_is_closed_to_others() {
             let is_in_nodes = path
                 .parent()
                 .is_some_and(|parent| parent.ends_with("nodes"));
-            // iceoryx2 makes these 0750 whenever somebody joins, in a directory that is closed.
+            // iceoryx2 sets the mode 0750 here whenever a peer joins. The directory above is
+            // closed.
             let rights = if is_in_nodes && path.is_dir() {
                 0o027
             } else {
@@ -84,7 +85,7 @@ fn what_the_bus_makes_is_closed_to_others() {
             println!("skipped: only root can look with the eyes of another user");
             return;
         }
-        // Nobody stops at the first directory, so let the way to the runtime directory be free.
+        // Nobody would stop at the first directory, so the way to the runtime directory is opened.
         let above = site.instance.dir().parent().unwrap();
         std::fs::set_permissions(above, PermissionsExt::from_mode(0o755)).unwrap();
         assert_eq!(
@@ -102,7 +103,7 @@ fn others_see_one_name_and_cannot_foresee_the_next() {
         let site = Site::new();
         let helper = Helper::start("serves", &site.instance);
         let identity = loop {
-            // The generation is announced when everything is made.
+            // The generation is published after everything is created.
             if site.instance.dir().join("current").exists() {
                 break identity_of(&site.instance);
             }
@@ -114,7 +115,7 @@ fn others_see_one_name_and_cannot_foresee_the_next() {
         };
         helper.kill();
         let suffix = name.strip_prefix(&format!("{identity}1_")).unwrap();
-        // What somebody makes of it who wants to be there before the next broker.
+        // An attacker plants this entry to be there before the next broker.
         let planted = format!("/dev/shm/{identity}2_{suffix}");
         std::fs::write(&planted, "").unwrap();
         let mut host = site.host();
@@ -124,7 +125,7 @@ fn others_see_one_name_and_cannot_foresee_the_next() {
     });
 }
 
-/// An image of a few dozen elements, in ASCII.
+/// Creates an image of a few dozen elements, in ASCII.
 fn image() -> Vec<u8> {
     let mut root = Tree::new("OpenDRIVE");
     for id in 0..6 {
@@ -136,8 +137,8 @@ fn image() -> Vec<u8> {
     root.image("maps/straight.xodr").unwrap()
 }
 
-/// Reads an image in every way until it was seen as it is and changed, often each. Returns how often
-/// it was refused.
+/// Reads an image in every way until it was often seen unchanged and often changed. Returns the
+/// number of refusals.
 fn read_it_while_it_changes(mapped_image: &MappedImage, sound: &[u8]) -> usize {
     let as_it_is = walk(Document::open(sound).unwrap());
     let (mut same, mut other, mut refused) = (0, 0, 0);
@@ -151,7 +152,7 @@ fn read_it_while_it_changes(mapped_image: &MappedImage, sound: &[u8]) -> usize {
             true => same += 1,
             false => other += 1,
         }
-        // Whatever it says, it ends; and what it says is not believed.
+        // Every call ends, whatever it returns. Its result is not trusted.
         for _ in 0..50 {
             let _ = document.validate();
         }

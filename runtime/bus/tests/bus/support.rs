@@ -12,10 +12,10 @@ use qcbus_messages::{
 };
 use tempfile::TempDir;
 
-/// Longer than anything takes on the slowest machine; only a hang gets here.
+/// Limit that is longer than anything takes on the slowest machine. Only a hang reaches it.
 pub const WATCHDOG: Duration = Duration::from_secs(60);
 
-/// Where one instance lives: a directory of its own.
+/// Own directory of an instance.
 pub struct Site {
     _dir: Option<TempDir>,
     pub instance: Instance,
@@ -31,7 +31,7 @@ impl Site {
         }
     }
 
-    /// In a directory that somebody else has made.
+    /// Uses a directory that was created by someone else.
     pub fn at(instance: &Instance) -> Site {
         Site {
             _dir: None,
@@ -57,7 +57,7 @@ pub fn run_forever(test: impl Future<Output = ()>) {
     runtime.block_on(test);
 }
 
-/// Fails loudly when something never happens.
+/// Panics if something never happens.
 pub async fn watched<T>(future: impl Future<Output = T>) -> T {
     tokio::time::timeout(WATCHDOG, future)
         .await
@@ -124,7 +124,7 @@ pub async fn join_with(
     (id.unwrap(), peer)
 }
 
-/// A message whose size and content follow from `number` and `len`.
+/// Creates a message with a size and content that follow from `number` and `len`.
 pub fn numbered(number: u64, len: usize) -> FromPeer {
     FromPeer::CheckersDone {
         job: JobId(number),
@@ -141,7 +141,7 @@ pub fn numbered(number: u64, len: usize) -> FromPeer {
     }
 }
 
-/// A message to a peer of about `len` bytes that says its number.
+/// Creates a message to a peer of about `len` bytes that contains its number.
 pub fn numbered_job(number: u64, len: usize) -> ToPeer {
     ToPeer::Job(Job {
         job: JobId(number),
@@ -160,7 +160,7 @@ pub fn numbered_job(number: u64, len: usize) -> ToPeer {
     })
 }
 
-/// What the shared memory of this instance is called, as long as there is a broker.
+/// Returns the names of this instance's shared memory, as long as a broker exists.
 pub fn shared_memory_of(instance: &Instance) -> Vec<String> {
     let identity = std::fs::read_to_string(instance.dir().join("id")).unwrap();
     shared_memory_named(&identity)
@@ -178,7 +178,7 @@ pub fn identity_of(instance: &Instance) -> String {
     std::fs::read_to_string(instance.dir().join("id")).unwrap()
 }
 
-/// What lies in the instance's directory.
+/// Returns the names in the instance's directory.
 pub fn files_of(instance: &Instance) -> Vec<String> {
     std::fs::read_dir(instance.dir())
         .unwrap()
@@ -186,7 +186,7 @@ pub fn files_of(instance: &Instance) -> Vec<String> {
         .collect()
 }
 
-/// Whether all bytes are this one. By pages, because comparing slices is fast without optimisation.
+/// Checks whether all bytes are this one. Comparing pages is fast without optimisation.
 pub fn is_uniform(bytes: &[u8], byte: u8) -> bool {
     let page = [byte; 4096];
     bytes
@@ -194,7 +194,7 @@ pub fn is_uniform(bytes: &[u8], byte: u8) -> bool {
         .all(|chunk| *chunk == page[..chunk.len()])
 }
 
-/// Whether /dev/shm has room for a test; says so when it has not.
+/// Checks whether /dev/shm has room for a test, and reports it if not.
 pub fn has_room(bytes: u64) -> bool {
     let stat = rustix::fs::statvfs("/dev/shm").unwrap();
     let enough = stat.f_bavail * stat.f_frsize > bytes;

@@ -1,5 +1,5 @@
-//! Kills at random moments: whoever is started afterwards works as if nothing had happened, no
-//! answer is lost, doubled or out of order within a session, and nothing is left behind.
+//! Kills at random moments: processes that are started afterwards work as if nothing had happened.
+//! No answer is lost, doubled or out of order within a session, and nothing is left behind.
 //!
 //! `QCBUS_TORTURE_SECONDS` makes it longer, `QCBUS_TORTURE_SEED` repeats a run.
 
@@ -40,7 +40,7 @@ fn random_kills_lose_nothing_and_leave_nothing() {
             std::mem::replace(&mut bundles[whom], start("answers_jobs")).kill();
         } else {
             judge(&mut broker);
-            // The lock is free as soon as the old one is dead, so not before.
+            // The lock is free only after the death of the old broker.
             broker.kill();
             broker = start("serves");
         }
@@ -61,12 +61,12 @@ fn random_kills_lose_nothing_and_leave_nothing() {
     });
 }
 
-/// Random time for things to happen in; nothing is waited for here.
+/// Pauses for a random time in which things can happen. It waits for no event.
 fn pause(time: Duration) {
     std::thread::sleep(time);
 }
 
-/// Counts what a broker says it has done, and fails when something went wrong.
+/// Counts the reported jobs of a broker, and fails if it reports a fault.
 fn judge(broker: &mut Helper) -> usize {
     let lines = broker.lines_so_far();
     let wrong: Vec<_> = lines.iter().filter(|line| line.contains("wrong")).collect();
@@ -74,7 +74,7 @@ fn judge(broker: &mut Helper) -> usize {
     lines.iter().filter(|line| line.starts_with("done")).count()
 }
 
-/// After the storm every bundle gets through a few hundred jobs with the broker that is there.
+/// Waits until each bundle has done a few hundred jobs with this broker after the storm.
 fn settle(broker: &mut Helper) -> usize {
     let mut done = 0;
     let mut past_three_hundred = 0;

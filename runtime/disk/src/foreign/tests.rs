@@ -9,7 +9,7 @@ use super::*;
 
 const WATCHDOG: Duration = Duration::from_secs(60);
 
-/// Does it on a thread of its own, because it might never end.
+/// Runs `work` on another thread, because it might never end.
 fn in_time<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
     let (done, wait) = channel();
     std::thread::spawn(move || done.send(work()));
@@ -37,7 +37,7 @@ fn nothing_but_files_is_opened_and_nobody_waits() {
             let path = path.clone();
             move || open(&path).map(|_| ())
         });
-        // What only root may look at, others may not even open.
+        // The check needs no read permission: it also refuses files that only root can read.
         let refused = matches!(&opened, Err(Refused::Special(_)));
         assert!(refused, "{}: {opened:?}", path.display());
         let read = in_time(move || read(&path, 10)).unwrap_err();
@@ -98,7 +98,7 @@ fn errors_of_the_moment_are_told_from_those_of_the_file() {
     assert!(is_of_the_moment(&io::ErrorKind::TimedOut.into()));
 }
 
-/// A visit that goes on until `end` is dropped.
+/// Starts a connection that goes on until `end` is dropped.
 fn hang(io_watchdog: &Arc<IoWatchdog>, owner: Option<u64>, path: &Path) -> Hanging {
     let ((end, ended), (begun, begins)) = (channel::<()>(), channel());
     let (io_watchdog, path) = (io_watchdog.clone(), path.to_path_buf());

@@ -2,7 +2,7 @@ use std::os::unix::fs::{PermissionsExt, chown, symlink};
 
 use super::*;
 
-/// A user who is neither root nor the one who runs the tests.
+/// A user who is neither root nor the user of the tests.
 const STRANGER: u32 = 12_345;
 
 fn mode(path: &Path, mode: u32) {
@@ -13,7 +13,7 @@ fn mode_of(path: &Path) -> u32 {
     std::fs::metadata(path).unwrap().permissions().mode() & 0o7777
 }
 
-/// A directory that only we can write to, with a file in it.
+/// Creates a directory that only the current user can write to, with a file in it.
 fn place() -> (tempfile::TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("file");
@@ -29,7 +29,7 @@ fn why(result: Result<Vec<u8>, TrustError>) -> (PathBuf, Foreign) {
     }
 }
 
-/// Whether files can be given to somebody else here.
+/// Checks whether the tests can give files to another user here.
 fn may_give_away() -> bool {
     let is_root = rustix::process::geteuid().is_root();
     if !is_root {
@@ -51,7 +51,7 @@ fn what_is_ours_alone_is_read() {
     for way in ["link", "around/link", "around/around/../", "./around/file"] {
         let path = dir.path().join(way);
         let end = match way.ends_with("../") {
-            // Out of the directory and into it again.
+            // The path leads out of the directory and into it again.
             true => path.join(dir.path().file_name().unwrap()).join("file"),
             false => path,
         };
@@ -77,7 +77,7 @@ fn what_others_may_write_to_is_not_believed() {
     let (at, reason) = why(read(&file, 100));
     assert_eq!((&*at, reason), (dir.path(), Foreign::World(0o777)));
     assert!(directory(dir.path()).is_err());
-    // In such a directory what is ours stays ours, but others can put something beside it.
+    // In such a directory the user's own files stay safe, but others can add files beside them.
     mode(dir.path(), 0o1777);
     assert_eq!(read(&file, 100).unwrap(), b"ours");
     let said = directory(dir.path()).unwrap_err().to_string();
@@ -133,12 +133,12 @@ fn what_belongs_to_somebody_else_is_not_believed() {
     chown(&file, Some(STRANGER), None).unwrap();
     assert_eq!(why(read(&file, 100)), (file.clone(), theirs));
     chown(&file, Some(0), None).unwrap();
-    // A link of theirs leads to what is ours, and will lead elsewhere tomorrow.
+    // Another user's link leads to the user's own file now, but may lead elsewhere later.
     let link = dir.path().join("link");
     symlink(&file, &link).unwrap();
     std::os::unix::fs::lchown(&link, Some(STRANGER), None).unwrap();
     assert_eq!(why(read(&link, 100)), (link, theirs));
-    // A link of ours leads to what is theirs.
+    // A link of the current user leads to a file of another user.
     let below = dir.path().join("below");
     std::fs::create_dir(&below).unwrap();
     chown(&below, Some(STRANGER), None).unwrap();
@@ -151,7 +151,7 @@ fn what_belongs_to_somebody_else_is_not_believed() {
         said.contains("chown 0") && said.contains("docker run --user 12345"),
         "{said}"
     );
-    // In a directory of everybody what is theirs stays theirs.
+    // In a directory that everybody can write to, the files of others stay theirs.
     mode(dir.path(), 0o1777);
     assert!(make_directory(&below.join("more")).is_err());
     assert!(!below.join("more").exists(), "nothing is made in it");
@@ -181,7 +181,7 @@ fn a_private_directory_is_ours_and_closed() {
     if !may_give_away() {
         return;
     }
-    // As somebody else plants it: a link to what is not ours.
+    // Another user plants a link to a directory that does not belong to the current user.
     mode(dir.path(), 0o1777);
     let (target, link) = (dir.path().join("target"), dir.path().join("link"));
     std::fs::create_dir(&target).unwrap();
