@@ -171,8 +171,8 @@ const ODDITIES: [(&str, u32); 4] = [
         5,
     ),
     ("no parameter `dept`; did you mean `depth`", 6),
-    ("no bundle is called `xodrBundel`; did you mean", 8),
-    ("no reporter is called `GitforgeReport`", 9),
+    ("no bundle has the name `xodrBundel`; did you mean", 8),
+    ("no reporter has the name `GitforgeReport`", 9),
 ];
 
 fn says_it_all(text: &str) {

@@ -27,7 +27,10 @@ use support::watchdog::{until, until_or};
 fn landlock_is_missing() -> bool {
     let missing = qcbus_confine::kernel_level() == 0;
     if missing {
-        skip("a bundle that is confined", "this kernel has no Landlock");
+        skip(
+            "a bundle that is confined",
+            "this kernel does not support Landlock",
+        );
     }
     missing
 }

@@ -116,7 +116,7 @@ fn how_little_was_asked_is_said_in_one_line() {
     let line = said.stdout.lines().find(|line| line.contains("not asked"));
     let line = line.unwrap_or_else(|| panic!("{whole}")).trim();
     let (_, numbers) = line
-        .split_once("not asked, so the verdicts say nothing about it: ")
+        .split_once("not requested, so the verdicts do not cover it: ")
         .unwrap_or_default();
     let words: Vec<&str> = numbers.split(' ').collect();
     let [out, "of", "the", all, "checkers", "of", "xodrBundle"] = words[..] else {

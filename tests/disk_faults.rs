@@ -272,7 +272,7 @@ fn a_file_that_never_answers_is_named_and_holds_up_nobody() {
             _ => false,
         };
         assert!(is_no_verdict, "{said:?}");
-        victim.says_nothing_false("a file does not answer");
+        victim.says_nothing_false("a file does not respond");
         victim.broker.failure(None);
         victim.settles("it answers again");
         let unseen = victim.farm.status().unwrap().unseen;

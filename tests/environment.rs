@@ -212,9 +212,7 @@ fn last_words_of_a_bundle_that_fails_are_shown() {
     let script = service.script();
     let (code, text) = service.add(&service.program, &[script.to_str().unwrap()]);
     assert_eq!(code, Some(2), "{text}");
-    let expected = "`mine` said last (all of it is in the broker's log):\n  \
-                    Traceback (most recent call last):\n    File \"mine.py\", line 1\n  \
-                    ModuleNotFoundError: No module named 'qcbus'\n  \\u{1b}[2Kerror: none\n";
+    let expected = "last output of `mine` (the full output is in the broker's log):\n  Traceback (most recent call last):\n    File \"mine.py\", line 1\n  ModuleNotFoundError: No module named 'qcbus'\n  \\u{1b}[2Kerror: none\n";
     assert!(text.contains(expected), "{text}");
     assert!(
         text.contains("`mine` is not ready: it ended with exit code 1"),

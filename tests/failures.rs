@@ -184,7 +184,7 @@ fn what_takes_the_place_of_a_watched_directory_is_not_said_to_be_gone() {
         rustix::fs::renameat_with(rustix::fs::CWD, &aside, rustix::fs::CWD, farm.root(), flags)
     };
     exchange().unwrap();
-    notice(&farm, "is no directory any more");
+    notice(&farm, "is not a directory any more");
     exchange().unwrap();
     notice(&farm, "is back");
 }

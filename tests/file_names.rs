@@ -201,7 +201,7 @@ fn what_cannot_be_looked_at_is_said_and_counts() {
         failure(&cli, &cli.path().join(name));
         let said = check(&cli, &["maps"]);
         assert_eq!(said.code, Some(3), "{}", said.whole(&cli));
-        let note = format!("note: not looked at: [DESK]/{name}: ");
+        let note = format!("note: not scanned: [DESK]/{name}: ");
         let told = cli.tidy(&said.stderr);
         assert_eq!(told.matches(&note).count(), 1, "{told}");
         // An error has a higher priority.
@@ -333,7 +333,7 @@ fn a_directory_that_may_not_be_read_counts() {
     rights(&closed, 0o700);
     assert_eq!(said.code, Some(3), "{}", said.whole(&cli));
     let told = cli.tidy(&said.stderr);
-    let note = "note: not looked at: [DESK]/maps/closed: cannot look into this directory";
+    let note = "note: not scanned: [DESK]/maps/closed: cannot look into this directory";
     assert_eq!(told.matches(note).count(), 1, "{told}");
 }
 

@@ -394,10 +394,7 @@ fn gate_results_and_state_are_held_by_one_broker() {
     let broker = farm.serve_ready();
     publishes(&farm, &[MAP]);
     let holder = format!("instance `instance`, process {}", broker.pid());
-    for (option, what) in [
-        ("--gate", "the gate"),
-        ("--out", "the directory of results"),
-    ] {
+    for (option, what) in [("--gate", "the gate"), ("--out", "the results directory")] {
         let path = if option == "--gate" {
             gate(&farm)
         } else {

@@ -202,7 +202,10 @@ fn a_module_that_fails_leaves_the_file_undetermined_and_says_why() {
 #[test]
 fn it_writes_nowhere_else_and_reaches_nobody() {
     if qcbus_confine::kernel_level() == 0 {
-        support::inside::skip("it_writes_nowhere_else", "this kernel has no Landlock");
+        support::inside::skip(
+            "it_writes_nowhere_else",
+            "this kernel does not support Landlock",
+        );
         return;
     }
     let script = r#"( echo x > "OUTSIDE" ) 2>/dev/null && exit 4

@@ -246,7 +246,7 @@ fn a_stopped_process_keeps_no_bundle_of_others_from_joining() {
     farm.write("a.xodr", &Content::Good(1).bytes());
     is_judged(&farm, "a.xodr", &Content::Good(1));
     let log = farm.log();
-    assert!(!log.contains("does not answer"), "{log}");
+    assert!(!log.contains("does not respond"), "{log}");
 }
 
 #[test]

@@ -232,7 +232,7 @@ fn a_check_that_is_ended_by_a_signal_says_what_it_did_not_look_at() {
                     let rest: Vec<String> = lines.map_while(Result::ok).collect();
                     let rest = rest.join("\n");
                     assert_eq!(check.wait().unwrap().code(), Some(3), "{signal}: {rest}");
-                    assert!(rest.contains("ended by a signal"), "{signal}: {rest}");
+                    assert!(rest.contains("stopped by a signal"), "{signal}: {rest}");
                     let named =
                         rest.contains("  large.xodr") || rest.contains("nothing was looked at");
                     assert!(

@@ -384,5 +384,5 @@ fn a_scenario_that_is_lost_on_its_way_out_is_no_success() {
     assert_eq!(command.status().unwrap().code(), Some(5));
     let said = cli.qcbus(&["pack", MAIN, "/dev/zero", "-o", "x.mosc"]);
     assert_eq!(said.code, Some(2), "{}", said.whole(&cli));
-    assert!(said.stderr.contains("it is no file"), "{}", said.stderr);
+    assert!(said.stderr.contains("it is not a file"), "{}", said.stderr);
 }

@@ -172,7 +172,7 @@ fn what_is_left_out_is_said_and_the_result_says_so() {
     assert!(!said.stdout.contains("elementId"), "{whole}");
     assert!(
         said.stdout
-            .contains("not asked, so the verdicts say nothing about it: 1 of"),
+            .contains("not requested, so the verdicts do not cover it: 1 of"),
         "{whole}"
     );
     let results = cli.result(&format!("out/{file}.xqar"));

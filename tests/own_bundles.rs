@@ -105,7 +105,7 @@ fn what_does_not_become_ready_is_taken_out_again_and_stops_nobody() {
     let cases = [
         ("exit 3", "exit code 3", 2),
         ("exec /nowhere/at/all", "127", 2),
-        ("exec sleep 600", "it has not said hello within 1 s", 3),
+        ("exec sleep 600", "it did not connect within 1 s", 3),
         // It says hello under a name that differs from its manifest.
         (&mine("1.0.0").replace("--name mine", "--name other"), "", 2),
     ];
@@ -211,7 +211,7 @@ fn an_upgrade_to_a_broken_program_leaves_the_one_that_works() {
     let (code, text) = add(&farm, "mine", &broken, &[]);
     assert_eq!(code, Some(2), "{text}");
     assert!(
-        text.contains("its manifest from before is in force again"),
+        text.contains("its previous manifest is in force again"),
         "{text}"
     );
     assert_eq!(manifest(), written);

@@ -80,7 +80,7 @@ fn distribution(
     }
 }
 
-const NOT_THERE: &str = "is not there";
+const NOT_THERE: &str = "does not exist";
 
 fn cases() -> Vec<Case> {
     let unused =

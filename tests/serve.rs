@@ -373,7 +373,7 @@ fn a_network_file_system_is_polled() {
     let _broker = farm.serve_ready();
     assert_eq!(
         farm.status().unwrap().watch_mode,
-        "poll every 0.1 s, as asked"
+        "poll every 0.1 s, as requested"
     );
     farm.write("a.xodr", &Content::Good(1).bytes());
     until_so("it is seen", || farm.out().join("a.xodr.xqar").exists());

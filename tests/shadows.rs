@@ -175,7 +175,7 @@ fn the_worst_of_them_hold_up_nobody_and_are_told_to_have_failed() {
         "it has died with a file twice",
         || {
             let (_, text) = bundle(&farm, &["trials", "dies_on_every_job"]);
-            text.contains("about which it failed").then_some(())
+            text.contains("on which it failed").then_some(())
         },
         || tail(&farm.log()),
     );

@@ -300,7 +300,10 @@ fn doctor_looks_at_the_running_broker() {
     let told = |farm: &Farm| String::from_utf8(farm.qcbus(&["doctor"]).stdout).unwrap();
     let journal = format!("{}/journal.sqlite", state.display());
     let without = told(&farm);
-    assert!(without.contains("none runs as this instance"), "{without}");
+    assert!(
+        without.contains("no broker runs as this instance"),
+        "{without}"
+    );
     assert!(
         without.contains("/qcbus-out/.qcbus/journal.sqlite"),
         "{without}"

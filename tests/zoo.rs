@@ -138,7 +138,7 @@ fn notices(farm: &Farm) -> String {
 fn hangs_after_hello() {
     let (farm, _broker) = beside("hangs_after_hello", "");
     until_so("it is told apart from those who answer", || {
-        notices(&farm).contains("hangs_after_hello: it joined and never said what it checks")
+        notices(&farm).contains("hangs_after_hello: it joined but did not register its checkers")
     });
     assert_eq!(
         farm.verdict("0.xodr").verdict,

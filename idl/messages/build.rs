@@ -24,8 +24,7 @@ fn main() {
     match date {
         Some(date) => println!("cargo::rustc-env=QCBUS_BUILD_DATE={date}"),
         None => println!(
-            "cargo::error=no day of the build: there is no git, and no `released` in {}; set \
-             SOURCE_DATE_EPOCH",
+            "cargo::error=unknown build date: there is no git, and no `released` in {}; set SOURCE_DATE_EPOCH",
             manifest.display()
         ),
     }

@@ -222,7 +222,7 @@ fn a_check_that_is_ended_by_a_signal_names_what_was_not_judged() {
             asked.join().unwrap()
         });
         assert_eq!(ended.code(), Some(3), "{ended:?}");
-        assert!(ended.says("not judged: ended by a signal"), "{ended:?}");
+        assert!(ended.says("not judged: stopped by a signal"), "{ended:?}");
         assert!(ended.says("m/0.xodr"), "{ended:?}");
         bench.until_quiet();
         signal(&bundle, Signal::CONT);

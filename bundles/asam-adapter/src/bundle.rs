@@ -20,7 +20,8 @@ use crate::runners::Runners;
 /// Checker that represents the module as a whole.
 pub(crate) const MODULE_CHECKER: &str = "check_qcbus_asam_module_is_known";
 const MODULE_UID: &str = "qcbus.dev:qcbus:1.0.0:asam.module_is_known";
-const MODULE_PAGE: &str = "# module is known\n\nThe module says nothing of checkers that it did not have when it was started.\n";
+const MODULE_PAGE: &str = "# module is known\n\nThe results of the module contain only checkers that it had when \
+                           it was started.\n";
 
 /// State shared by all rules of a bundle.
 struct Host {
@@ -147,7 +148,7 @@ impl Host {
             Err(error) => {
                 // A process in the sandbox cannot start another runner. Its parent starts a new
                 // process.
-                tracing::error!(module = name, %error, "nothing more can be run");
+                tracing::error!(module = name, %error, "no further run is possible");
                 std::process::exit(i32::from(Exit::Internal.code()));
             }
         };
@@ -179,7 +180,10 @@ impl Run<'_> {
                 reason: "the module's result does not mention this checker".to_owned(),
             },
             false => Ending::NotApplicable {
-                reason: format!("the module has it for other files than {}", kind.as_str()),
+                reason: format!(
+                    "the module does not apply this checker to {} files",
+                    kind.as_str()
+                ),
             },
         }
     }
@@ -194,8 +198,8 @@ impl Run<'_> {
         if !unknown.is_empty() {
             let ids: Vec<&str> = unknown.iter().map(|it| it.id.as_str()).collect();
             found.fail(format!(
-                "the module has checkers that it did not have when it was started: `{}`; what they found is listed \
-                 here",
+                "the module has checkers that it did not have when it was started: `{}`; their findings are \
+                 listed here",
                 ids.join("`, `")
             ));
         }

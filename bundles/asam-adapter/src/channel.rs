@@ -139,7 +139,7 @@ impl Channel {
                 content,
             }) = Packet::of(&packet[..length])
             else {
-                return Err(io::Error::new(ErrorKind::InvalidData, "this is no packet"));
+                return Err(io::Error::new(ErrorKind::InvalidData, "invalid packet"));
             };
             if head.saturating_add(body) > most {
                 return Err(io::Error::new(

@@ -38,7 +38,7 @@ pub(crate) fn of<'d>(subject: &Subject<'d>) -> Result<Files<'d>, String> {
             }
             let path = plain(&from_text(source.path));
             if !path.is_absolute() {
-                return Err(format!("`{}` is no absolute path", source.path));
+                return Err(format!("`{}` is not an absolute path", source.path));
             }
             if !known.insert(path.clone()) {
                 continue;
@@ -68,7 +68,7 @@ pub(crate) fn of<'d>(subject: &Subject<'d>) -> Result<Files<'d>, String> {
         }
     }
     if files.is_empty() {
-        return Err("the file lies in an archive".to_owned());
+        return Err("the file is in an archive".to_owned());
     }
     Ok((files, pieces))
 }
@@ -101,7 +101,7 @@ fn bytes_of(
         }
         Some(digest) => Ok(Bytes::OnDisk(digest)),
         None if transcoded || is_packed => Err(format!(
-            "the bytes of {} cannot be proven: it is included, and not in UTF-8",
+            "the bytes of {} cannot be verified: it is included, and not in UTF-8",
             path.display()
         )),
         None => Ok(Bytes::Here(text.len() as u64)),

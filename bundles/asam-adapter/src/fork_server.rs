@@ -65,11 +65,11 @@ impl ForkServer {
                 match self.warm(run, &writer) {
                     Ok(pid) => return Ok(Started::Warm(pid)),
                     Err(SpawnError::Cold(why)) => {
-                        tracing::info!(%why, "this run is plain, not warm");
+                        tracing::info!(%why, "this run is plain, not forked");
                         break;
                     }
                     Err(error) => {
-                        tracing::info!(%error, "the interpreter is started anew");
+                        tracing::info!(%error, "the interpreter is restarted");
                         self.server = None;
                     }
                 }
@@ -119,7 +119,7 @@ impl ForkServer {
         }
         self.server
             .as_mut()
-            .ok_or_else(|| WhyCold::new("it was let go"))
+            .ok_or_else(|| WhyCold::new("its interpreter was stopped"))
     }
 
     /// Returns the exit status of a run, or `None` if the run has not ended.

@@ -66,7 +66,7 @@ fn begin(
     let runners = Runners::start(count, &hosted, program)
         .map_err(|error| format!("`{name}` cannot be run: {error}"))?;
     let learned = learn(&hosted, &runners)
-        .map_err(|why| format!("`{name}` is of no use as a bundle: {why}"))?;
+        .map_err(|why| format!("`{name}` cannot be used as a bundle: {why}"))?;
     Ok(bundle(hosted, learned, runners))
 }
 

@@ -188,20 +188,19 @@ fn variable(text: &str) -> Result<(String, String), UsageError> {
     match text.split_once('=') {
         Some((name, value)) if !name.is_empty() => Ok((name.to_owned(), value.to_owned())),
         _ => Err(UsageError::Argument(format!(
-            "--env: `{text}` is no NAME=VALUE"
+            "--env: expected NAME=VALUE, found `{text}`"
         ))),
     }
 }
 
 fn kind(text: &str) -> Result<FileKind, UsageError> {
     let known = FileKind::ALL.into_iter().find(|it| it.as_str() == text);
-    known
-        .ok_or_else(|| UsageError::Argument(format!("--kind: there are no files of kind `{text}`")))
+    known.ok_or_else(|| UsageError::Argument(format!("--kind: unknown file kind `{text}`")))
 }
 
 fn positive(parser: &mut lexopt::Parser) -> Result<u64, UsageError> {
     let number = |text: &str| text.parse().ok().filter(|it| *it > 0);
-    let read = |text: &str| number(text).ok_or("it is no number above zero");
+    let read = |text: &str| number(text).ok_or("expected a number greater than 0");
     Ok(parser.value()?.parse_with(read)?)
 }
 

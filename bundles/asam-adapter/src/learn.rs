@@ -60,7 +60,7 @@ pub(crate) fn learn(hosted: &Hosted, runners: &Runners) -> Result<Learned, Strin
         .collect();
     let answers = runners
         .ask_all(&requests)
-        .map_err(|error| format!("nothing can be run: {error}"))?;
+        .map_err(|error| format!("it cannot be run: {error}"))?;
     let mut learned: Option<Learned> = None;
     let mut failures = Vec::new();
     for (sample, answered) in samples.into_iter().zip(answers) {
@@ -70,10 +70,10 @@ pub(crate) fn learn(hosted: &Hosted, runners: &Runners) -> Result<Learned, Strin
             Ok((ran.application.unwrap_or_default(), report))
         });
         match looked {
-            Err(why) => failures.push(format!("over a small {kind} file: {why}")),
+            Err(why) => failures.push(format!("with a small {kind} file: {why}")),
             Ok((_, report)) if hosted.kinds.is_none() && !takes(&report) => failures.push(format!(
-                "over a small {kind} file: the module `{}` has not looked, so it is not asked about such files \
-                 (`kinds` in its manifest says otherwise)",
+                "with a small {kind} file: the module `{}` did not check it, so it is not used for such files \
+                 (set `kinds` in its manifest to change this)",
                 hosted.name
             )),
             Ok((application, report)) => add(&mut learned, sample.kind, application, report),
@@ -82,7 +82,7 @@ pub(crate) fn learn(hosted: &Hosted, runners: &Runners) -> Result<Learned, Strin
     match learned {
         Some(learned) if !learned.checkers.is_empty() => {
             for why in failures {
-                tracing::info!(module = hosted.name, why, "a kind of files is not taken");
+                tracing::info!(module = hosted.name, why, "a kind of file is not supported");
             }
             Ok(learned)
         }
@@ -98,8 +98,8 @@ fn of_no_use(failures: &[String], hosted: &Hosted) -> String {
     if hosted.application.is_none() {
         let tried = applications(hosted).join("`, `");
         text.push(format!(
-            "if its section of a configuration has another name in its code than `{tried}`, say so in its manifest: \
-             \"application\": \"NAME\""
+            "if its code uses another name than `{tried}` for its section of a configuration, set the name in \
+             its manifest: \"application\": \"NAME\""
         ));
     }
     text.join("\n")

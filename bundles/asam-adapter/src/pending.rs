@@ -60,7 +60,7 @@ impl Staged {
                 Bytes::OnDisk(digest) => {
                     read = foreign::read(&file.path, MOST)?;
                     if <[u8; 32]>::from(Sha256::digest(&read)) != digest {
-                        let why = format!("{} has changed meanwhile", file.path.display());
+                        let why = format!("{} has changed in the meantime", file.path.display());
                         return Err(io::Error::other(why));
                     }
                     &read

@@ -48,7 +48,7 @@ pub(crate) struct Ended {
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Broken {
     /// The requesting process has ended.
-    #[error("nobody waits for it any more")]
+    #[error("the process that requested it has ended")]
     Unwanted,
     /// The run was not started.
     #[error("it cannot be started: {0}")]
@@ -176,7 +176,7 @@ impl Watched<'_> {
         if self.begin.elapsed() > limits.time {
             let seconds = limits.time.as_secs();
             return Some(format!(
-                "was not done after {seconds} s and was killed (`limits.seconds` of its manifest)"
+                "did not finish within {seconds} s and was killed (`limits.seconds` of its manifest)"
             ));
         }
         (self.heard.bytes > limits.output).then(|| {
@@ -199,7 +199,7 @@ impl Watched<'_> {
         (family::memory(&family) > limits.memory).then(|| {
             let most = limits.memory >> 20;
             format!(
-                "took more than {most} MB of memory and was killed (`limits.memory_mb` of its manifest)"
+                "used more than {most} MB of memory and was killed (`limits.memory_mb` of its manifest)"
             )
         })
     }

@@ -60,8 +60,7 @@ impl Programs {
                 return None;
             }
             Some(format!(
-                "{} is not the program any more from which it was learned what this module checks: that is learned \
-                 anew",
+                "{} has changed since the checkers of this module were determined: they are determined again",
                 program.path.display()
             ))
         })

@@ -68,7 +68,7 @@ impl ReportModule {
         let answered = self.runners.ask(&request, &[&bytes]);
         // The parent of this process starts a new one.
         let answered = answered.unwrap_or_else(|error| {
-            tracing::error!(module = name, %error, "the runner is gone");
+            tracing::error!(module = name, %error, "the runner has ended");
             std::process::exit(i32::from(Exit::Internal.code()))
         });
         let (ran, body) =

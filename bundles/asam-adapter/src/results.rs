@@ -43,18 +43,18 @@ pub(crate) fn read(name: &str, ran: &Ran, result: &[u8]) -> Result<Report, Strin
     }
     if ran.application.is_none() {
         return fails(
-            "ended with exit code 0, but has left no result where its configuration says",
+            "ended with exit code 0, but left no result at the path in its configuration",
         );
     }
     let results = match xqar::read(result) {
         Ok(results) => results,
-        Err(error) => return fails(&format!("has left a result that cannot be read: {error}")),
+        Err(error) => return fails(&format!("left a result that cannot be read: {error}")),
     };
     if let Some(other) = about_another(&results, ran) {
-        return fails(&format!("has left a result about another file, {other}"));
+        return fails(&format!("left a result about another file, {other}"));
     }
     let Some(first) = results.bundles.first() else {
-        return fails("has left a result without a bundle in it");
+        return fails("left a result without a bundle");
     };
     let mut report = Report {
         version: first.version.clone(),
@@ -114,13 +114,13 @@ fn told(checker: Checker, paths: &Paths) -> Told {
             }
         }
         Some(Status::Skipped) => Ending::NotApplicable {
-            reason: reason("the module has skipped it"),
+            reason: reason("the module skipped it"),
         },
         Some(Status::Error) => Ending::Failed {
-            reason: reason("the module says that it failed"),
+            reason: reason("the module reports that it failed"),
         },
         None => Ending::Failed {
-            reason: "the module does not say how it ended".to_owned(),
+            reason: "the module does not report how it ended".to_owned(),
         },
     };
     let mut issues = checker.issues;
@@ -236,7 +236,7 @@ impl Paths {
         match said.trim() {
             "" => format!("the module `{name}` {what}; it printed nothing"),
             said => format!(
-                "the module `{name}` {what}; it printed last:\n{}",
+                "the module `{name}` {what}; its last output:\n{}",
                 self.lead_back(said)
             ),
         }
@@ -349,6 +349,9 @@ mod tests {
         assert_eq!(*by, ["first", "broken", "silent"]);
         assert!(matches!(endings[2], Ending::NotApplicable { .. }));
         assert_eq!(endings[3], &failed("Error: x."));
-        assert_eq!(endings[4], &failed("the module does not say how it ended"));
+        assert_eq!(
+            endings[4],
+            &failed("the module does not report how it ended")
+        );
     }
 }

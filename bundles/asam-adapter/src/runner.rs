@@ -26,7 +26,7 @@ pub(crate) fn serve(hosted: &Hosted) -> Exit {
     match runner(hosted) {
         Ok(()) => Exit::Accepted,
         Err(error) => {
-            tracing::error!(module = hosted.name, %error, "the runner cannot go on");
+            tracing::error!(module = hosted.name, %error, "the runner cannot continue");
             Exit::Internal
         }
     }
@@ -116,7 +116,7 @@ impl Runner<'_> {
                 tracing::warn!(
                     module = self.hosted.name,
                     why,
-                    "it is run plainly once more"
+                    "it is run again as a plain run"
                 );
                 self.run(message, true)
             }
@@ -186,7 +186,7 @@ impl Runner<'_> {
         room.directory("tmp")?;
         let directory = self.hosted.directory.clone().unwrap_or(own.clone());
         let input = staged.input().to_str().ok_or_else(|| {
-            let why = "its path is no UTF-8, and a configuration cannot name it";
+            let why = "its path is not UTF-8, so a configuration cannot contain it";
             NotRun::Why(why.to_owned())
         })?;
         let is_own = self.hosted.directory.is_none();
@@ -253,7 +253,7 @@ impl Runner<'_> {
         if let Some(changed) = prepared.staged.changed() {
             let changed = changed.display();
             ran.fault = Some(format!(
-                "has changed its copy of {changed}, and judged something else"
+                "changed its copy of {changed}, so it checked other content"
             ));
             return Vec::new();
         }
@@ -282,7 +282,7 @@ impl Runner<'_> {
             Err(error) => return Err(unreadable(&error)),
         };
         if !found.is_file() {
-            return Err("left something as its result that is no file".to_owned());
+            return Err("left a result that is not a file".to_owned());
         }
         let modified = |it: &Path| std::fs::metadata(it).and_then(|it| it.modified());
         // Both files are on the same disk, so their times come from the same clock.

@@ -24,11 +24,11 @@ pub(crate) fn in_directory(directory: &Path, most: u64) -> Result<Written, Strin
     for path in paths {
         let inside = path.strip_prefix(directory).ok().and_then(Path::to_str);
         let Some(name) = inside else {
-            return Err("it has written a file whose name is no UTF-8".to_owned());
+            return Err("it wrote a file whose name is not UTF-8".to_owned());
         };
         let left = most.saturating_sub(bytes.len() as u64);
         let read = foreign::read(&path, left)
-            .map_err(|error| format!("what it has written cannot be read: {name}: {error}"))?;
+            .map_err(|error| format!("the files that it wrote cannot be read: {name}: {error}"))?;
         names.push((name.to_owned(), read.len() as u64));
         bytes.extend_from_slice(&read);
     }
@@ -36,10 +36,10 @@ pub(crate) fn in_directory(directory: &Path, most: u64) -> Result<Written, Strin
 }
 
 fn walk(directory: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<(), String> {
-    let unread = |error: std::io::Error| format!("what it has written cannot be read: {error}");
+    let unread = |error: std::io::Error| format!("the files that it wrote cannot be read: {error}");
     if depth > DEEPEST {
         return Err(format!(
-            "it has written more than {DEEPEST} directories deep"
+            "it wrote files more than {DEEPEST} directories deep"
         ));
     }
     for entry in std::fs::read_dir(directory).map_err(unread)? {
@@ -49,7 +49,7 @@ fn walk(directory: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<(), 
             walk(&entry.path(), depth + 1, found)?;
         } else if kind.is_file() {
             if found.len() >= MOST_FILES {
-                return Err(format!("it has written more than {MOST_FILES} files"));
+                return Err(format!("it wrote more than {MOST_FILES} files"));
             }
             found.push(entry.path());
         }

@@ -328,7 +328,7 @@ fn statuses_are_what_they_say() {
     let (code, said) = guest.judge(&[]);
     assert_eq!(code, Some(3), "{said}");
     assert!(
-        said.contains("one failed: the module says that it failed"),
+        said.contains("one failed: the module reports that it failed"),
         "{said}"
     );
     assert!(!said.contains("two"), "skipped is an answer: {said}");

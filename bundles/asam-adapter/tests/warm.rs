@@ -298,15 +298,15 @@ fn what_is_not_recognised_is_said() {
         ("broken", "it cannot be loaded ahead: SyntaxError: "),
         (
             "spaced",
-            "its interpreter has the option `-s -E`, which only a plain run has",
+            "its interpreter has the option `-s -E`, which only a plain run supports",
         ),
         ("split", "/bin/split` is no Python program"),
         (
             "shim",
             "is a script, which may choose an interpreter for each job",
         ),
-        ("late > file", "its command needs a shell, for `>`"),
-        ("cd / && late", "its command needs a shell, for `&`"),
+        ("late > file", "its command needs a shell because of `>`"),
+        ("cd / && late", "its command needs a shell because of `&`"),
         (
             "X=1 late",
             "its command begins with something that only a shell can run",
@@ -325,19 +325,19 @@ fn what_is_not_recognised_is_said() {
         ),
         (
             "PYTHON script.py",
-            "the script `script.py` depends on the directory of each job; name it by its whole path",
+            "the script `script.py` depends on the directory of each job; use its absolute path",
         ),
         (
             "PYTHON /no/script.py",
-            "the script `/no/script.py` is no file",
+            "the script `/no/script.py` is not a file",
         ),
         (
             "PYTHON -c pass",
-            "its interpreter has the option `-c`, which only a plain run has",
+            "its interpreter has the option `-c`, which only a plain run supports",
         ),
         (
             "PYTHON -X dev x.py",
-            "its interpreter has the option `-X`, which only a plain run has",
+            "its interpreter has the option `-X`, which only a plain run supports",
         ),
         ("PYTHON -m a/b", "it names no module after -m"),
         (
@@ -376,12 +376,12 @@ fn jobs_that_are_otherwise_are_run_plainly() {
     let other = shop.environment(&[("TZ", "UTC")]);
     assert_eq!(
         why(&mut server, &other),
-        "this job has another $TZ than it was loaded with"
+        "$TZ of this job differs from its value at load time"
     );
     let less = &shop.environment(&[])[..2];
     assert_eq!(
         why(&mut server, less),
-        "this job has another $LANG than it was loaded with"
+        "$LANG of this job differs from its value at load time"
     );
     let stars = shop.environment(&[("QCBUS_X", "*")]);
     assert!(why(&mut server, &stars).contains("put it in double quotes"));
@@ -389,7 +389,7 @@ fn jobs_that_are_otherwise_are_run_plainly() {
     let plain = shop.environment(&[]);
     assert_eq!(
         why(&mut server, &plain),
-        "the directory of this job has `json.py`, which Python would look at before installed modules"
+        "the directory of this job has `json.py`, which Python would find before installed modules"
     );
     assert_eq!(shop.warm(&mut server, &plain).stdout, "ran\n");
 }

@@ -25,8 +25,7 @@ impl Model for Modular {
         let refers = root.elements("ScenarioReference").next().is_some();
         let offers = root.names().any(|name| name == OFFERS);
         if subject.kind() != FileKind::Mosc && !refers && !offers {
-            let why =
-                "the file is a plain scenario: it refers to no other and offers no attributes";
+            let why = "the file is a plain scenario: it refers to no other scenario and offers no attributes";
             return Err(Unbuilt::NotApplicable(why.to_owned()));
         }
         Ok(Assembly {

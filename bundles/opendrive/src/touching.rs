@@ -83,7 +83,7 @@ impl<'a> RoadMap<'a> {
         let joints = road.map_or(&[][..], |road| self.joints_of(road));
         debug_assert!(
             joints.is_sorted_by_key(|joint| joint.from),
-            "lanes and their ends come in order"
+            "lanes and their ends must be sorted"
         );
         let begin = joints.partition_point(|joint| joint.from < from);
         let own = joints.get(begin..).unwrap_or(&[]).iter();

@@ -12,7 +12,7 @@ use crate::scope::{Context, ContextId, Declared};
 
 /// Kind of the entries of a catalog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[expect(missing_docs, reason = "the standard's words")]
+#[expect(missing_docs, reason = "names of the standard")]
 pub enum CatalogKind {
     Vehicle,
     Controller,

@@ -44,10 +44,10 @@ impl DateTime {
             return Err(FORM);
         }
         if !(1..=12).contains(&month) {
-            return Err(DateTimeError("has no month from 01 to 12"));
+            return Err(DateTimeError("has a month that is not from 01 to 12"));
         }
         if day < 1 || day > days(year, month) {
-            return Err(DateTimeError("names a day that its month does not have"));
+            return Err(DateTimeError("has a day that does not exist in its month"));
         }
         let (clock, zone) = split_zone(time)?;
         let of_day = clock_seconds(clock)?;
@@ -113,7 +113,7 @@ fn clock_seconds(clock: &str) -> Result<f64, DateTimeError> {
     };
     let midnight = hours == 24 && minutes == 0 && whole == 0 && part == 0.0;
     if !midnight && (hours > 23 || minutes > 59 || whole > 59) {
-        return Err(DateTimeError("names a time that no day has"));
+        return Err(DateTimeError("has a time that does not exist"));
     }
     Ok((hours * 3600 + minutes * 60 + whole) as f64 + part)
 }

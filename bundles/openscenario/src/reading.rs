@@ -100,15 +100,15 @@ pub(crate) fn resolve<'m, 'd: 'm>(
                 ValueFaultKind::Embedded,
                 at,
                 format!(
-                    "`${name}` stands within a longer text, where the standard replaces nothing: a parameter \
-                     is the whole value or part of an expression `${{…}}`"
+                    "`${name}` is within a longer text, where the standard replaces no parameters: a parameter \
+                     must be the whole value or part of an expression `${{…}}`"
                 ),
             )
         }),
         Form::Ros(at) => {
             let dialect = Dialect::Ros;
             let text = format!(
-                "`$(` begins {}, which the standard does not know",
+                "`$(` begins {}, which is not part of the standard",
                 dialect.name()
             );
             Err(Problem::new(ValueFaultKind::Dialect(dialect), at, text))
@@ -127,14 +127,14 @@ fn literal<'d>(raw: &'d str, expected: Expected) -> Result<Value<'d>, Problem<'d
                 .map(|error| format!(": it {error}")),
             _ => None,
         };
-        let allowed = allowed.unwrap_or_else(|| format!(", which is {}", data_type.allowed()));
+        let allowed = allowed.unwrap_or_else(|| format!("; expected {}", data_type.allowed()));
         let shown = if raw.is_empty() {
             "an empty text".to_owned()
         } else {
             format!("`{raw}`")
         };
         let text = format!(
-            "{shown} is no value of type `{}`{allowed}",
+            "{shown} is not a value of type `{}`{allowed}",
             data_type.word()
         );
         Problem::new(ValueFaultKind::Declared, 0, text)
@@ -151,7 +151,7 @@ fn parameter<'m, 'd: 'm>(
         ..problem
     };
     let Some(declaration) = lookup(name) else {
-        let text = format!("no parameter `{name}` is declared around this element");
+        let text = format!("the parameter `{name}` is not declared in the scope of this element");
         return Err(named(Problem::new(ValueFaultKind::Undeclared, 0, text)));
     };
     let Declared::Value(value) = &declaration.declared else {
@@ -250,8 +250,8 @@ fn expression<'m, 'd: 'm>(
     };
     if let Some(word) = takes_none {
         let text = format!(
-            "an expression stands where a value of type `{word}` is due: it is not evaluated there, a \
-             parameter `$name` would be replaced"
+            "expected a value of type `{word}`, found an expression: it is not evaluated there, but a parameter \
+             `$name` would be replaced"
         );
         let is_text = matches!(expected, Expected::Type(DataType::String));
         let value = is_text.then_some(Value::Text(Cow::Borrowed(raw)));
@@ -306,8 +306,8 @@ fn fit_result<'d>(evaluated: &Evaluated, expected: Expected) -> Result<Value<'d>
             let integer = integral(*double).filter(|integer| range.contains(integer));
             let integer = integer.ok_or_else(wrong)?;
             let text = format!(
-                "the result is `{integer}`, but of type `double`, where {} is due; `round(…)`, `floor(…)` \
-                 and `ceil(…)` give whole numbers",
+                "the result is `{integer}` of type `double`, expected {}; `round(…)`, `floor(…)` and `ceil(…)` \
+                 give whole numbers",
                 data_type.allowed()
             );
             let value = Some(Value::Integer(integer));

@@ -184,7 +184,7 @@ fn seen_from(pose: Pose, x: f64, y: f64) -> (f64, f64) {
 
 #[expect(
     clippy::cast_possible_truncation,
-    reason = "what is farther away than i64 is in the last cell"
+    reason = "a position beyond the range of i64 goes into the last cell"
 )]
 fn cell(x: f64, y: f64) -> (i64, i64) {
     ((x / CELL).floor() as i64, (y / CELL).floor() as i64)

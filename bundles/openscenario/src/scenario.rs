@@ -486,8 +486,8 @@ impl<'d> Scenario<'d> {
             if element.reference().is_none() && self.declares_variable(&fault.name) {
                 fault.kind = ValueFaultKind::Variable;
                 fault.text = format!(
-                    "`{}` is a variable, whose value is known only when the scenario runs; `$` reads \
-                     parameters",
+                    "`{}` is a variable, and its value is known only when the scenario runs; `$` refers to \
+                     parameters only",
                     fault.name
                 );
             } else {

@@ -174,13 +174,14 @@ impl<'d> Context<'d> {
             problem.kind = ValueFaultKind::Order;
             let name = &problem.name;
             let found = if later == node {
-                format!("`${name}` is this very parameter")
+                format!("`${name}` is the parameter that is being declared")
             } else {
                 let row = later.position().row;
-                format!("`${name}` is declared only further down, in row {row}")
+                format!("`${name}` is declared only later, in row {row}")
             };
-            problem.text =
-                format!("{found}; a declaration may use parameters that are declared before it");
+            problem.text = format!(
+                "{found}; a declaration may use only parameters that are declared before it"
+            );
         }
     }
 

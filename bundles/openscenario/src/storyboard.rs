@@ -11,7 +11,7 @@ use crate::scope::ContextId;
 
 /// Kind of a storyboard element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[expect(missing_docs, reason = "the standard's words")]
+#[expect(missing_docs, reason = "names of the standard")]
 pub enum StoryKind {
     Story,
     Act,

@@ -277,17 +277,15 @@ fn faults_teach() {
     for (text, expected) in [
         (
             "${3^2}",
-            "`^` does not belong to the expression language; a power is written `pow(2, 3)`",
+            "`^` is not part of the expression language; write a power as `pow(2, 3)`",
         ),
         (
             "${Sin(3)}",
-            "`Sin` does not belong to the expression language; words are case-sensitive, it is \
-             written `sin`",
+            "`Sin` is not part of the expression language; words are case-sensitive; write `sin`",
         ),
         (
             "${3\u{a0}* 2}",
-            "the character U+00A0 does not belong to the expression language; its signs are \
-             `+ - * / % ( ) ,`",
+            "the character U+00A0 is not part of the expression language; the allowed signs are `+ - * / % ( ) ,`",
         ),
         (
             "${pow(2)}",
@@ -301,12 +299,11 @@ fn faults_teach() {
         ("${2 - $yes}", "`-` takes numbers, found a boolean"),
         (
             "${5f}",
-            "`5f` is no number: numbers are written like `2`, `0.5` or `1.5e-3`, without units \
-             and separators",
+            "`5f` is not a number: numbers are written like `2`, `0.5` or `1.5e-3`, without units and separators",
         ),
         (
             "${5}}",
-            "an expression is the whole value, but `}` follows its `}`",
+            "an expression must be the whole value, but `}` follows its `}`",
         ),
         ("${2/0}", "division by zero: the right operand of `/` is 0"),
         ("${sqrt(-9)}", "`sqrt` takes no negative number, found -9"),

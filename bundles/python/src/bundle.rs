@@ -65,7 +65,7 @@ impl Native {
             let known = FileKind::ALL.into_iter().find(|it| it.as_str() == name);
             known.ok_or_else(|| {
                 let all = FileKind::ALL.map(FileKind::as_str).join(", ");
-                PyValueError::new_err(format!("`{name}` is no kind of file; there are {all}"))
+                PyValueError::new_err(format!("`{name}` is not a file kind; the kinds are {all}"))
             })
         };
         let kinds = kinds.iter().map(kind).collect::<PyResult<Vec<_>>>()?;
@@ -108,7 +108,7 @@ impl Native {
         function: Py<PyAny>,
     ) -> PyResult<()> {
         if self.made.get().is_some() {
-            let text = "the bundle runs already: declare all rules before `main`";
+            let text = "the bundle is already running: declare all rules before `main`";
             return Err(PyRuntimeError::new_err(text));
         }
         let params = params
@@ -134,8 +134,9 @@ impl Native {
         };
         if let Some(uid) = facts.uids.iter().find(|uid| !is_rule_uid(uid)) {
             return Err(PyValueError::new_err(format!(
-                "`{uid}` is no UID: it has a domain with a dot, a standard, the version from which it holds and a name, \
-                 of letters, digits and underscores, as in `acme.example:xodr:1.0.0:road.named`"
+                "`{uid}` is not a UID: it must have a domain with a dot, a standard, the version from which it \
+                 applies and a name, of letters, digits and underscores, as in \
+                 `acme.example:xodr:1.0.0:road.named`"
             )));
         }
         if let Err(error) = facts.versions.parse::<VersionRange>() {
@@ -282,7 +283,7 @@ pub(crate) fn level_of(name: &str) -> PyResult<Level> {
         "warning" => Ok(Level::Warning),
         "information" | "info" => Ok(Level::Information),
         _ => Err(PyValueError::new_err(format!(
-            "`{name}` is no level: error, warning or information"
+            "`{name}` is not a level: use error, warning or information"
         ))),
     }
 }

@@ -91,14 +91,14 @@ impl Column {
         format!("<column of {} `{}`>", self.len(), self.format())
     }
 
-    #[expect(unsafe_code, reason = "the interface of buffers is one of C")]
+    #[expect(unsafe_code, reason = "the buffer protocol is a C interface")]
     unsafe fn __getbuffer__(
         slf: Bound<'_, Self>,
         view: *mut ffi::Py_buffer,
         flags: c_int,
     ) -> PyResult<()> {
         if view.is_null() {
-            return Err(PyBufferError::new_err("nothing to fill in"));
+            return Err(PyBufferError::new_err("the buffer view is null"));
         }
         let wants = |flag: c_int| flags & flag == flag;
         let column = slf.get();
@@ -114,7 +114,7 @@ impl Column {
         unsafe {
             (*view).obj = std::ptr::null_mut();
             if refused {
-                return Err(PyBufferError::new_err("a column is read only"));
+                return Err(PyBufferError::new_err("a column is read-only"));
             }
             (*view).buf = data.cast_mut();
             (*view).len = column.shape * column.stride;
@@ -173,7 +173,7 @@ impl Table {
         match column {
             Some((_, column)) => Ok(column.clone_ref(py)),
             None => Err(PyKeyError::new_err(format!(
-                "no column `{name}`; there are {}",
+                "no column `{name}`; the columns are {}",
                 self.keys().join(", ")
             ))),
         }

@@ -269,7 +269,7 @@ impl Element {
         let why = match name {
             "tail" => "character data between elements is not kept",
             "nsmap" | "prefix" => {
-                "elements go by their local names; there are no namespaces to look at"
+                "elements have only local names; namespaces are not available"
             }
             "set" | "append" | "remove" | "insert" | "clear" => {
                 "a document is read in place and cannot be changed"

@@ -84,7 +84,7 @@ impl Told {
         let collected = self.lock();
         match collected.over {
             true => Err(Closed::new_err(
-                "the rule has come back: what it says afterwards nobody hears",
+                "the rule has already returned: anything that it reports afterwards is lost",
             )),
             false => Ok(collected),
         }
@@ -97,7 +97,7 @@ impl Told {
         lease.hold()?;
         if !self.leases.iter().any(|own| Arc::ptr_eq(own, &lease)) {
             let text =
-                "a finding points at an element or a document of its own job, not of another";
+                "a finding must point at an element or a document of its own job, not of another";
             return Err(PyValueError::new_err(text));
         }
         Ok(Spot {
@@ -128,7 +128,8 @@ fn element_of(at: &Bound<'_, PyAny>) -> PyResult<Element> {
     }
     let what = at.get_type().name()?;
     Err(PyTypeError::new_err(format!(
-        "a finding points at an element, a road, a lane section, a lane or a document of its job, not at {what}"
+        "a finding must point at an element, a road, a lane section, a lane or a document of its job, not at \
+         {what}"
     )))
 }
 
@@ -242,7 +243,7 @@ impl Found {
         let level = level.map(level_of).transpose()?;
         if let Some(uid) = uid.as_ref().filter(|uid| !self.uids.contains(uid)) {
             let own = self.uids.join("`, `");
-            let text = format!("`{uid}` is no UID of this rule, whose are `{own}`");
+            let text = format!("`{uid}` is not a UID of this rule; its UIDs are `{own}`");
             return Err(PyValueError::new_err(text));
         }
         let mut collected = self.told.open()?;

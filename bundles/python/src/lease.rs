@@ -22,7 +22,7 @@ pyo3::create_exception!(
     qcbus,
     Closed,
     PyRuntimeError,
-    "The job that this belonged to is over, and its document is no longer there."
+    "The job that this belonged to has ended, and its document is no longer available."
 );
 
 /// Short-lived access to an open document.
@@ -75,7 +75,7 @@ impl Lease {
         let slot = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
         slot.clone().map(Glance).ok_or_else(|| {
             Closed::new_err(
-                "the job that this belonged to is over: a rule may keep texts and numbers, but no elements",
+                "the job that this belonged to has ended: a rule may keep texts and numbers, but no elements",
             )
         })
     }

@@ -374,7 +374,7 @@ fn stations<'m, 'a>(
 > {
     if !(step.is_finite() && step > 0.0) {
         return Err(PyValueError::new_err(format!(
-            "a step of {step} m leads nowhere"
+            "the step must be a finite number greater than 0 m, found {step} m"
         )));
     }
     let roads = map.roads().iter();
@@ -384,7 +384,7 @@ fn stations<'m, 'a>(
     let samples: f64 = roads.iter().map(|(_, length)| length / step + 2.0).sum();
     if samples > MOST_SAMPLES {
         return Err(PyValueError::new_err(format!(
-            "a step of {step} m makes {samples:.0} samples; at most {MOST_SAMPLES} are given at once"
+            "a step of {step} m gives {samples:.0} samples; at most {MOST_SAMPLES} are returned at once"
         )));
     }
     let along = |length: f64| {

@@ -71,7 +71,7 @@ impl Rows {
             return match column {
                 Some((_, column)) => Ok(column.clone_ref(py).into_any()),
                 None => Err(PyKeyError::new_err(format!(
-                    "no column `{name}` was asked for"
+                    "column `{name}` was not requested"
                 ))),
             };
         }

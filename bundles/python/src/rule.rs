@@ -39,7 +39,7 @@ impl<'d> Shown<'d> {
     fn open(py: Python<'_>, subject: &'d Subject<'d>) -> Result<Shown<'d>, Unbuilt> {
         if !subject.root().is_well_formed() {
             // A rule that reads only a part of the file would report no issues in the rest.
-            let why = "the file is no well-formed XML, so that only a part of it can be seen";
+            let why = "the file is not well-formed XML, so only a part of it can be read";
             return Err(Unbuilt::Broken(why.to_owned()));
         }
         let failed = |error: &dyn std::fmt::Display| Unbuilt::Failed(format!("failed to {error}"));

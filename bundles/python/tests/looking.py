@@ -23,7 +23,7 @@ def bundle_of(check: Callable[[qcbus.Document, qcbus.Found], Any], **given: Any)
 
 
 def run(bundle: qcbus.Bundle, text: str | bytes, name: str = "a.xodr") -> tuple[list[dict], list[tuple[str, str]]]:
-    """What a bundle finds in a text, and what could not look."""
+    """What a bundle finds in a text, and what could not run."""
     return bundle._native.check(name, text.encode() if isinstance(text, str) else text)
 
 

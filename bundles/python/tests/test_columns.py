@@ -125,5 +125,5 @@ def test_samples():
             look(RING, lambda doc: doc.poses(step))
     with pytest.raises(ValueError, match="samples; at most"):
         look(RING, lambda doc: doc.poses(1e-9))
-    with pytest.raises(KeyError, match="no column `z`; there are road, s, x, y, hdg, curvature"):
+    with pytest.raises(KeyError, match="no column `z`; the columns are road, s, x, y, hdg, curvature"):
         poses["z"]

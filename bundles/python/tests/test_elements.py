@@ -80,7 +80,7 @@ def test_paths():
     assert at("road", lambda it: (it.find("no"), it.findtext("userData"), it.findtext("no", "-"))) == (
         None, "some <text>", "-",
     )
-    with pytest.raises(ValueError, match="follow the XPath 'road\\[': expected .* at character 6"):
+    with pytest.raises(ValueError, match="evaluate the XPath 'road\\[': expected .* at character 6"):
         look(MAP, lambda doc: doc.find("road["))
 
 

@@ -91,7 +91,7 @@ def test_no_rule_looks_at_half_a_file(text):
 
     said, [(checker, why)] = run(bundle_of(check), text)
     assert (said, checker) == ([], "check_looking_looks")
-    assert why == "the file is no well-formed XML, so that only a part of it can be seen"
+    assert why == "the file is not well-formed XML, so only a part of it can be read"
 
 
 def test_what_is_said_after_the_rule_has_come_back_is_refused():

@@ -103,17 +103,17 @@ fn say_later(later: &Later<'_>, stated: Option<Version>, found: &mut Sink<'_>) {
     };
     let more = match later.count.saturating_sub(1) {
         0 => String::new(),
-        1 => ", and one more thing that came later".to_owned(),
-        more => format!(", and {more} more things that came later"),
+        1 => ", and one more feature of a later version".to_owned(),
+        more => format!(", and {more} more features of later versions"),
     };
     let text = format!(
-        "the header says version {stated}, but the file uses {}, which came with version {} ({wherein}){more}; \
-         let `revMinor` be {}, or do without",
+        "the header says version {stated}, but the file uses {}, which was introduced in version {} \
+         ({wherein}){more}; set `revMinor` to {}, or remove the newer features",
         newest.what, newest.since, later.version.minor
     );
     let mut finding = found.issue(later.header, text);
     for thing in later.things.iter().take(MOST_SHOWN) {
-        let what = format!("{}, of version {}", thing.what, thing.since);
+        let what = format!("{}, introduced in version {}", thing.what, thing.since);
         finding = match thing.attribute {
             Some(attribute) => finding.at(attribute, what),
             None => finding.at(thing.node, what),
@@ -180,7 +180,7 @@ fn newer_than<'a>(later: &Later<'a>, stated: Version) -> impl Iterator<Item = Br
     let things = later.things.iter();
     things.flat_map(move |thing| {
         let text = format!(
-            "{} came with version {}, but its header says {stated}",
+            "{} was introduced in version {}, but the header of its file says {stated}",
             thing.what, thing.since
         );
         let name = thing.attribute.map(|attribute| attribute.name());

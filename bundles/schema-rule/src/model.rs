@@ -52,7 +52,7 @@ fn unbuilt(reason: &SkipReason) -> Unbuilt {
 pub(crate) const SCHEMA_DIR: Param = Param::text(
     "schemaDir",
     "",
-    "directory of schemas (.xsd, .tbl) that are used instead of those that come with qcbus",
+    "directory with schemas (.xsd, .tbl) to use instead of those shipped with qcbus",
 );
 
 /// The user's schemas. They are read and compiled before the first check.

@@ -108,7 +108,7 @@ impl Checked<'_> {
         if self.sources.is_empty() {
             return vec![fact(
                 self.schema.clone(),
-                "the schema that the file was compared with; it comes with qcbus",
+                "schema that was used to check the file; shipped with qcbus",
             )];
         }
         let files = self.sources.iter();
@@ -116,7 +116,7 @@ impl Checked<'_> {
             .map(|file| {
                 fact(
                     format!("{} sha256:{}", file.path, file.sha256),
-                    "a file of the schema that the file was compared with, given by the user",
+                    "file of the schema that was used to check the file; given by the user",
                 )
             })
             .collect()

@@ -26,15 +26,15 @@ pub(crate) const CROSS_SECTION: &str =
 pub(crate) fn explanation(node: Node<'_>, condition: &str) -> Option<String> {
     let fixed = match condition {
         COMPLETE_OUTLINE => {
-            "with useCompleteOutline there may be no <cornerReference>, without it there must be at least two"
+            "with useCompleteOutline, <cornerReference> is not allowed; without it, at least two are required"
         }
         SIDE => {
-            "with the attribute side there may be no <cornerReference>, without it there must be at least two"
+            "with the attribute side, <cornerReference> is not allowed; without it, at least two are required"
         }
         MULTI_BOARD => {
             "a signal of type multiBoard must be dynamic and have at least one <vmsBoard> and one <staticBoard>"
         }
-        CONNECTION_IDS => "two <connection> of this junction have the same id",
+        CONNECTION_IDS => "two <connection> elements of this junction have the same id",
         BORDER_AND_OFFSET => "lanes may be described by <laneOffset> or by <border>, not by both",
         RADIUS => return Some(radius(node)),
         CROSS_SECTION => "<crossSectionSurface> excludes <superelevation> and <shape>",
@@ -50,21 +50,24 @@ fn radius(object: Node<'_>) -> String {
         .filter(|name| object.attribute(name).is_some())
         .collect();
     format!(
-        "it has {}, but an object has either radius, or both width and length, or none of them",
+        "it has {}; an object must have either radius, or both width and length, or none of them",
         there.join(" and ")
     )
 }
 
 /// Conditions on the distance of repeated objects, with their explanation.
 const DISTANCES: [(&str, &str); 3] = [
-    ("(= repeat/@distance 0)", "0, for it goes on without gaps"),
+    (
+        "(= repeat/@distance 0)",
+        "0, because the object continues without gaps",
+    ),
     (
         "(> repeat/@distance 0)",
-        "greater than 0, for there are single copies",
+        "greater than 0, because the copies are separate",
     ),
     (
         "(!= repeat/@distance 0)",
-        "other than 0, for there are single copies",
+        "different from 0, because the copies are separate",
     ),
 ];
 
@@ -93,11 +96,11 @@ fn by_type(node: Node<'_>, condition: &str) -> Option<String> {
             .find(|(test, _)| condition.contains(test))
             .map_or("another", |(_, allowed)| allowed);
         return Some(format!(
-            "the distance \"{distance}\" of <repeat> does not suit an object of type {ty}; it must be {allowed}"
+            "the distance \"{distance}\" of <repeat> is invalid for an object of type {ty}; it must be {allowed}"
         ));
     }
     Some(format!(
-        "an object of type {ty} may not have {}",
+        "an object of type {ty} must not have {}",
         banned.join(", ")
     ))
 }
@@ -109,11 +112,12 @@ pub(crate) fn condition(node: Node<'_>, condition: &str) -> Option<&'static str>
             let references = node.children_named("cornerReference").count();
             match node.attr("useCompleteOutline") {
                 Some("false") if references > 1 => Some(
-                    "it asks whether useCompleteOutline is there, not whether it is true, \
-                     so \"false\" with corner references is rejected although the standard allows it",
+                    "it tests whether useCompleteOutline is present, not whether it is true; \"false\" with \
+                     corner references is rejected although the standard allows it",
                 ),
                 None if references == 0 => Some(
-                    "useCompleteOutline may be left out by the standard, but the schema then demands corner references",
+                    "useCompleteOutline is optional in the standard, but without it the schema requires corner \
+                     references",
                 ),
                 _ => None,
             }
@@ -121,7 +125,8 @@ pub(crate) fn condition(node: Node<'_>, condition: &str) -> Option<&'static str>
         MULTI_BOARD => {
             let complete = node.child("vmsBoard").is_some() && node.child("staticBoard").is_some();
             (complete && node.attr("dynamic") == Some("yes")).then_some(
-                "it compares dynamic, whose values are yes and no, with the boolean true, so no such signal is valid",
+                "it compares dynamic, whose values are yes and no, with the boolean true; therefore no such \
+                 signal is valid",
             )
         }
         _ => None,
@@ -136,19 +141,23 @@ pub(crate) fn missing_child(
 ) -> Option<&'static str> {
     if names.iter().any(|name| name == "_OpenDriveElement") {
         return Some(
-            "it demands a child <_OpenDriveElement>, the name of an internal base type that no file can be meant to contain",
+            "it requires a child <_OpenDriveElement>, which is the name of an internal base type and not meant \
+             for files",
         );
     }
     let profile = parent.is("elevationProfile") || parent.is("lateralProfile");
     if profile && matches!(title, "OpenDRIVE 1.4" | "OpenDRIVE 1.5") {
         return Some(
-            "it demands records of a profile that may be left out, so that an empty one, which says the same, is rejected",
+            "it requires records in a profile that may be omitted; an empty profile, which means the same, is \
+             rejected",
         );
     }
     let alternatives = ALTERNATIVES.iter().find(|(name, _)| parent.is(name));
     let one_is_there = |both: &[&str; 2]| both.iter().any(|one| parent.child(one).is_some());
     (title == "OpenSCENARIO 1.2" && alternatives.is_some_and(|(_, both)| one_is_there(both)))
-        .then_some("it demands both children in a row, where the standard has one or the other")
+        .then_some(
+            "it requires both children in sequence, but the standard requires one or the other",
+        )
 }
 
 /// Returns the defect of the schema with this title that causes a misplaced child, if any.
@@ -162,7 +171,7 @@ pub(crate) fn misplaced_child(
         .any(|name| child.is(name));
     let either = matches!(title, "OpenDRIVE 1.5" | "OpenDRIVE 1.6");
     (either && parent.is("geometry") && is_addition).then_some(
-        "it takes additional data in place of a curve only, where the other versions take them beside it",
+        "it allows additional data only instead of a curve; the other versions allow it beside the curve",
     )
 }
 
@@ -171,7 +180,7 @@ pub(crate) fn misplaced_child(
 pub(crate) fn children_of_none(parent: Node<'_>, title: &str) -> Option<&'static str> {
     let is_old = matches!(title, "OpenDRIVE 1.1" | "OpenDRIVE 1.2");
     (is_old && parent.is("userData")).then_some(
-        "it takes no elements within userData, where later versions take whatever an application needs",
+        "it allows no elements in userData; later versions allow whatever an application needs",
     )
 }
 
@@ -195,7 +204,8 @@ pub(crate) fn attribute(code: Code, attribute: Attribute<'_>, title: &str) -> Op
             if attribute.name() == "level" && is_in_center(attribute.node()) =>
         {
             Some(
-                "it knows level at the lanes on both sides, but not at the center lane, where files have it as well",
+                "it allows level on the lanes of both sides, but not on the center lane, where files have it as \
+                 well",
             )
         }
         (Code::UnexpectedAttribute, "OpenDRIVE 1.2")
@@ -204,13 +214,16 @@ pub(crate) fn attribute(code: Code, attribute: Attribute<'_>, title: &str) -> Op
                 && attribute.node().parent().is_some_and(is_in_center) =>
         {
             Some(
-                "it knows laneChange at the lanes on both sides, but not at the center lane, where it means the same",
+                "it allows laneChange on the lanes of both sides, but not on the center lane, where it means the \
+                 same",
             )
         }
         (Code::UnexpectedAttribute, "OpenDRIVE 1.1" | "OpenDRIVE 1.2")
             if attribute.name() == "signalId" && attribute.node().is("control") =>
         {
-            Some("it spells signalID what all files and the later versions spell signalId")
+            Some(
+                "it spells the attribute signalID; all files and the later versions spell it signalId",
+            )
         }
         _ => None,
     }
@@ -250,28 +263,29 @@ const LANE_TYPES: [&str; 23] = [
 fn value(attribute: Attribute<'_>, title: &str) -> Option<&'static str> {
     let (node, word) = (attribute.node(), attribute.value().trim());
     match (title, attribute.name()) {
-        ("OpenDRIVE 1.1", "type") if node.is("lane") && LANE_TYPES.contains(&word) => Some(
-            "it has numbers for the types of lanes, where the standard and all files have words",
-        ),
-        ("OpenDRIVE 1.1", "type") if node.is("object") && is_word(word) => Some(
-            "it has numbers for the types of objects, where files and the later versions have words",
-        ),
-        ("OpenDRIVE 1.1", "type") if node.is("signal") && is_word(word) => Some(
-            "it has numbers for the types of signals, where files and the later versions have words",
-        ),
+        ("OpenDRIVE 1.1", "type") if node.is("lane") && LANE_TYPES.contains(&word) => {
+            Some("it uses numbers for the types of lanes; the standard and all files use words")
+        }
+        ("OpenDRIVE 1.1", "type") if node.is("object") && is_word(word) => {
+            Some("it uses numbers for the types of objects; files and the later versions use words")
+        }
+        ("OpenDRIVE 1.1", "type") if node.is("signal") && is_word(word) => {
+            Some("it uses numbers for the types of signals; files and the later versions use words")
+        }
         ("OpenDRIVE 1.1", "id") if (node.is("object") || node.is("signal")) && is_word(word) => {
             Some(
-                "it has numbers for the ids of objects and signals, where files and the later versions have any text",
+                "it uses numbers for the ids of objects and signals; files and the later versions use any text",
             )
         }
         ("OpenDRIVE 1.1", "level") if node.is("lane") && matches!(word, "true" | "false") => {
-            Some("it has numbers for level, where the standard and all files have true and false")
+            Some("it uses numbers for level; the standard and all files use true and false")
         }
         ("OpenDRIVE 1.4", "max") if node.is("speed") && is_decimal(word) => Some(
-            "it takes whole numbers only, although speeds in m/s seldom are any; later versions take decimals",
+            "it allows only whole numbers, although speeds in m/s are seldom whole; later versions allow \
+             decimals",
         ),
         ("OpenDRIVE 1.8.1", "sStart" | "sEnd") if node.is("segment") && word == "begin" => {
-            Some("it takes start, where the standard's text and examples have begin")
+            Some("it uses start; the text and the examples of the standard use begin")
         }
         _ => None,
     }

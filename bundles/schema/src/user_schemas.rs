@@ -57,14 +57,14 @@ pub enum UserSchemaError {
     },
     /// The schema is for neither standard.
     #[error(
-        "use the schema {0}: it declares neither <OpenDRIVE> nor <OpenSCENARIO> as a root element; \
-         an XSD that belongs to another one is named there by xs:include and lies in the same directory"
+        "use the schema {0}: it declares neither <OpenDRIVE> nor <OpenSCENARIO> as a root element; an XSD that \
+         is part of another one must be included there by xs:include and be in the same directory"
     )]
     NoKnownRoot(String),
     /// Two schemas for the same files.
     #[error(
-        "choose a schema: {first} and {second} are both for {what}; the version is taken from the \
-         names of file and directory, such as 1.7/map.xsd"
+        "choose a schema: {first} and {second} are both for {what}; the version is taken from the file and \
+         directory names, such as 1.7/map.xsd"
     )]
     Ambiguous {
         /// First schema.
@@ -176,7 +176,7 @@ fn tables(file: &UserSchemaFile<'_>, bytes: &[u8]) -> Result<Schema, UserSchemaE
         let before = bytes.get(..error.valid_up_to()).unwrap_or_default();
         broken(NotationError {
             line: before.iter().filter(|byte| **byte == b'\n').count() + 1,
-            what: "it is no UTF-8 text".to_owned(),
+            what: "the file is not UTF-8 text".to_owned(),
         })
     })?;
     Schema::from_notation(text).map_err(broken)

@@ -115,7 +115,7 @@ pub(crate) fn is_known_elsewhere(schema: &Schema, parent: &str, child: &str) -> 
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SkipReason {
     /// The header or its version is missing, or the version is not a number.
-    #[error("the file header names no version, so no schema can be chosen")]
+    #[error("the file header states no valid version, so no schema can be chosen")]
     NoVersion,
     /// Versions before 1.0 have no published schema.
     #[error("version {0} has no published schema: major version 0")]
@@ -124,10 +124,10 @@ pub enum SkipReason {
     #[error("version {0} has no published schema")]
     NoSchema(Version),
     /// The tables cannot be used.
-    #[error("the tables could not be used: failed to {0}")]
+    #[error("the tables cannot be used: failed to {0}")]
     Tables(NotationError),
     /// The file is not well-formed, so the tree is partial.
-    #[error("the file is not well-formed XML, so only part of it is known")]
+    #[error("the file is not well-formed XML, so only a part of it can be read")]
     IllFormed,
 }
 

@@ -43,20 +43,20 @@ impl Code {
     pub fn about(self, subject: &str) -> String {
         match self {
             Code::UnknownRoot => format!("`{subject}` as the root element"),
-            Code::UnexpectedElement => format!("`{subject}` where it is not known"),
+            Code::UnexpectedElement => format!("`{subject}` where it is not allowed"),
             Code::MisplacedElement => format!("`{subject}` in the wrong place"),
             Code::RepeatedElement => format!("`{subject}` more often than allowed"),
-            Code::MissingElement => format!("what is missing in or before `{subject}`"),
+            Code::MissingElement => format!("missing elements in or before `{subject}`"),
             Code::UnexpectedAttribute => format!("the unknown attribute `{subject}`"),
             Code::MissingAttribute => format!("missing attributes of `{subject}`"),
-            Code::InvalidValue => format!("values of `{subject}` that do not fit"),
-            Code::InvalidText => format!("text of `{subject}` that does not fit"),
+            Code::InvalidValue => format!("invalid values of `{subject}`"),
+            Code::InvalidText => format!("invalid text of `{subject}`"),
             Code::UnexpectedText => format!("text in `{subject}`"),
-            Code::UnknownType => format!("`{subject}` of no known type"),
-            Code::ConditionFailed => format!("conditions that `{subject}` breaks"),
-            Code::DuplicateKey => format!("`{subject}` with a key that occurs twice"),
+            Code::UnknownType => format!("`{subject}` with an unknown type"),
+            Code::ConditionFailed => format!("conditions that `{subject}` violates"),
+            Code::DuplicateKey => format!("`{subject}` with a duplicate key"),
             Code::MissingKey => format!("`{subject}` without its key"),
-            Code::DanglingReference => format!("`{subject}` that refers to nothing"),
+            Code::DanglingReference => format!("`{subject}` with an undefined target"),
         }
     }
 

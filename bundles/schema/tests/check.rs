@@ -244,7 +244,7 @@ fn messages_say_where_a_late_child_belongs_and_what_a_short_attribute_meant() {
     );
     assert_eq!(
         found("<a from='1'/>"),
-        ["Test knows no attribute `from` of `a`; did you mean \"fromLane\"?"]
+        ["Test defines no attribute `from` for `a`; did you mean \"fromLane\"?"]
     );
     assert_eq!(found("<a/>").len(), 1);
 }

@@ -148,7 +148,7 @@ fn children_that_do_not_fit_are_told_apart() {
         ),
         (
             "<c/><d/><e/>",
-            Some("<e> cannot stand beside <d>: <a> takes one or the other"),
+            Some("<e> cannot occur together with <d>: <a> takes one or the other"),
         ),
         (
             "<c/><e/><e/>",
@@ -186,7 +186,7 @@ fn violations_teach() {
     assert!(texts.contains(&"<road> lacks <lanes>"), "{texts:?}");
     assert!(
         texts[0].contains(
-            "length=\"abc\" of <road> does not fit, it must be a number greater than 0.0 (double)"
+            "length=\"abc\" of <road> is invalid; it must be a number greater than 0.0 (double)"
         ),
         "{texts:?}"
     );
@@ -200,8 +200,7 @@ fn violations_teach() {
         (
             "xmlns:xsi='http://www.w3.org/2001/XMLSchema' xsi:noNamespaceSchemaLocation='a.xsd'",
             Some(
-                "xsi:noNamespaceSchemaLocation of <OpenDRIVE> means nothing: \
-                 xmlns:xsi must be \"http://www.w3.org/2001/XMLSchema-instance\"",
+                "xsi:noNamespaceSchemaLocation of <OpenDRIVE> has no meaning: xmlns:xsi must be \"http://www.w3.org/2001/XMLSchema-instance\"",
             ),
         ),
         (
@@ -210,7 +209,9 @@ fn violations_teach() {
         ),
         (
             "version='1.7'",
-            Some("OpenDRIVE 1.7 knows no attribute `version` of `OpenDRIVE`, which has none"),
+            Some(
+                "OpenDRIVE 1.7 defines no attribute `version` for `OpenDRIVE`, which has no attributes",
+            ),
         ),
     ] {
         let text = road("").replacen("<OpenDRIVE", &format!("<OpenDRIVE {attributes}"), 1);

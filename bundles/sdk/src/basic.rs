@@ -71,14 +71,14 @@ pub fn version_is_defined(document: &Document<'_>, header: &str, found: &mut Sin
     let wrong = ["revMajor", "revMinor"].map(|attribute| match header.attr(attribute) {
         None => Some(format!("has no `{attribute}`")),
         Some(text) if revision(text).is_none() => Some(format!(
-            "says `{attribute}=\"{text}\"`, which is no whole number from 0 to 65535"
+            "says `{attribute}=\"{text}\"`, which is not a whole number from 0 to 65535"
         )),
         Some(_) => None,
     });
     let wrong: Vec<String> = wrong.into_iter().flatten().collect();
     if !wrong.is_empty() {
         let text = format!(
-            "the element `{name}` {}; both must name the version of the standard",
+            "the element `{name}` {}; both attributes must state the version of the standard",
             wrong.join(" and ")
         );
         found.issue(Place::Node(header), text);

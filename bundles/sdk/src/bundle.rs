@@ -183,7 +183,7 @@ fn checkers_of(rule: &'static dyn AnyRule) -> Vec<Checker> {
         id: format!("{}{BACKPORT_SUFFIX}", facts.id),
         is_backport: true,
         description: format!(
-            "In versions before the rule was made: {}",
+            "In versions before the rule was introduced: {}",
             plain.description
         ),
         ..plain.clone()

@@ -29,7 +29,7 @@ pub struct Loaded {
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// The name does not belong to any kind of file that can be checked.
-    #[error("check {}: its name ends in none of {}", to_text(.0), Suffix::list())]
+    #[error("check {}: its name must end in one of {}", to_text(.0), Suffix::list())]
     UnknownKind(PathBuf),
     /// The file cannot be read at all.
     #[error("{error}")]

@@ -119,7 +119,7 @@ pub const MAX_ISSUES: Param = Param::number(
     "qcbus.max_issues",
     1000.0,
     "",
-    "how many findings of this checker are listed; the rest is counted",
+    "maximum number of listed findings of this checker; further findings are only counted",
 );
 
 /// A configured value that is invalid for its parameter.

@@ -55,7 +55,8 @@ pub enum ResourceError {
     },
     /// More files or deeper directories than expected.
     #[error(
-        "read {path}: it has more than {most} files, or directories nested deeper than {deepest}; is it the right one?"
+        "read {path}: it has more than {most} files, or directories nested deeper than {deepest}; check that it \
+         is the right directory"
     )]
     TooMuch {
         /// The directory.
@@ -66,7 +67,7 @@ pub enum ResourceError {
         deepest: usize,
     },
     /// No rule of the bundle takes files.
-    #[error("bring files to {0}: none of its rules takes any")]
+    #[error("pass files to {0}: none of its rules accepts any")]
     NotTaken(&'static str),
     /// The files were read but cannot be used.
     #[error("{0}")]

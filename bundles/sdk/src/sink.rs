@@ -181,7 +181,7 @@ impl<'d> Sink<'d> {
                 .kept
                 .filter(|_| is_other && known.more <= MOST_REFERENCES);
             if let Some(kept) = shown.and_then(|kept| self.kept.get_mut(kept)) {
-                let what = "a further reference that leads there";
+                let what = "another reference to this place";
                 let spot = locate(self.subject, &Place::Node(reference), Some(what));
                 kept.issue.locations.push(spot.locations);
             }
@@ -318,8 +318,8 @@ impl<'d> Sink<'d> {
             let unsaid = behind.more.saturating_sub(MOST_REFERENCES);
             if let Some(Kept { issue, .. }) = finding.filter(|_| unsaid > 0) {
                 let text = match unsaid {
-                    1 => "; one more reference leads there".to_owned(),
-                    unsaid => format!("; {unsaid} more references lead there"),
+                    1 => "; one more reference leads to this place".to_owned(),
+                    unsaid => format!("; {unsaid} more references lead to this place"),
                 };
                 issue.description.push_str(&text);
             }
@@ -333,7 +333,7 @@ impl<'d> Sink<'d> {
         let limit = self.limit();
         let count = suppressed.count;
         let text = format!(
-            "{count} further findings of this checker are not listed, because it lists {limit} \
+            "{count} further findings of this checker are not listed, because it lists at most {limit} \
              (parameter `{}`)",
             MAX_ISSUES.name
         );
@@ -345,7 +345,7 @@ impl<'d> Sink<'d> {
         let metadata = Metadata {
             key: qcbus_formats::pool::NOT_LISTED.to_owned(),
             value: count.to_string(),
-            description: "findings beyond the number that this checker lists".to_owned(),
+            description: "number of findings that this checker does not list".to_owned(),
         };
         facts.push(metadata);
         (issues, facts)
@@ -362,7 +362,7 @@ impl<'d> Sink<'d> {
             count: 0,
             worst: Level::Information,
             last: Level::Information,
-            first: locate(subject, place, Some("the first that is not listed")),
+            first: locate(subject, place, Some("the first finding that is not listed")),
         });
         suppressed.count += 1;
         suppressed.worst = suppressed.worst.min(suppressed.last);
@@ -490,7 +490,7 @@ impl Finding<'_, '_> {
     pub fn uid(self, uid: &str) -> Self {
         debug_assert!(
             self.facts.uids.contains(&uid),
-            "{uid} is no UID of {}",
+            "{uid} is not a UID of {}",
             self.facts.id
         );
         uid.clone_into(&mut self.issue.rule_uid);

@@ -38,7 +38,9 @@ impl fmt::Display for Version {
 
 /// Reason why a text is not a valid version or range of versions.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is no version range such as `1.7.0..`, `1.4.0..1.8.0`, `..=1.6.0` or nothing")]
+#[error(
+    "expected a version range such as `1.7.0..`, `1.4.0..1.8.0`, `..=1.6.0` or nothing, found `{0}`"
+)]
 pub struct VersionError(String);
 
 impl FromStr for Version {

@@ -242,7 +242,7 @@ fn preconditions_hold_transitively_even_when_not_demanded() {
 fn versions_gate_and_backports_lower() {
     assert_eq!(
         of("newer").reason(),
-        "the rule applies to OpenDRIVE 1.8 and later; the file is 1.4"
+        "the rule applies to OpenDRIVE 1.8 and later; the file has version 1.4"
     );
     let lowered = of("lowered");
     assert_eq!(lowered.issues[0].level, Level::Warning);

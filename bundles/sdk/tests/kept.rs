@@ -180,7 +180,7 @@ impl Broker {
                         said.extend(issues.into_iter().map(|issue| issue.description));
                     }
                     FromPeer::JobDone { .. } => return said,
-                    FromPeer::NeedDocument { doc } => panic!("{doc:?} is not there"),
+                    FromPeer::NeedDocument { doc } => panic!("{doc:?} is not available"),
                     _ => {}
                 },
                 other => panic!("{other:?}"),

@@ -9,7 +9,7 @@
     clippy::panic,
     clippy::print_stdout,
     clippy::unwrap_used,
-    reason = "a test may fail and tell what it tried"
+    reason = "a test may panic and report what it tried"
 )]
 
 #[path = "mutation/edit.rs"]

@@ -18,7 +18,7 @@ impl Model for Scene {
     fn build<'d>(subject: &'d Subject<'d>) -> Result<Scenario<'d>, Unbuilt> {
         if let Some(version) = subject.version().filter(|version| version.major != 1) {
             // The same name may mean something else in another version of the language.
-            let why = format!("OpenSCENARIO {version} is not known, only 1.0 to 1.4 are");
+            let why = format!("OpenSCENARIO {version} is not supported, only 1.0 to 1.4 are");
             return Err(Unbuilt::Broken(why));
         }
         let inputs = Inputs {
@@ -126,7 +126,7 @@ impl<'d> About<'d> for Sink<'d> {
             return self.issue(place, text);
         };
         let entry = entry.attr("name").unwrap_or("");
-        let text = format!("in the catalog's entry `{entry}`: {}", text.into());
+        let text = format!("in the catalog entry `{entry}`: {}", text.into());
         self.issue_behind(reference, place, text)
     }
 }

@@ -7,7 +7,10 @@
 //! `QCBUS_MUTATE=NAME` tries the edits of the rules whose name contains it, and prints the results
 //! of each.
 
-#![expect(clippy::unwrap_used, reason = "a test may fail and tell what it tried")]
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test may panic and report what it tried"
+)]
 
 #[path = "mutation/list.rs"]
 mod list;

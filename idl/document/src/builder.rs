@@ -24,7 +24,7 @@ use names::Names;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum BuildError {
     /// The number of items exceeds its capacity.
-    #[error("build the document image: no room for more {what} than {capacity}")]
+    #[error("build the document image: there is no room for more than {capacity} {what}")]
     NoRoom {
         /// The kind of item.
         what: &'static str,
@@ -52,7 +52,7 @@ pub enum BuildError {
     )]
     TooManyNames,
     /// A range is outside of the text written so far.
-    #[error("build the document image: {offset} + {len} lies outside of the text")]
+    #[error("build the document image: {offset} + {len} is outside the text")]
     OutsideText {
         /// Its offset.
         offset: u32,
@@ -60,7 +60,7 @@ pub enum BuildError {
         len: u32,
     },
     /// An event is invalid at this point, such as an end without a start or a second root.
-    #[error("build the document image: {event} cannot come here")]
+    #[error("build the document image: {event} is not allowed here")]
     Misplaced {
         /// The event.
         event: &'static str,

@@ -31,7 +31,7 @@ pub enum ImageError {
         needed: u64,
     },
     /// The magic number is missing.
-    #[error("read the document image: these bytes are something else")]
+    #[error("read the document image: the magic number is missing")]
     NotAnImage,
     /// The image was written by another version of qcbus.
     #[error(
@@ -44,13 +44,13 @@ pub enum ImageError {
         expected: u32,
     },
     /// A section is outside of the image, is misaligned, or is not a whole number of records.
-    #[error("read the document image: the section of {section} is out of place")]
+    #[error("read the document image: the position or size of section {section} is invalid")]
     Section {
         /// Name of the section.
         section: &'static str,
     },
     /// A record contradicts another one.
-    #[error("trust the document image: {what} (record {index} of {section})")]
+    #[error("validate the document image: {what} (record {index} of {section})")]
     Contradiction {
         /// The section of the record.
         section: &'static str,
@@ -130,7 +130,7 @@ impl<'a> Document<'a> {
     /// Returns the number of nodes: elements and runs of character data.
     #[expect(
         clippy::len_without_is_empty,
-        reason = "a document without nodes is asked for its root"
+        reason = "a document without nodes has no root, so callers ask for the root"
     )]
     pub fn len(&self) -> u32 {
         let bytes = self.header.extents[Section::Nodes as usize].len.get();
@@ -347,7 +347,7 @@ fn str_at(bytes: &[u8], offset: u32, len: u32) -> Option<&str> {
     if bytes.len() <= SHORT && is_ascii(bytes) {
         #[expect(
             unsafe_code,
-            reason = "the standard library looks at short texts for four times as long"
+            reason = "the standard library takes four times as long for short texts"
         )]
         // SAFETY: every byte was just checked to be ASCII, which is valid UTF-8. No earlier check
         // and no result of `validate` is used. As everywhere, a `&[u8]` does not change while it is

@@ -100,7 +100,7 @@ impl<'a> Image<'a> {
             let start = source.start.get() as usize;
             check(
                 start == expected,
-                "the file does not start where the one before ends",
+                "the file does not start where the previous one ends",
             )?;
             check(
                 index == 0 || self.text.get(end) == Some(&b'\n'),
@@ -117,7 +117,7 @@ impl<'a> Image<'a> {
             end == self.text.len(),
             Section::Sources,
             self.sources.len(),
-            "the text belongs to no file",
+            "the end of the text belongs to no file",
         )
     }
 
@@ -138,7 +138,7 @@ impl<'a> Image<'a> {
             } else {
                 decoded += decodable(self.text, decoded, stop)?;
             }
-            let what = "lines or characters are miscounted";
+            let what = "lines or characters are counted incorrectly";
             demand(known.next() == Some(&line), Section::Lines, index, what)?;
         }
         self.is_ascii = is_ascii;
@@ -146,7 +146,7 @@ impl<'a> Image<'a> {
             known.next().is_none(),
             Section::Lines,
             self.lines.len(),
-            "there are more than the text has",
+            "there are more records than the text needs",
         )
     }
 
@@ -155,7 +155,7 @@ impl<'a> Image<'a> {
             self.order.len() == self.names.len(),
             Section::NameOrder,
             0,
-            "not every name has a place",
+            "the number of entries differs from the number of names",
         )?;
         demand(
             self.names.len() <= crate::Capacities::MAX_NAMES,
@@ -211,15 +211,15 @@ impl<'a> Image<'a> {
                 let posting = next_posting.get_mut(usize::from(node.name.get()));
                 check(
                     posting.is_some_and(|posting| self.is_posted(posting, index)),
-                    "it is not posted under its name",
+                    "it has no posting under its name",
                 )?;
                 check(
                     self.is_text(node.start.get() as usize, node.start.get() as usize),
-                    "it starts outside of the text",
+                    "it starts outside the text",
                 )?;
                 check(
                     self.is_text(node.stop.get() as usize, node.stop.get() as usize),
-                    "it ends outside of the text",
+                    "it ends outside the text",
                 )?;
             } else {
                 check(
@@ -233,7 +233,7 @@ impl<'a> Image<'a> {
             }
             check(
                 end as usize > index && end <= len,
-                "the subtree ends outside of the document",
+                "the subtree ends outside the document",
             )?;
             check(self.is_nested(index, node), "it is not within its parent")?;
         }
@@ -247,7 +247,7 @@ impl<'a> Image<'a> {
             self.postings.len() == elements,
             Section::Postings,
             elements,
-            "more is posted than there is",
+            "there are more postings than elements",
         )
     }
 
@@ -256,7 +256,7 @@ impl<'a> Image<'a> {
         let mut first = 0;
         let mut ranges = Vec::with_capacity(self.names.len());
         for (id, name) in self.names.iter().enumerate() {
-            let what = "its elements do not follow those of the name before";
+            let what = "its elements do not follow those of the previous name";
             demand(
                 name.first_posting.get() as usize == first,
                 Section::Names,
@@ -271,7 +271,7 @@ impl<'a> Image<'a> {
             first == self.postings.len(),
             Section::Postings,
             first,
-            "not every posting has a name",
+            "not every posting belongs to a name",
         )?;
         Ok(ranges)
     }
@@ -402,7 +402,7 @@ fn decodable(text: &[u8], start: usize, stop: usize) -> Result<usize, ImageError
         Err(wrong) => Err(ImageError::Contradiction {
             section: Section::Text.name(),
             index: (start + wrong.valid_up_to()) as u64,
-            what: "the text is no UTF-8",
+            what: "the text is not valid UTF-8",
         }),
     }
 }

@@ -116,13 +116,13 @@ impl NumberKind {
     fn teach_spelling(self, value: &str, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let value = trim(value);
         if value.is_empty() {
-            return f.write_str("where a number is needed");
+            return f.write_str("but a number is expected");
         }
         match self {
             NumberKind::Double
                 if value.contains(',') && parse_double(&value.replace(',', ".")).is_ok() =>
             {
-                f.write_str("which is no number: the decimal separator is a point, as in 12.5")
+                f.write_str("which is not a number: the decimal separator is a point, as in 12.5")
             }
             NumberKind::Double
                 if matches!(
@@ -130,18 +130,22 @@ impl NumberKind {
                     "inf" | "-inf" | "infinity" | "-infinity" | "nan"
                 ) =>
             {
-                f.write_str("which is no number: write INF, -INF or NaN, in exactly these letters")
+                f.write_str(
+                    "which is not a number: write INF, -INF or NaN, in exactly this spelling",
+                )
             }
-            NumberKind::Double => f.write_str("which is no number; write it like 12.5 or -1.25e-3"),
-            NumberKind::Integer => f.write_str("which is no integer; write it like 12 or -3"),
+            NumberKind::Double => {
+                f.write_str("which is not a number; write it like 12.5 or -1.25e-3")
+            }
+            NumberKind::Integer => f.write_str("which is not an integer; write it like 12 or -3"),
         }
     }
 
     fn range(self) -> &'static str {
         match self {
-            NumberKind::Double => "beyond the largest double, about 1.8e308",
+            NumberKind::Double => "which is beyond the largest double, about 1.8e308",
             NumberKind::Integer => {
-                "beyond the 64-bit integers, -9223372036854775808 to 9223372036854775807"
+                "which is outside the range of 64-bit integers, -9223372036854775808 to 9223372036854775807"
             }
         }
     }

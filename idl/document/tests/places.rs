@@ -210,18 +210,18 @@ fn an_xpath_is_followed_from_an_element() {
                 .to_string()
         };
         for (xpath, expected) in [
-            ("", "follow the XPath '': expected '/' at character 1"),
+            ("", "evaluate the XPath '': expected '/' at character 1"),
             (
                 "../a[",
-                "follow the XPath '../a[': expected a number, 'last()', 'local-name()' or '@' at character 6",
+                "evaluate the XPath '../a[': expected a number, 'last()', 'local-name()' or '@' at character 6",
             ),
             (
                 "a[",
-                "follow the XPath 'a[': expected a number, 'last()', 'local-name()' or '@' at character 3",
+                "evaluate the XPath 'a[': expected a number, 'last()', 'local-name()' or '@' at character 3",
             ),
             (
                 "...",
-                "follow the XPath '...': expected the name of an element, or '*' at character 1",
+                "evaluate the XPath '...': expected the name of an element, or '*' at character 1",
             ),
         ] {
             assert_eq!(said(xpath), expected);
@@ -233,26 +233,26 @@ fn an_xpath_is_followed_from_an_element() {
 fn what_is_not_understood_is_said_where_it_stands() {
     with_document(&Tree::new("a"), |document| {
         for (xpath, said) in [
-            ("", "follow the XPath '': expected '/' at character 1"),
+            ("", "evaluate the XPath '': expected '/' at character 1"),
             (
                 "/a[",
-                "follow the XPath '/a[': expected a number, 'last()', 'local-name()' or '@' at character 4",
+                "evaluate the XPath '/a[': expected a number, 'last()', 'local-name()' or '@' at character 4",
             ),
             (
                 "/ä[@b='c]",
-                "follow the XPath '/ä[@b='c]': expected a closing quote at character 8",
+                "evaluate the XPath '/ä[@b='c]': expected a closing quote at character 8",
             ),
             (
                 "/a/..",
-                "follow the XPath '/a/..': expected the name of an element, or '*' at character 4",
+                "evaluate the XPath '/a/..': expected the name of an element, or '*' at character 4",
             ),
             (
                 "/a | /b",
-                "follow the XPath '/a | /b': expected '/', '[' or the end at character 4",
+                "evaluate the XPath '/a | /b': expected '/', '[' or the end at character 4",
             ),
             (
                 "/child::a",
-                "follow the XPath '/child::a': expected the name of an element, or '*' at character 2",
+                "evaluate the XPath '/child::a': expected the name of an element, or '*' at character 2",
             ),
         ] {
             assert_eq!(document.evaluate(xpath).unwrap_err().to_string(), said);
@@ -352,23 +352,23 @@ fn values_that_are_no_numbers_are_explained() {
         assert_eq!(said("missing"), "<road> has no attribute 'missing'");
         assert_eq!(
             said("length"),
-            "attribute 'length' of <road> is '12,5', which is no number: the decimal separator is a point, as in 12.5"
+            "attribute 'length' of <road> is '12,5', which is not a number: the decimal separator is a point, as in 12.5"
         );
         assert_eq!(
             said("s"),
-            "attribute 's' of <road> is '1e999', beyond the largest double, about 1.8e308"
+            "attribute 's' of <road> is '1e999', which is beyond the largest double, about 1.8e308"
         );
         assert_eq!(
             said("t"),
-            "attribute 't' of <road> is 'inf', which is no number: write INF, -INF or NaN, in exactly these letters"
+            "attribute 't' of <road> is 'inf', which is not a number: write INF, -INF or NaN, in exactly this spelling"
         );
         assert_eq!(
             said("z"),
-            "attribute 'z' of <road> is empty, where a number is needed"
+            "attribute 'z' of <road> is empty, but a number is expected"
         );
         assert_eq!(
             road.i64("h").unwrap_err().to_string(),
-            "attribute 'h' of <road> is ' +1.5e1\n', which is no integer; write it like 12 or -3"
+            "attribute 'h' of <road> is ' +1.5e1\n', which is not an integer; write it like 12 or -3"
         );
         assert_eq!(
             road.f64("length").unwrap_err().offset(),

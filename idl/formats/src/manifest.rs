@@ -125,7 +125,7 @@ pub enum ManifestError {
 
 fn named_by(listed_in: &Option<PathBuf>) -> String {
     match listed_in {
-        Some(path) => format!(" (named by `manifest_file_path` in {})", path.display()),
+        Some(path) => format!(" (listed in `manifest_file_path` of {})", path.display()),
         None => String::new(),
     }
 }
@@ -239,7 +239,7 @@ fn object(path: &Path, bytes: &[u8]) -> Result<Map<String, Value>, ManifestError
             path: path.to_owned(),
             row: 1,
             column: 1,
-            reason: String::from("a manifest is an object"),
+            reason: String::from("a manifest must be an object"),
         }),
         Err(error) => {
             let reason = error.to_string();
@@ -341,7 +341,7 @@ impl Keys<'_> {
         let reason = match self.object.get(name) {
             Some(Value::String(text)) if !text.trim().is_empty() => return Ok(text.clone()),
             Some(Value::String(_)) => String::from("is empty"),
-            Some(_) => String::from("is not a text"),
+            Some(_) => String::from("is not a string"),
             None => format!("is missing{}", misspelt(name, others(self.object))),
         };
         Err(self.wrong(name, &reason))
@@ -356,7 +356,7 @@ impl Keys<'_> {
         let hint = did_you_mean(&value, words.iter().copied());
         Err(self.wrong(
             name,
-            &format!("is `{value}`, not {}{hint}", words.join(" or ")),
+            &format!("is `{value}`, expected {}{hint}", words.join(" or ")),
         ))
     }
 
@@ -378,7 +378,7 @@ impl Keys<'_> {
                 other => {
                     let known = MAY_KEYS.join(", ");
                     let hint = did_you_mean(other, MAY_KEYS.iter().copied());
-                    let reason = format!("is none of {known}{hint}");
+                    let reason = format!("is not one of {known}{hint}");
                     return Err(self.wrong(&format!("may.{other}"), &reason));
                 }
             }
@@ -392,7 +392,7 @@ impl Keys<'_> {
             None => false,
         };
         if shadow && module_type != ModuleType::CheckerBundle {
-            return Err(self.wrong("shadow", "is for checker bundles"));
+            return Err(self.wrong("shadow", "is only allowed for checker bundles"));
         }
         Ok(shadow)
     }
@@ -417,7 +417,7 @@ impl Keys<'_> {
             let Some(text) = text else {
                 return Err(self.wrong(
                     &format!("environment.{name}"),
-                    "is not a variable with a text",
+                    "is not a valid variable name with a string value",
                 ));
             };
             once.environment.push((name.clone(), text.to_owned()));
@@ -426,13 +426,14 @@ impl Keys<'_> {
             let key = format!("limits.{name}");
             if !LIMIT_KEYS.contains(&name.as_str()) {
                 let hint = did_you_mean(name, LIMIT_KEYS.iter().copied());
-                return Err(
-                    self.wrong(&key, &format!("is none of {}{hint}", LIMIT_KEYS.join(", ")))
-                );
+                return Err(self.wrong(
+                    &key,
+                    &format!("is not one of {}{hint}", LIMIT_KEYS.join(", ")),
+                ));
             }
             match value.as_u64().filter(|it| *it > 0) {
                 Some(number) => once.limits.push((name.clone(), number)),
-                None => return Err(self.wrong(&key, "is not a whole number above zero")),
+                None => return Err(self.wrong(&key, "is not an integer greater than 0")),
             }
         }
         if let Some(warm) = self.object.get("warm") {
@@ -450,7 +451,7 @@ impl Keys<'_> {
                 let kinds = kinds.filter(|it| !it.is_empty());
                 let known = KINDS.join(", ");
                 once.kinds = kinds.ok_or_else(|| {
-                    self.wrong("kinds", &format!("is not a list of some of {known}"))
+                    self.wrong("kinds", &format!("is not a list with values from {known}"))
                 })?;
             }
             Some(_) => return Err(self.wrong("kinds", "is not a list")),
@@ -491,7 +492,7 @@ impl Keys<'_> {
 /// Returns a hint about a similar key that is written instead of a missing one.
 fn misspelt<'k>(name: &str, written: impl Iterator<Item = &'k str>) -> String {
     match closest(name, written) {
-        Some(near) => format!("; `{near}` is no key, should it be `{name}`?"),
+        Some(near) => format!("; `{near}` is not a key, did you mean `{name}`?"),
         None => String::new(),
     }
 }
@@ -552,7 +553,7 @@ fn unique(modules: Vec<Module>) -> Result<Vec<Module>, ManifestError> {
         let key = (module.name.as_str(), module.module_type);
         if let Some(first) = seen.insert(key, &module.manifest) {
             let reason = format!(
-                "`{}` is given twice, first in {}",
+                "`{}` is defined twice, first in {}",
                 module.name,
                 first.display()
             );

@@ -139,7 +139,7 @@ fn only_a_bundle_can_be_a_shadow() {
     assert_eq!(of("checker_bundle", shadow), Ok(true));
     let error = of("report_module", shadow).unwrap_err();
     assert!(
-        error.contains("`module[0].shadow` is for checker bundles"),
+        error.contains("`module[0].shadow` is only allowed for checker bundles"),
         "{error}"
     );
     let error = of("checker_bundle", r#", "shadow": "yes""#).unwrap_err();

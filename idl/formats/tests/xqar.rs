@@ -73,7 +73,7 @@ fn the_old_form_is_understood() {
     assert_eq!(
         (issues[0].id, issues[0].level),
         (0, Level::Error),
-        "`x7` is no number: its rank"
+        "`x7` is not a number: its rank"
     );
     assert_eq!((issues[1].id, issues[1].level), (1, Level::Information));
     assert_eq!(

@@ -21,7 +21,7 @@ pub enum CodecError {
     #[error("{0} bytes were left over after the message")]
     TrailingBytes(usize),
     /// The message is larger than [`MAX_MESSAGE`].
-    #[error("the message has {0} bytes, more than the {MAX_MESSAGE} allowed")]
+    #[error("the message has {0} bytes; at most {MAX_MESSAGE} are allowed")]
     TooLarge(usize),
     /// The message cannot be encoded.
     #[error("cannot encode the message: {0}")]

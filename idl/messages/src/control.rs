@@ -408,7 +408,7 @@ impl std::fmt::Display for Unseen {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "not looked at: {}: {}",
+            "not scanned: {}: {}",
             path_text::to_text(&self.path),
             self.why
         )

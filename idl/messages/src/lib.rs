@@ -30,7 +30,7 @@ pub use peer_to_broker::{CheckerEnd, FromPeer};
 pub use qcbus_formats::Verdict;
 
 #[cfg(test)]
-#[expect(dead_code, reason = "the rest of it runs when this is built")]
+#[expect(dead_code, reason = "the other functions are used only in the build")]
 #[path = "../build.rs"]
 mod build;
 

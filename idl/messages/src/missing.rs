@@ -107,21 +107,21 @@ impl fmt::Display for Absence {
     /// Writes text that continues a sentence after the name of the file.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Absence::NotThere => f.write_str("is not there"),
+            Absence::NotThere => f.write_str("does not exist"),
             Absence::Directory => f.write_str("is a directory, not a file"),
             Absence::NotAFile => f.write_str("is a device, pipe or socket, not a file"),
             Absence::Unreadable { why } => write!(f, "cannot be read: {why}"),
             Absence::Remote => {
-                f.write_str("lies elsewhere, and nothing is fetched from the network")
+                f.write_str("is not a local file, and nothing is fetched from the network")
             }
             Absence::TooLarge { why } => write!(f, "is too large: {why}"),
             Absence::EmptyPath => f.write_str("is an empty path, which names no file"),
             Absence::Parameter { name } => write!(
                 f,
-                "cannot be looked for: the parameter `${name}` has no plain default"
+                "cannot be resolved: the parameter `${name}` has no plain default"
             ),
             Absence::Expression => f.write_str(
-                "cannot be looked for: the path is an expression, which is known only when it runs",
+                "cannot be resolved: the path is an expression, which is known only at run time",
             ),
             Absence::TooMany { most } => {
                 write!(
@@ -130,16 +130,17 @@ impl fmt::Display for Absence {
                 )
             }
             Absence::SimulatorMap => {
-                f.write_str("is the name of a map that the simulator knows, not of a file")
+                f.write_str("is the name of a map of the simulator, not of a file")
             }
             Absence::Escapes => f.write_str(
-                "is no name for what lies in an archive or in a directory of the search path: such names are relative, parted by `/` and without `..`",
+                "is not a valid name in an archive or in a directory of the search path: such names are \
+                 relative, separated by `/` and without `..`",
             ),
             Absence::NotAScenario => f.write_str(
-                "is not looked for: the name of a scenario ends in `.xosc`, that of an archive in `.mosc`",
+                "is not searched: the name of a scenario must end in `.xosc`, that of an archive in `.mosc`",
             ),
             Absence::TooDeep { most } => {
-                write!(f, "is not read: scenarios refer to scenarios more than {most} deep")
+                write!(f, "is not read: scenario references are nested more than {most} deep")
             }
             Absence::NotExpanded { why } => write!(f, "cannot be expanded: {why}"),
             Absence::Broken {
@@ -147,7 +148,7 @@ impl fmt::Display for Absence {
                 row,
                 column,
                 text,
-            } => write!(f, "cannot be relied on: {path}:{row}:{column}: {text}"),
+            } => write!(f, "is not reliable: {path}:{row}:{column}: {text}"),
         }
     }
 }

@@ -52,7 +52,8 @@ impl<'e> Chosen<'e> {
         let parts: Vec<String> = self.counts.iter().map(part).collect();
         is_cut.then(|| {
             format!(
-                "{} are annotated: GitHub takes no more from one step. The log of the step has all.",
+                "{} are annotated: GitHub accepts no more from one step. The log of the step contains all of \
+                 them.",
                 parts.join(", ")
             )
         })

@@ -54,7 +54,7 @@ fn summary(result: &ResultMessage) -> String {
     };
     let blocked = blocked(result).len();
     if blocked > 0 {
-        summary.push_str(&format!("; {} could not look", number_of(blocked)));
+        summary.push_str(&format!("; {} could not run", number_of(blocked)));
     }
     summary
 }
@@ -68,7 +68,7 @@ fn number_of(checkers: usize) -> String {
 fn unanswered(result: &ResultMessage) -> Vec<Entry> {
     let about = match result.verdict {
         Verdict::Undetermined => "the file is undetermined, not accepted",
-        Verdict::Accepted | Verdict::Rejected => "the file was not looked at by all",
+        Verdict::Accepted | Verdict::Rejected => "the file was not checked by all checkers",
     };
     let entry = |silence: Silence| {
         let said = format!("{about}: {silence}");

@@ -17,7 +17,7 @@ use qcbus_reporter_sdk::{NoSources, ReportFormat as _, Setting};
 
 #[test]
 fn a_report_of_several_files() {
-    let mut elsewhere = issue(Level::Error, "ids.exist", "road 7 is not there", 3);
+    let mut elsewhere = issue(Level::Error, "ids.exist", "road 7 is not available", 3);
     elsewhere.locations[0].elsewhere = Some(OtherPlace {
         path: "/farm/maps/town.xodr".into(),
         row: 12,
@@ -70,7 +70,7 @@ fn an_undetermined_verdict_is_an_error_of_its_file() {
     let commands = runner::run(&report(&[nobody]));
     let error = commands.iter().find(|it| it.name == "error").unwrap();
     assert_eq!(error.properties["file"], "maps/none.xodr");
-    let said = "the file is undetermined, not accepted: no checker has looked at the file";
+    let said = "the file is undetermined, not accepted: no checker has checked the file";
     assert_eq!(error.data, said);
 }
 
@@ -198,8 +198,7 @@ fn ten_thousand_findings_are_all_in_the_log_and_the_cut_is_said() {
     assert_eq!(titles.len(), 10, "another rule each");
     assert_eq!(
         commands.last().unwrap().data,
-        "10 of 9000 errors, 4 of 4 warnings, 9 of 996 information are annotated: GitHub takes no \
-         more from one step. The log of the step has all."
+        "10 of 9000 errors, 4 of 4 warnings, 9 of 996 information are annotated: GitHub accepts no more from one step. The log of the step contains all of them."
     );
     assert!(text.len() < 4_000_000, "{} bytes", text.len());
 }

@@ -82,8 +82,8 @@ fn left_out(entries: &[Entry]) -> Option<Entry> {
             .count()
     };
     let description = format!(
-        "{MOST_ENTRIES} of {} entries are in this report, the most severe ones; left out: {} blocker, \
-         {} major, {} minor, {} info",
+        "only the {MOST_ENTRIES} most severe of {} entries are in this report; left out: {} blocker, {} major, \
+         {} minor, {} info",
         entries.len(),
         of(Severity::Blocker),
         of(Severity::Major),

@@ -38,7 +38,7 @@ impl Section {
 fn unanswered(result: &ResultMessage) -> Vec<Entry> {
     let about = match result.verdict {
         Verdict::Undetermined => "the file is undetermined, not accepted",
-        Verdict::Accepted | Verdict::Rejected => "the file was not looked at by all",
+        Verdict::Accepted | Verdict::Rejected => "the file was not checked by all checkers",
     };
     let said = |silence: Silence| {
         let name = silence

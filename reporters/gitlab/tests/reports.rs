@@ -153,7 +153,7 @@ fn nobody_takes_silence_for_success() {
             blocked,
             "1 checker gave no answer (xodrBundle/check_a): The file cannot be read.",
         ),
-        (nobody, "no checker has looked at the file"),
+        (nobody, "no checker has checked the file"),
     ] {
         let all = entries(&whole(&[result("u.xodr", vec![checker])]));
         assert_eq!(all.len(), 1);
@@ -209,8 +209,7 @@ fn thirty_thousand_findings_lose_the_least_severe_and_say_it() {
     assert_eq!(all.len(), MOST_ENTRIES + 1);
     assert_eq!(
         all[0]["description"],
-        "25000 of 30000 entries are in this report, the most severe ones; left out: 0 blocker, \
-         0 major, 0 minor, 5000 info"
+        only the "25000 most severe of 30000 entries are in this report; left out: 0 blocker, 0 major, 0 minor, 5000 info"
     );
     let of = |severity: &str| all.iter().filter(|it| it["severity"] == severity).count();
     assert_eq!(

@@ -158,13 +158,15 @@ impl<'r> ResultData<'r> {
         if total > MOST_FINDINGS {
             let left_out = total - MOST_FINDINGS;
             cuts.push(format!(
-                "{left_out} of {total} findings are not on this page, the mildest; the .xqar has all of them"
+                "the {left_out} least severe of {total} findings are not on this page; the .xqar contains all of \
+                 them"
             ));
         }
         let not_listed = not_listed(result);
         if not_listed > 0 {
             cuts.push(format!(
-                "{not_listed} further findings are counted and not listed: a checker lists so many of a file"
+                "{not_listed} further findings are counted but not listed, because a checker lists only a \
+                 limited number per file"
             ));
         }
         let (map, plan) = match drawn {

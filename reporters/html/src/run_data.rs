@@ -123,8 +123,8 @@ impl RunData {
         if total > MOST_FINDINGS {
             let left_out = total - MOST_FINDINGS;
             cuts.push(format!(
-                "{left_out} of {total} findings are not on this page, the mildest; the pages of the files \
-                 have them"
+                "the {left_out} least severe of {total} findings are not on this page; the pages of the files \
+                 contain them"
             ));
         }
         RunData {

@@ -63,7 +63,7 @@ fn indent(params: &[Param], place: Destination) -> Result<usize, ReportError> {
         _ => Err(ReportError::Param {
             name: "Indent".into(),
             value: value.into(),
-            why: "a whole number from 0 to 16 is needed".into(),
+            why: "expected an integer from 0 to 16".into(),
         }),
     }
 }

@@ -175,7 +175,7 @@ fn a_senseless_indent_is_refused_with_what_is_allowed() {
     let error = new_reporter(false).report(&result, &NoSources);
     assert_eq!(
         error.unwrap_err().to_string(),
-        "use the parameter Indent=\"-1\": a whole number from 0 to 16 is needed"
+        "use the parameter Indent=\"-1\": expected an integer from 0 to 16"
     );
 }
 

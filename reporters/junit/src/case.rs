@@ -112,7 +112,9 @@ impl Findings<'_> {
         let mut lines: Vec<String> = said.map(|issue| self.line(issue)).collect();
         let more = issues.len().saturating_sub(MOST_FINDINGS);
         if more > 0 {
-            lines.push(format!("and {more} more; all are in the result file"));
+            lines.push(format!(
+                "and {more} more; the result file contains all of them"
+            ));
         }
         lines.join("\n")
     }

@@ -61,7 +61,7 @@ fn inapplicable(params: &[Param]) -> Result<Inapplicable, ReportError> {
         Some(value) => Err(ReportError::Param {
             name: "Inapplicable".into(),
             value: value.into(),
-            why: "`counted` or `listed` is needed".into(),
+            why: "expected `counted` or `listed`".into(),
         }),
     }
 }

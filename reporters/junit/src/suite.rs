@@ -73,11 +73,11 @@ fn verdict(id: &str, class: &str, result: &ResultMessage) -> TestCase {
         .collect();
     let why = match blocked.as_slice() {
         [] if result.verdict == Verdict::Undetermined => {
-            "no checker has looked at the file".to_owned()
+            "no checker has checked the file".to_owned()
         }
-        [] => "the result does not say why".to_owned(),
+        [] => "the result does not state the reason".to_owned(),
         [first, ..] => format!(
-            "{} could not look: {}",
+            "{} could not run: {}",
             counted(blocked.len(), "checker"),
             short(&reason(first), crate::LONGEST_FINDING)
         ),
@@ -116,7 +116,11 @@ fn remarks(result: &ResultMessage, left_out: usize) -> String {
         )),
     }
     let not_asked = NotAsked::of(&result.results);
-    lines.extend(not_asked.iter().map(|it| path(&format!("not asked: {it}"))));
+    lines.extend(
+        not_asked
+            .iter()
+            .map(|it| path(&format!("not requested: {it}"))),
+    );
     lines.join("\n")
 }
 

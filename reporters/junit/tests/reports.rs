@@ -142,7 +142,7 @@ fn ten_thousand_findings_are_bounded_and_the_errors_come_first() {
     assert_eq!(lines.len(), MOST_FINDINGS + 1);
     assert_eq!(
         lines[MOST_FINDINGS],
-        "and 9900 more; all are in the result file"
+        "and 9900 more; the result file contains all of them"
     );
     let message = &failure.attributes["message"];
     assert_eq!(message, "the one that counts (1 of 10000 findings)");

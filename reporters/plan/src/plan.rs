@@ -70,12 +70,12 @@ impl Plan {
         cuts.extend(sentence(
             failed(NotDrawn::Nowhere),
             "road",
-            "for want of a finite place within 1,000 km of the other roads",
+            "no finite place within 1,000 km of the other roads",
         ));
         cuts.extend(sentence(
             failed(NotDrawn::TooLong),
             "road",
-            "as it would take too many points",
+            "too many points",
         ));
         let mut out = Writer::default();
         out.count(roads.len());
@@ -229,7 +229,7 @@ fn objects(out: &mut Writer, map: &RoadMap<'_>, origin: Shift, cuts: &mut Vec<St
     cuts.extend(sentence(lost, "object", NO_PLACE));
 }
 
-const NO_PLACE: &str = "for want of a place that can be computed from the road";
+const NO_PLACE: &str = "no place can be computed from the road";
 
 /// Returns a sentence about elements of one kind that are not drawn, or `None` if there are none.
 fn sentence<'a>(ids: impl Iterator<Item = &'a str>, kind: &str, why: &str) -> Option<String> {
@@ -248,7 +248,7 @@ fn sentence<'a>(ids: impl Iterator<Item = &'a str>, kind: &str, why: &str) -> Op
         (false, 0) => names.join(", "),
         (false, more) => format!("{} and {more} more", names.join(", ")),
     };
-    Some(format!("Not drawn, {why}: {kind}{plural} {names}."))
+    Some(format!("Not drawn ({why}): {kind}{plural} {names}."))
 }
 
 /// Returns an id in a form suitable for a sentence.

@@ -84,8 +84,8 @@ pub(crate) fn notifications(found: Found, left_out: Found) -> Vec<Notification> 
         said.push((
             Severity::Warning,
             format!(
-                "{written} of {total} findings are in this report, the most severe ones: code scanning \
-                 takes no more. Left out: {error} errors, {warning} warnings, {note} notes."
+                "{written} of {total} findings are in this report, the most severe ones: code scanning accepts \
+                 no more. Left out: {error} errors, {warning} warnings, {note} notes."
             ),
         ));
     }

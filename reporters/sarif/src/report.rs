@@ -105,7 +105,7 @@ impl Sarif {
 }
 
 fn base() -> Base {
-    let text = "The directory that was given or watched: the root of the repository, for hosts.";
+    let text = "The directory that was given or watched; for hosts, the root of the repository.";
     Base {
         description: plain(text),
     }

@@ -12,8 +12,8 @@ use crate::text;
 pub const UNANSWERED: &str = "qcbus.dev:qcbus:1.0.0:check.unanswered";
 
 /// Description of that rule.
-pub(crate) const ABOUT: &str = "A checker that should have looked at the file gave no answer, so \
-    nobody knows what it would have found; findings of it that are gone are not mended.";
+pub(crate) const ABOUT: &str = "A checker that should have checked the file gave no answer, so its findings are \
+                                unknown; missing findings of this checker are not fixed.";
 
 /// Returns a sentence for each reason of a missing answer; empty if all checkers answered.
 pub(crate) fn reasons(result: &ResultMessage) -> Vec<String> {
@@ -37,7 +37,7 @@ pub(crate) fn notification(result: &ResultMessage, paths: &Paths, reason: &str) 
 pub(crate) fn finding(result: &ResultMessage, paths: &Paths, reasons: &[String]) -> SarifResult {
     let said = match result.verdict {
         Verdict::Undetermined => "The file is undetermined, not accepted: ",
-        Verdict::Accepted | Verdict::Rejected => "The file was not looked at by all: ",
+        Verdict::Accepted | Verdict::Rejected => "The file was not checked by all checkers: ",
     };
     let hash = fingerprint_of(&[UNANSWERED, &result.display_path]);
     SarifResult {

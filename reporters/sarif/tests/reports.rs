@@ -320,8 +320,7 @@ fn thirty_thousand_findings_lose_the_least_severe_and_say_it() {
     let told = &run["invocations"][0]["toolConfigurationNotifications"];
     assert_eq!(
         told[0]["message"]["text"],
-        "25000 of 30000 findings are in this report, the most severe ones: code scanning takes no \
-         more. Left out: 0 errors, 0 warnings, 5000 notes."
+        "25000 of 30000 findings are in this report, the most severe ones: code scanning accepts no more. Left out: 0 errors, 0 warnings, 5000 notes."
     );
     // A restarted daemon has the listed results and still reports the omitted ones.
     assert_eq!(form().whole(&form().split(&text)).unwrap(), text);

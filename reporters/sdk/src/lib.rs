@@ -105,6 +105,6 @@ pub enum ReportError {
         why: String,
     },
     /// The result cannot be converted to the report's format.
-    #[error("put the result in its form: {0}")]
+    #[error("convert the result to the format of the report: {0}")]
     Form(String),
 }

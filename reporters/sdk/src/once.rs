@@ -96,11 +96,11 @@ fn outdated(result: &ResultMessage) -> Option<&'static str> {
     }
     match (modified(&result.input), modified(&result.xqar)) {
         (Err(error), _) if error.kind() == std::io::ErrorKind::NotFound => {
-            Some("the file is not there any more; its lines cannot be shown")
+            Some("the file does not exist any more; its lines cannot be shown")
         }
-        (Err(_), _) => Some("the file cannot be looked at; its lines cannot be shown"),
+        (Err(_), _) => Some("the file cannot be accessed; its lines cannot be shown"),
         (Ok(file), Ok(checked)) if file > checked => {
-            Some("the file has changed since it was checked; places are those of then")
+            Some("the file has changed since it was checked; places refer to the checked version")
         }
         _ => None,
     }

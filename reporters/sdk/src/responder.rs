@@ -95,7 +95,7 @@ impl<'r> Responder<'r> {
                 PeerReport::Written
             }
             Ok(Err(error)) => PeerReport::Failed(format!("failed to {error}")),
-            Err(_) => PeerReport::Failed("the reporter panicked over this result".into()),
+            Err(_) => PeerReport::Failed("the reporter panicked on this result".into()),
         }
     }
 
@@ -105,7 +105,7 @@ impl<'r> Responder<'r> {
         match catch_unwind(withdraw) {
             Ok(Ok(())) => PeerReport::Written,
             Ok(Err(error)) => PeerReport::Failed(format!("failed to {error}")),
-            Err(_) => PeerReport::Failed("the reporter panicked over this withdrawal".into()),
+            Err(_) => PeerReport::Failed("the reporter panicked on this withdrawal".into()),
         }
     }
 
@@ -206,7 +206,10 @@ mod tests {
         let PeerReport::Failed(why) = tell(&mut responder, 1, "fails.xodr") else {
             panic!("it was not written");
         };
-        assert_eq!(why, "failed to put the result in its form: it is full");
+        assert_eq!(
+            why,
+            "failed to convert the result to the format of the report: it is full"
+        );
     }
 
     #[test]

@@ -33,7 +33,7 @@ pub fn silences(result: &ResultMessage) -> Vec<Silence> {
         silences.extend(grouped(result, blocked));
         if silences.is_empty() {
             silences.push(Silence {
-                reason: "no checker has looked at the file".to_owned(),
+                reason: "no checker has checked the file".to_owned(),
                 names: Vec::new(),
             });
         }
@@ -140,7 +140,7 @@ mod tests {
         assert!(said(Verdict::Accepted, Vec::new()).is_empty());
         assert_eq!(
             said(Verdict::Undetermined, Vec::new()),
-            ["no checker has looked at the file"]
+            ["no checker has checked the file"]
         );
     }
 }

@@ -29,9 +29,9 @@ pub fn rounded(number: f64) -> String {
 /// Returns a short explanation of a verdict for new users.
 pub fn meaning(verdict: Verdict) -> &'static str {
     match verdict {
-        Verdict::Accepted => "everything that was asked has looked, and found no error",
+        Verdict::Accepted => "all requested checkers have run and found no error",
         Verdict::Rejected => "at least one error was found",
-        Verdict::Undetermined => "something that was asked could not look; this is no acceptance",
+        Verdict::Undetermined => "a requested checker could not run; the file is not accepted",
     }
 }
 

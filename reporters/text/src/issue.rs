@@ -43,7 +43,7 @@ impl View<'_> {
         for info in &entry.issue.domain_info {
             match info.name.as_str() {
                 qcbus_formats::location::NAME => {}
-                qcbus_formats::pool::RULE_INFO => note("breaks as well", &further_rules(info)),
+                qcbus_formats::pool::RULE_INFO => note("also violates", &further_rules(info)),
                 name => note(&one_line(name), &flat(info)),
             }
         }

@@ -24,7 +24,11 @@ pub(crate) fn write(out: &mut String, result: &ResultMessage, paint: Paint, opti
     let not_asked = NotAsked::of(&result.results);
     if !not_asked.is_empty() {
         let not_asked: Vec<String> = not_asked.iter().map(ToString::to_string).collect();
-        let _ = writeln!(out, "  not asked: {}", shown::line(&not_asked.join(", ")));
+        let _ = writeln!(
+            out,
+            "  not requested: {}",
+            shown::line(&not_asked.join(", "))
+        );
     }
     if result.digest != Digest::default() {
         let _ = writeln!(out, "  sha256: {}", result.digest);
@@ -47,7 +51,7 @@ fn issues(result: &ResultMessage) -> String {
     let said: Vec<String> = counts.into_iter().flatten().collect();
     match said.as_slice() {
         [] if result.verdict == Verdict::Undetermined => {
-            "no issues, but not everybody has looked".into()
+            "no issues, but not all checkers have run".into()
         }
         [] => "no issues".into(),
         _ => said.join(", "),

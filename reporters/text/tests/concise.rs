@@ -105,7 +105,7 @@ fn an_open_verdict_is_never_silent() {
     );
     assert_eq!(
         text(Vec::new()),
-        "a.xodr: undetermined: no checker has looked at the file\n"
+        "a.xodr: undetermined: no checker has checked the file\n"
     );
     assert_eq!(
         concise(

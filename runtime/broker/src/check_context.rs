@@ -36,13 +36,11 @@ pub fn check_context(options: &Options, config: Digest, children: &[ChildSpec]) 
 /// Returns why a broker with context `ours` may find other results than `asked`, for the user.
 pub fn differs(ours: &CheckContext, asked: &CheckContext) -> Option<&'static str> {
     if ours.general != asked.general {
-        return Some(
-            "it works with another configuration, other limits or another form of results",
-        );
+        return Some("it uses another configuration, other limits or another form of results");
     }
     let same = |(name, digest): (&String, &String)| ours.bundles.get(name) == Some(digest);
     if asked.bundles.is_empty() || !asked.bundles.iter().all(same) {
-        return Some("it has not the same bundles, or starts them otherwise");
+        return Some("it does not have the same bundles, or starts them differently");
     }
     None
 }

@@ -114,7 +114,7 @@ fn cut_to(results: &mut Results, most: usize) {
         if cut > 0 {
             let gap = if checker.summary.is_empty() { "" } else { "; " };
             checker.summary = format!(
-                "{}{gap}{cut} further findings are in the .xqar, a report has no room for them",
+                "{}{gap}{cut} further findings are only in the .xqar, because a report has no room for them",
                 checker.summary
             )
             .into();
@@ -183,7 +183,7 @@ mod tests {
         };
         assert_eq!(modest, &whole.bundles[0].checkers[0]);
         assert_eq!(flood.issues.len(), 125);
-        let said = "said; 875 further findings are in the .xqar, a report has no room for them";
+        let said = "said; 875 further findings are only in the .xqar, because a report has no room for them";
         assert_eq!(&*flood.summary, said);
     }
 }

@@ -29,7 +29,7 @@ pub fn adopt() -> Strangers {
         is_first: std::process::id() == 1,
     };
     if let Err(error) = rustix::process::set_child_subreaper(Some(rustix::process::getpid())) {
-        tracing::warn!(%error, "what bundles leave behind cannot be found");
+        tracing::warn!(%error, "cannot find the descendants of bundles");
     }
     strangers
 }

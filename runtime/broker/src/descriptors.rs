@@ -90,13 +90,13 @@ impl Descriptors {
         let (allowed, needed) = (self.allowed, FOR_THE_REST + PER_PEER * wanted as u64);
         let so_that = match fit >= FEWEST {
             true => {
-                format!("no more than {fit} bundles and reporters can join instead of {wanted}")
+                format!("at most {fit} bundles and reporters can join instead of {wanted}")
             }
-            false => "not even the standard bundles may be able to join".to_owned(),
+            false => "possibly not even the standard bundles can join".to_owned(),
         };
         let said = format!(
-            "only {allowed} files may be open at once, so that {so_that}; raise the limit to {needed} \
-             (`ulimit -Hn {needed}`; systemd: LimitNOFILE={needed}; docker: --ulimit nofile={needed})"
+            "only {allowed} files may be open at once, so {so_that}; raise the limit to {needed} (`ulimit -Hn \
+             {needed}`; systemd: LimitNOFILE={needed}; docker: --ulimit nofile={needed})"
         );
         (fit.max(FEWEST), Some(said))
     }

@@ -24,8 +24,8 @@ pub enum Purpose {
 impl Purpose {
     fn as_str(self) -> &'static str {
         match self {
-            Purpose::State => "the state",
-            Purpose::Results => "the directory of results",
+            Purpose::State => "the state directory",
+            Purpose::Results => "the results directory",
             Purpose::Gate => "the gate",
         }
     }
@@ -57,7 +57,7 @@ pub const GATE_FILE: &str = ".qcbus-gate";
 pub enum LockError {
     /// Another broker has locked it.
     #[error(
-        "{} is {} of another broker that runs ({holder}); stop that one with `qcbus down`, or give this one {}",
+        "{} is {} of another running broker ({holder}); stop that broker with `qcbus down`, or choose {}",
         to_text(directory), purpose.as_str(), purpose.way_out()
     )]
     Taken {
@@ -70,7 +70,7 @@ pub enum LockError {
     },
     /// Runs of `qcbus check` write into it.
     #[error(
-        "`qcbus check` is writing results into {}; wait for its end, or choose another directory with --out",
+        "`qcbus check` is writing results into {}; wait until it ends, or choose another directory with --out",
         to_text(directory)
     )]
     Shared {
@@ -335,7 +335,7 @@ fn is_free(directory: &Path, purpose: Purpose) -> Result<(), LockError> {
 /// Warns that a file system has no locks. This is no reason to refuse the work.
 fn without_locks(directory: &Path, error: &io::Error) {
     let directory = to_text(directory);
-    tracing::warn!("cannot lock {directory}, see to it that nobody else uses it: {error}");
+    tracing::warn!("cannot lock {directory}: {error}; make sure that no other process uses it");
 }
 
 fn introduce(
@@ -368,7 +368,7 @@ fn refusal(file: &mut File, directory: &Path, purpose: Purpose) -> LockError {
     }
     let holder = match text.trim().split_once(' ') {
         Some((pid, instance)) => format!("instance `{instance}`, process {pid}"),
-        None => "it has not said which".to_owned(),
+        None => "unknown instance".to_owned(),
     };
     LockError::Taken {
         directory,
@@ -384,8 +384,8 @@ pub fn open_to_others<'p>(
 ) -> impl Iterator<Item = String> {
     directories.filter_map(|directory| match trust::directory(directory) {
         Err(error @ TrustError::Foreign { .. }) => Some(format!(
-            "{} is not ours alone: what lies there is not ours for certain, and whoever may write there can have us \
-             write elsewhere: {error}",
+            "{} is not under this user's sole control: its files cannot be trusted, and other users can redirect \
+             what this broker writes: {error}",
             to_text(directory)
         )),
         _ => None,

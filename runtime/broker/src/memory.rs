@@ -30,7 +30,7 @@ fn set(parameter: libc::c_int, value: libc::c_int) {
     // program.
     let done = unsafe { libc::mallopt(parameter, value) };
     if done == 0 {
-        tracing::debug!(parameter, "the C library keeps its heaps as they are");
+        tracing::debug!(parameter, "the C library rejected the heap setting");
     }
 }
 

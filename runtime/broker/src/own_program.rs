@@ -92,20 +92,20 @@ impl OwnProgram {
         let what = match foreign::metadata(&self.called) {
             Ok(data) if is_same(&data, &std::fs::metadata(RUNNING).ok()?) => return None,
             Ok(_) => {
-                format!("{shown} was replaced: this broker still runs the earlier program")
+                format!("{shown} was replaced: this broker still runs the previous program")
             }
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
                 format!("{shown} was removed: this broker still runs it")
             }
             Err(error) => {
                 return Some(format!(
-                    "{shown} cannot be looked at ({error}): whether this broker runs it is not known"
+                    "{shown} cannot be accessed ({error}): it is unknown whether this broker runs it"
                 ));
             }
         };
         Some(format!(
-            "{what}, and starts its bundles from it; to run what is installed now, restart \
-             the broker (`qcbus down`, then `qcbus serve` as before, or `systemctl restart` of its service)"
+            "{what} and starts its bundles from it; to run the installed program, restart the broker (`qcbus \
+             down`, then `qcbus serve` as before, or `systemctl restart` of its service)"
         ))
     }
 }

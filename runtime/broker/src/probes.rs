@@ -115,14 +115,14 @@ impl Probes {
                     }
                 }
                 Err(RecvTimeoutError::Disconnected) => {
-                    return Err(io::Error::other("looking at it has failed"));
+                    return Err(io::Error::other("the file lookup failed"));
                 }
             }
         }
     }
 }
 
-const NO_ANSWER: &str = "a file that it depends on has not answered for too long";
+const NO_ANSWER: &str = "a file that it depends on has not responded for too long";
 
 impl Orders {
     fn lock(&self) -> MutexGuard<'_, Waiting> {

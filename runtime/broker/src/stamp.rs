@@ -242,7 +242,7 @@ pub(crate) mod tests {
         assert!(is_listing(&listing) && !is_listing(&stamp));
         assert!(
             !is_listing(&Stamp::default()),
-            "images of disks have files without times"
+            "disk images contain files without times"
         );
     }
 

@@ -72,28 +72,28 @@ fn difference(before: &Identity, now: &Identity) -> Option<String> {
     let same_directory = before.inode == now.inode;
     if !same_directory && was != is && from_text(was).exists() {
         return Some(format!(
-            "the state directory {is} is a copy of {was}: results that it names outside of {} belong to that \
-             farm and are left alone; what is missing here is judged anew",
+            "the state directory {is} is a copy of {was}: results outside of {} that it lists belong to the \
+             original and are left alone; files without results here are judged again",
             now.out
         ));
     }
     if was != is {
         return Some(format!(
-            "the state directory {is} was moved or copied from {was}: results that it names outside of {} are \
-             left alone; what is missing here is judged anew",
+            "the state directory {is} was moved or copied from {was}: results outside of {} that it lists are \
+             left alone; files without results here are judged again",
             now.out
         ));
     }
     if !same_directory {
         return Some(format!(
-            "the state directory {is} was replaced, by a backup for instance: what does not agree with the \
-             results in {} is judged anew",
+            "the state directory {is} was replaced, for instance by a backup: files whose results in {} do not \
+             agree with it are judged again",
             now.out
         ));
     }
     (before.out != now.out).then(|| {
         format!(
-            "results go to {} now and went to {} before: those are left alone",
+            "results are now written to {} instead of {}: the earlier results are left alone",
             now.out, before.out
         )
     })

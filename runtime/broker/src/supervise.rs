@@ -238,13 +238,13 @@ impl Children {
         let (state, why) = match (looks(peer.pid, given), kernel_level()) {
             (Looks::Unknown, _) => return None,
             (Looks::Filtered, 1..) => ("confined", ""),
-            (Looks::Filtered, 0) => ("partly", "this kernel has no Landlock"),
+            (Looks::Filtered, 0) => ("partly", "this kernel does not support Landlock"),
             (Looks::Open, _) if !self.surroundings.sandbox => ("open", "--no-sandbox"),
             (Looks::Open, 1..) if surrounded => {
-                ("partly", "it has not confined itself after it joined")
+                ("partly", "it did not confine itself after it joined")
             }
-            (Looks::Open, 0) if is_ours => ("open", "this kernel has no Landlock"),
-            (Looks::Open, _) => ("open", "it has not confined itself after it joined"),
+            (Looks::Open, 0) if is_ours => ("open", "this kernel does not support Landlock"),
+            (Looks::Open, _) => ("open", "it did not confine itself after it joined"),
         };
         Some(SandboxStatus {
             state: state.to_owned(),
@@ -300,9 +300,9 @@ impl Children {
         });
         if !proven && !is_it {
             return Err(format!(
-                "`{}` says that a broker has started it (--launch {}), and does not prove it: start it without \
-                 --launch, or where something starts it for the broker, hand on the environment variable \
-                 {LAUNCH} as it is; a bundle or reporter joins under the name of its manifest",
+                "`{}` states that a broker has started it (--launch {}), but does not prove it: start it without \
+                 --launch; if another program starts it for the broker, pass on the environment variable \
+                 {LAUNCH} unchanged; a bundle or reporter must join under the name in its manifest",
                 name.escape_debug(),
                 launch.0
             ));

@@ -265,10 +265,9 @@ impl Writer {
         self.stopped |= failure.concerns_all;
         if !self.told {
             self.told = true;
-            let _ = self.notices.send(Notice::Storing(format!(
-                "{}; it is tried again",
-                failure.what
-            )));
+            let _ = self
+                .notices
+                .send(Notice::Storing(format!("{}; it is retried", failure.what)));
         }
     }
 
@@ -338,7 +337,7 @@ impl Writer {
         {
             let (path, why) = (to_text(&job.path), judged.why.join("; "));
             let _ = self.notices.send(Notice::Storing(format!(
-                "{path} stays undetermined until it changes or qcbus is started anew: {why}"
+                "{path} stays undetermined until it changes or qcbus is restarted: {why}"
             )));
         }
         // After the end of the loop there is no receiver.

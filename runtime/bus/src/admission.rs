@@ -205,7 +205,7 @@ impl Admission {
                 // One warning is enough, because opening is retried every second.
                 if self.file.take().is_some() {
                     let directory = to_text(&self.directory);
-                    tracing::warn!(%error, directory, "the socket for peers is gone, nobody can join");
+                    tracing::warn!(%error, directory, "the admission socket is lost, no process can join");
                 }
             }
         }
@@ -359,7 +359,7 @@ fn process_of(stream: &UnixStream, pid: Pid) -> Option<Process> {
     process.is_alive().then_some(process)
 }
 
-#[expect(unsafe_code, reason = "a number becomes the descriptor that it is")]
+#[expect(unsafe_code, reason = "the kernel returns the descriptor as a number")]
 fn peer_handle(stream: &UnixStream) -> io::Result<OwnedFd> {
     let [fd] = socket_option(stream, libc::SO_PEERPIDFD)?;
     // SAFETY: the kernel has just opened this descriptor for this process; no other code knows it.
@@ -369,7 +369,7 @@ fn peer_handle(stream: &UnixStream) -> io::Result<OwnedFd> {
 /// Returns a socket option that consists of numbers.
 #[expect(
     unsafe_code,
-    reason = "rustix knows no handles of peers, and no peer without a number"
+    reason = "rustix supports neither pidfds of peers nor peers without a process id"
 )]
 fn socket_option<const N: usize>(stream: &UnixStream, name: libc::c_int) -> io::Result<[i32; N]> {
     let mut value = [0_i32; N];

@@ -25,7 +25,8 @@ const MAX_IMAGE: usize = u32::MAX as usize;
 pub enum LoanError {
     /// Shared memory lacks room. Writing anyway would kill the process, so no slot is lent.
     #[error(
-        "not enough shared memory: {needed} bytes are needed, and so many are not free of the {size} bytes of /dev/shm, of which {reserve} are kept in reserve"
+        "not enough shared memory: {needed} bytes are needed, but not free in /dev/shm; it has {size} bytes, of \
+         which {reserve} are kept in reserve"
     )]
     NoSpace {
         /// Requested bytes.
@@ -37,7 +38,9 @@ pub enum LoanError {
     },
     /// Shared memory is too small, even if all of it were released.
     #[error(
-        "{needed} bytes of shared memory are needed, and /dev/shm has {size} in all, of which {kept} are kept for the bus itself; make it larger: `mount -o remount,size={advised}M /dev/shm`, for a container `docker run --shm-size={advised}m`"
+        "{needed} bytes of shared memory are needed, but /dev/shm has only {size} in total, of which {kept} are \
+         reserved for the bus itself; make it larger: `mount -o remount,size={advised}M /dev/shm`, for a \
+         container `docker run --shm-size={advised}m`"
     )]
     NeverFits {
         /// Requested bytes.
@@ -51,7 +54,8 @@ pub enum LoanError {
     },
     /// The address space limit of the process is too small for the mapping.
     #[error(
-        "the address space of a process is limited to {limit} bytes here (`ulimit -v`), too little to map shared memory for {needed} bytes; raise it with `ulimit -v unlimited`"
+        "the address space of a process is limited to {limit} bytes here (`ulimit -v`), which is too little to \
+         map shared memory for {needed} bytes; raise it with `ulimit -v unlimited`"
     )]
     AddressSpace {
         /// Requested bytes.
@@ -60,10 +64,10 @@ pub enum LoanError {
         limit: u64,
     },
     /// The image exceeds the maximum size.
-    #[error("an image of {0} bytes is larger than any image may be")]
+    #[error("an image of {0} bytes exceeds the maximum size")]
     TooLarge(usize),
     /// The maximum number of documents is being filled or held. Release some documents first.
-    #[error("as many documents as the bus carries at once are being filled or held")]
+    #[error("the maximum number of documents on the bus is in use")]
     Busy,
     /// The bus refuses, with this error text.
     #[error("the bus refused: {0}")]
@@ -74,7 +78,7 @@ pub enum LoanError {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PublishError {
     /// The number of used bytes exceeds the number of lent bytes.
-    #[error("{used} bytes are used of {lent} lent")]
+    #[error("{used} bytes are used, but only {lent} are lent")]
     TooMuchUsed {
         /// Used bytes, as stated by the caller.
         used: usize,
@@ -180,7 +184,11 @@ impl Class {
             if let Ok(mut sample) = publisher.loan_slice_uninit(1) {
                 sample.user_header_mut().doc = LET_GO;
                 let sent = initialised(sample).send();
-                tracing::trace!(?sent, topic = self.row.name, "asked for shared memory back");
+                tracing::trace!(
+                    ?sent,
+                    topic = self.row.name,
+                    "requested the release of shared memory"
+                );
             }
         }
         while let Ok(Some(_)) = own.receive() {}

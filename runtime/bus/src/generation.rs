@@ -120,7 +120,9 @@ impl Generation {
             fs::DirBuilder::new().mode(0o700).create(&dir)?;
         }
         if !instance.dir().join(CURRENT).exists() {
-            tracing::warn!("`{CURRENT}` was removed from the runtime directory; it was made again");
+            tracing::warn!(
+                "`{CURRENT}` was removed from the runtime directory; it was created again"
+            );
             self.announce(instance)?;
         }
         Ok(())

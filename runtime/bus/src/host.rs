@@ -482,7 +482,9 @@ impl Host {
             }
             match codec::decode::<Hello>(&sample) {
                 Ok(hello) if hello.incarnation == key.incarnation => self.meet(key, hello, now),
-                Ok(_) => tracing::warn!("an introduction contradicts itself"),
+                Ok(_) => {
+                    tracing::warn!("an introduction contains another incarnation than its header")
+                }
                 Err(error) => tracing::warn!(%error, "an introduction cannot be read"),
             }
         }
@@ -499,8 +501,8 @@ impl Host {
         let mut sessions = self.sessions.values().filter(|it| !it.is_silent());
         let older = sessions.find(|it| it.key().incarnation == key.incarnation);
         if older.is_some_and(|it| !it.is_of(&known)) {
-            let why = "another process that runs has said so of itself before: give every process a number \
-                 of its own";
+            let why = "another running process already uses this incarnation: give every process a number of its \
+                       own";
             return self.refuse_hello(key, &hello, why, now);
         }
         self.open(key, hello, known, now);
@@ -515,9 +517,9 @@ impl Host {
         }
         let (since, _) = *self.strangers.entry(key).or_insert((now, false));
         if now.saturating_duration_since(since) >= PROVE_WITHIN {
-            let why = "it has not proven which process it is: build it with this version of qcbus, and let it \
-                 connect to peers.sock in the instance's directory before it says hello (in another container: \
-                 share that directory, and run as the same user)";
+            let why = "it has not proven its process identity: build it with this version of qcbus, and let it \
+                       connect to peers.sock in the instance's directory before it introduces itself (in another \
+                       container: share that directory, and run as the same user)";
             self.refuse_hello(key, hello, why, now);
         }
     }
@@ -537,7 +539,7 @@ impl Host {
                 self.sessions.insert(peer, session);
                 self.refuse(peer, &why);
             }
-            Err(error) => tracing::warn!(%error, "cannot tell a peer why it may not join"),
+            Err(error) => tracing::warn!(%error, "cannot tell a peer why it was refused"),
         }
         let len = why.len();
         self.waiting.push(HostEvent::TurnedAway { why }, len);
@@ -555,7 +557,7 @@ impl Host {
         if self.sessions.len() >= allowed {
             tracing::warn!(
                 name = hello.name,
-                "no room even to refuse a peer; it has to wait"
+                "no room even to refuse a peer; it must wait"
             );
             return self.admission.keep(key, known, now);
         }
@@ -578,7 +580,7 @@ impl Host {
             let limit = self.limits.peers;
             self.refuse(
                 peer,
-                &format!("the broker serves {limit} bundles and reporters already"),
+                &format!("the broker already serves {limit} bundles and reporters"),
             );
         } else {
             let hello = HostEvent::Hello {

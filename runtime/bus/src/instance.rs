@@ -23,11 +23,14 @@ pub struct Instance {
 pub enum InstanceError {
     /// The name would lead out of the runtime directory or is ambiguous.
     #[error(
-        "`{0}` is no name of an instance: use up to {MAX_NAME} letters, digits, `.`, `_`, `-`, not beginning with `.`"
+        "`{0}` is not a valid instance name: use up to {MAX_NAME} letters, digits, `.`, `_`, `-`, not beginning \
+         with `.`"
     )]
     BadName(String),
     /// The directory belongs to another user, who could read and replace its content.
-    #[error("no runtime directory: {0}; or set XDG_RUNTIME_DIR to a directory of your own")]
+    #[error(
+        "cannot use the runtime directory: {0}; or set XDG_RUNTIME_DIR to a directory of your own"
+    )]
     NotOurs(TrustError),
     /// The directory cannot be created.
     #[error("cannot use the runtime directory {}: {source}", dir.display())]

@@ -204,7 +204,7 @@ impl Link {
 
     fn notify(&self) {
         if let Err(why) = self.wake.notify() {
-            tracing::debug!(?why, "cannot wake the other side; it looks by itself");
+            tracing::debug!(?why, "cannot wake the other side; it polls instead");
         }
     }
 

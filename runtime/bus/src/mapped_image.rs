@@ -93,7 +93,7 @@ struct Mapped {
 
 #[expect(
     unsafe_code,
-    reason = "a raw pointer makes the type neither Send nor Sync by itself"
+    reason = "a type with a raw pointer is neither Send nor Sync by default"
 )]
 // SAFETY: `start` points into the mapping that `_sample` keeps, which may be read from any thread.
 // The content does not change (see `MappedImage::deref`). The sample itself is Send and only

@@ -112,7 +112,7 @@ impl Membership {
             codec::encode(hello).map_err(|error| BeginError::Hello(error.to_string()))?;
         if introduction.len() > HELLO_BYTES {
             let len = introduction.len();
-            let why = format!("{len} bytes of at most {HELLO_BYTES}");
+            let why = format!("{len} bytes; at most {HELLO_BYTES} are allowed");
             return Err(BeginError::Hello(why));
         }
         let services = Services::new(&generation.limits);
@@ -311,7 +311,7 @@ impl Membership {
                 self.welcome |= matches!(message, ToPeer::Welcome { .. });
                 events.push_back(PeerEvent::Message(message));
             }
-            Err(error) => tracing::error!(%error, "the broker said what nobody can understand"),
+            Err(error) => tracing::error!(%error, "cannot decode a message of the broker"),
         }
     }
 
@@ -377,7 +377,7 @@ impl Membership {
         if self.proves && self.hellos.is_multiple_of(PROVE_EVERY) {
             let said = introduce(&self.instance, self.key).and_then(Statement::new);
             self.said.push(said.map_err(|error| {
-                format!("cannot say to the broker which process this is: {error}")
+                format!("cannot prove the process identity to the broker: {error}")
             })?);
         }
         self.hellos += 1;

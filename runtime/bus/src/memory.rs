@@ -223,7 +223,7 @@ impl Backing {
         };
         match &backing.file {
             Some(file) => backing.len = file.metadata()?.len(),
-            None => tracing::debug!(publisher, "the memory of a publisher is not to be found"),
+            None => tracing::debug!(publisher, "the memory of a publisher was not found"),
         }
         backing.go_ahead()?;
         Ok(backing)

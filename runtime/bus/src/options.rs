@@ -154,7 +154,8 @@ pub enum StartError {
     },
     /// The address space limit of the process is too small for the bus.
     #[error(
-        "the address space of this process is limited to {limit} bytes (`ulimit -v`), a broker for so many bundles needs {needed}; raise it with `ulimit -v unlimited`"
+        "the address space of this process is limited to {limit} bytes (`ulimit -v`), but a broker for this many \
+         bundles needs {needed}; raise it with `ulimit -v unlimited`"
     )]
     AddressSpace {
         /// The limit, in bytes.
@@ -202,7 +203,7 @@ fn shared_memory_way_out(source: &std::io::Error) -> &'static str {
             "; make it writable: `mount -o remount,rw /dev/shm`"
         }
         std::io::ErrorKind::PermissionDenied => {
-            "; let this user make directories there: `chmod 1777 /dev/shm`"
+            "; let this user create directories there: `chmod 1777 /dev/shm`"
         }
         _ => "",
     }
@@ -217,7 +218,7 @@ fn way_out(size: u64, free: u64, needed: u64) -> String {
         "make it larger: `mount -o remount,size={advised}M /dev/shm`, for a container `docker run --shm-size={advised}m`"
     );
     match needed <= size {
-        true => format!("wait for others to end, remove what they left there, or {make}"),
+        true => format!("wait until other processes end, remove what they left there, or {make}"),
         false => make,
     }
 }

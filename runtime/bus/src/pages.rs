@@ -17,7 +17,7 @@ pub(crate) fn back_with_memory<T: Send>(blocks: &mut [T]) -> Result<(), ()> {
     match done {
         Ok(()) | Err(rustix::io::Errno::INVAL) => Ok(()),
         Err(error) => {
-            tracing::debug!(%error, "shared memory cannot be had");
+            tracing::debug!(%error, "cannot allocate shared memory");
             give_up(blocks);
             Err(())
         }
@@ -90,7 +90,7 @@ pub(crate) fn take_memory_from(start: *mut u8, len: usize) {
     // a valid value of every block.
     let done = unsafe { rustix::mm::madvise(first, whole, rustix::mm::Advice::LinuxRemove) };
     if let Err(error) = done {
-        tracing::warn!(%error, "cannot give shared memory back");
+        tracing::warn!(%error, "cannot release shared memory");
     }
 }
 

@@ -279,7 +279,7 @@ impl Peer {
         match codec::encode(message) {
             Ok(bytes) => membership.push(&bytes),
             Err(error) => {
-                tracing::error!(%error, "a message cannot be sent, the session ends");
+                tracing::error!(%error, "cannot send a message, the session ends");
                 // Without it, the broker would take the other messages for complete. Empty ones are
                 // invalid.
                 membership.push(&[]);
@@ -487,7 +487,7 @@ impl Peer {
             && now.duration_since(since) >= self.options.grace
         {
             let seconds = self.options.grace.as_secs_f32();
-            self.close(format!("the broker has been gone for {seconds} s"));
+            self.close(format!("the broker has been unavailable for {seconds} s"));
         }
     }
 }

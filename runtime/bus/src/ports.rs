@@ -315,7 +315,7 @@ pub(crate) fn clean_dead_nodes(config: &Config) {
     }
     for view in dead {
         if let Err(why) = view.try_remove_stale_resources() {
-            tracing::debug!(?why, "a dead node is still to be cleaned");
+            tracing::debug!(?why, "cannot clean up a dead node");
         }
     }
 }

@@ -46,7 +46,7 @@ pub(crate) struct Inside {
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum NoEntry {
     /// The broker is ending or has ended.
-    #[error("the broker is about to end, or somebody has removed its shared memory")]
+    #[error("the broker is about to end, or its shared memory was removed")]
     Locked,
     /// The generation may be usable, but this process cannot use it.
     #[error("cannot use the shared memory of the broker in {root}: {source}")]

@@ -75,7 +75,7 @@ impl RuntimeFiles {
             return;
         }
         if let Err(lost) = self.restore() {
-            let lost = format!("{lost}; until the broker is started again, nobody can join it");
+            let lost = format!("{lost}; no process can join until the broker is restarted");
             tracing::error!("{lost}");
             *self.lost.lock().unwrap_or_else(PoisonError::into_inner) = Some(lost);
             *state = State::Lost;
@@ -91,12 +91,12 @@ impl RuntimeFiles {
     fn restore(&self) -> Result<(), String> {
         if !self.generation.root.is_dir() {
             let root = self.generation.root.display();
-            return Err(format!("somebody has removed the shared memory {root}"));
+            return Err(format!("the shared memory {root} was removed"));
         }
         self.restore_lock()?;
         if let Err(error) = self.generation.restore(&self.instance) {
             self.say(
-                "cannot make again what was removed from the runtime directory",
+                "cannot restore the files that were removed from the runtime directory",
                 &error,
             );
         }
@@ -108,7 +108,7 @@ impl RuntimeFiles {
         let text = format!("{what}: {error}");
         let mut said = self.trouble.lock().unwrap_or_else(PoisonError::into_inner);
         if *said != text {
-            tracing::warn!("{text}; it is tried again and again");
+            tracing::warn!("{text}; it is retried repeatedly");
             *said = text;
         }
     }
@@ -126,7 +126,9 @@ impl RuntimeFiles {
             .and_then(|()| InstanceLock::take(&self.instance));
         match taken {
             Ok(taken) => {
-                tracing::warn!("the lock of the runtime directory was removed; it was made again");
+                tracing::warn!(
+                    "the lock of the runtime directory was removed; it was created again"
+                );
                 *lock = Some(taken);
                 Ok(())
             }
@@ -135,13 +137,13 @@ impl RuntimeFiles {
                     .map(|pid| format!(", process {pid}"))
                     .unwrap_or_default();
                 Err(format!(
-                    "somebody has removed the lock of the runtime directory, and another broker{pid} has taken it since"
+                    "the lock of the runtime directory was removed, and another broker{pid} has taken it since"
                 ))
             }
             // The next call tries again.
             Err(LockError::Io(error)) => {
                 self.say(
-                    "cannot make the lock of the runtime directory again",
+                    "cannot create the lock of the runtime directory again",
                     &error,
                 );
                 Ok(())

@@ -16,7 +16,7 @@ pub const STDERR: &str = "QCBUS_STDERR";
 /// process is read by the broker and ends with it. Returns `None` if the stderr is not read.
 #[expect(
     unsafe_code,
-    reason = "a descriptor that was handed over is known by its number only"
+    reason = "a descriptor that was passed on is known only by its number"
 )]
 pub fn lasting_stderr() -> Option<OwnedFd> {
     let told = std::env::var(STDERR).ok()?;

@@ -147,10 +147,10 @@ pub(crate) enum BrokenStream {
         most: usize,
     },
     /// The length of a frame is invalid.
-    #[error("a frame of {0} bytes came; at most {FRAME_BYTES} are allowed")]
+    #[error("a frame of {0} bytes was received; at most {FRAME_BYTES} are allowed")]
     Frame(usize),
     /// Too many useless frames arrived in a row.
-    #[error("{0} frames in a row brought nothing")]
+    #[error("{0} useless frames were received in a row")]
     Useless(u32),
 }
 

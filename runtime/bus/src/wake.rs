@@ -15,10 +15,7 @@ pub(crate) const TICK: Duration = Duration::from_millis(20);
 struct ListenerFd(WakeListener);
 
 impl AsRawFd for ListenerFd {
-    #[expect(
-        unsafe_code,
-        reason = "iceoryx2 hands out its descriptor only this way"
-    )]
+    #[expect(unsafe_code, reason = "iceoryx2 exposes its descriptor only this way")]
     fn as_raw_fd(&self) -> RawFd {
         // SAFETY: the descriptor belongs to the listener, which lives as long as `self`. Through
         // this handle it is only waited on, and neither closed nor read from.
@@ -26,7 +23,7 @@ impl AsRawFd for ListenerFd {
     }
 }
 
-#[expect(unsafe_code, reason = "tokio asks for a descriptor that stays valid")]
+#[expect(unsafe_code, reason = "tokio requires a descriptor that stays valid")]
 fn register(listener: ListenerFd) -> std::io::Result<AsyncFd<ListenerFd>> {
     // SAFETY: `as_raw_fd` returns the same descriptor every time. It is open until the listener is
     // dropped, which only happens together with the registration.
@@ -59,7 +56,7 @@ impl Waker {
         match woken {
             Ok(Ok(mut guard)) => guard.clear_ready(),
             Ok(Err(error)) => {
-                tracing::warn!(%error, "cannot wait for a wake-up; looking every {TICK:?} instead");
+                tracing::warn!(%error, "cannot wait for a wake-up; polling every {TICK:?} instead");
                 tokio::time::sleep(limit).await;
             }
             Err(_) => {}

@@ -535,9 +535,9 @@ pub struct RuleArgs {
 /// `qcbus expand`.
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "Scenarios that are referred to are looked for beside the scenario or in its archive, then in the\n\
-directories of SCENARIO_PATH. What is found on the way is said on stderr. Exit code 1, and no file: a\n\
-reference leads nowhere, which value is meant is open, or a limit is exceeded."
+    after_help = "Referenced scenarios are searched next to the scenario or in its archive, then in \
+                  the\ndirectories of SCENARIO_PATH. Findings are written to stderr. Exit code 1 and no output \
+                  file: a\nreference cannot be resolved, a value is ambiguous, or a limit is exceeded."
 )]
 pub struct ExpandArgs {
     /// A modular scenario (.xosc) or an archive of one (.mosc)
@@ -550,9 +550,9 @@ pub struct ExpandArgs {
 /// `qcbus pack`.
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "Files that lie below the directory of the main scenario keep their path from there, others go by \
-their\nname alone. What is wrong with the archive is said on stderr; it is written all the same, and errors\n\
-end in exit code 1."
+    after_help = "Files below the directory of the main scenario keep their path from there, other files keep \
+                  only their\nname. Problems of the archive are written to stderr; it is written anyway, and \
+                  errors\nlead to exit code 1."
 )]
 pub struct PackArgs {
     /// The main scenario, then its referenced files; in the archive the first is called main.xosc
@@ -611,7 +611,7 @@ fn reporter() -> impl TypedValueParser<Value = &'static Registration> {
     let row = |it: &&'static Registration| PossibleValue::new(it.alias).help(it.about);
     let find = |alias: String| REPORTERS.into_iter().find(|it| it.alias == alias);
     PossibleValuesParser::new(REPORTERS.iter().map(row))
-        .try_map(move |alias| find(alias).ok_or("there is no such reporter"))
+        .try_map(move |alias| find(alias).ok_or("unknown reporter"))
 }
 
 /// Parses `NAME=VALUE`.
@@ -626,7 +626,7 @@ fn name_value(text: &str) -> Result<(String, String), String> {
 fn threads(text: &str) -> Result<usize, String> {
     let number = text.parse().ok();
     let number = number.filter(|it| (1..=Permits::MOST).contains(it));
-    number.ok_or_else(|| format!("`{text}` is no number from 1 to {}", Permits::MOST))
+    number.ok_or_else(|| format!("`{text}` is not a number from 1 to {}", Permits::MOST))
 }
 
 /// Parses `250ms`, `30s`, `5m`, `2h`, `90d`; a number without a unit is seconds.
@@ -635,7 +635,7 @@ pub fn duration(text: &str) -> Result<Duration, String> {
         .find(|c: char| !(c.is_ascii_digit() || c == '.'))
         .unwrap_or(text.len());
     let (number, unit) = text.split_at(split);
-    let wrong = || format!("`{text}` is no time; write 250ms, 30s, 5m, 2h or 90d");
+    let wrong = || format!("`{text}` is not a duration; write 250ms, 30s, 5m, 2h or 90d");
     let number: f64 = number.parse().map_err(|_| wrong())?;
     let seconds = match unit {
         "ms" => number / 1000.0,
@@ -652,7 +652,7 @@ pub fn duration(text: &str) -> Result<Duration, String> {
 fn rest(text: &str) -> Result<Duration, String> {
     let time = duration(text)?;
     let allowed = Duration::from_millis(10)..=Duration::from_secs(3600);
-    let wrong = || format!("`{text}` is no time for files to rest; write one from 10ms to 1h");
+    let wrong = || format!("`{text}` is not a valid time for files to settle; use 10ms to 1h");
     allowed.contains(&time).then_some(time).ok_or_else(wrong)
 }
 

@@ -118,8 +118,8 @@ pub fn hint(name: &str) -> String {
     match suggest(name) {
         Some(near) => format!("did you mean `{near}`?"),
         None => match with_word(name).as_slice() {
-            [] => "`qcbus rule` lists all".to_owned(),
-            near => format!("rules with such a word: {}", near.join(", ")),
+            [] => "`qcbus rule` lists all rules".to_owned(),
+            near => format!("rules with this word: {}", near.join(", ")),
         },
     }
 }

@@ -50,7 +50,7 @@ pub struct Sandboxed {
 /// Returns [`SandboxError::Kernel`] if the process is not confined, or only partly.
 pub fn confine(sandboxed: &Sandboxed) -> Result<(), SandboxError> {
     if threads() != Some(1) {
-        let why = "threads run already that would stay outside";
+        let why = "other threads already run and would stay unconfined";
         return Err(SandboxError::kernel("a single thread is needed", why));
     }
     let may = &sandboxed.may;
@@ -83,7 +83,7 @@ pub fn confine(sandboxed: &Sandboxed) -> Result<(), SandboxError> {
         true => Ok(()),
         false => Err(SandboxError::kernel(
             "Landlock",
-            "this kernel does not have it",
+            "this kernel does not support it",
         )),
     }
 }

@@ -33,7 +33,7 @@ impl LauncherEnd {
     /// Ends this process in the same way, so that its parent learns how the session ended.
     #[expect(
         unsafe_code,
-        reason = "to end by a signal it must have its first meaning again"
+        reason = "a signal ends the process only with its default action"
     )]
     pub fn end(self) -> ! {
         match self {
@@ -69,8 +69,8 @@ pub fn run_sessions(
     session: impl Fn(u32) -> After,
 ) -> Result<LauncherEnd, SandboxError> {
     if threads() != Some(1) {
-        let why = "this process has started threads before";
-        return Err(SandboxError::kernel("a session's own process", why));
+        let why = "this process has already started threads";
+        return Err(SandboxError::kernel("starting a session process", why));
     }
     let signals = Signals::take(unsupervised);
     let ended = sessions(&signals, unsupervised, session);
@@ -96,7 +96,7 @@ fn sessions(
 /// Forks a process that continues from here. Returns in the parent only.
 #[expect(
     unsafe_code,
-    reason = "a session begins as what this process is, so it is forked"
+    reason = "a session continues from the state of this process, so it is forked"
 )]
 fn start(
     signals: &Signals,
@@ -109,7 +109,7 @@ fn start(
     let child = unsafe { libc::fork() };
     match child {
         -1 => Err(SandboxError::kernel(
-            "a session's own process",
+            "starting a session process",
             std::io::Error::last_os_error(),
         )),
         0 => {
@@ -127,7 +127,7 @@ fn start(
 
 /// Makes this process die with its parent and not receive keyboard signals. The parent receives
 /// those and forwards them.
-#[expect(unsafe_code, reason = "prctl and setpgid have no safe form here")]
+#[expect(unsafe_code, reason = "prctl and setpgid have no safe interface here")]
 fn follow(parent: u32, unsupervised: bool) {
     // SAFETY: plain system calls on this process.
     let followed = unsafe {
@@ -150,7 +150,7 @@ struct Signals {
 
 #[expect(
     unsafe_code,
-    reason = "waiting for signals in a single thread has no safe form here"
+    reason = "waiting for signals in a single thread has no safe interface here"
 )]
 impl Signals {
     fn take(unsupervised: bool) -> Signals {

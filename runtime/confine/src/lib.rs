@@ -28,7 +28,10 @@ pub use orders::{Orders, SandboxError};
 pub use outer::Outer;
 
 /// Returns the Landlock version of the running kernel, or 0 if it has none.
-#[expect(unsafe_code, reason = "the crate does not tell what the kernel has")]
+#[expect(
+    unsafe_code,
+    reason = "the crate does not return the Landlock version of the kernel"
+)]
 pub fn kernel_level() -> u32 {
     const TELL_THE_LEVEL: libc::c_uint = 1;
     let nothing = std::ptr::null::<libc::c_void>();

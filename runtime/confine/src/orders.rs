@@ -12,7 +12,7 @@ const OFF: &str = "off";
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SandboxError {
     /// The value of the variable is invalid for this version.
-    #[error("{VARIABLE} cannot be understood: {0}")]
+    #[error("{VARIABLE} is invalid: {0}")]
     Orders(String),
     /// The kernel refuses.
     #[error("{what}: {why}")]
@@ -56,7 +56,7 @@ impl Orders {
         let wrong = |why: String| SandboxError::Orders(why);
         let text = text
             .to_str()
-            .ok_or_else(|| wrong("it is no text".to_owned()))?;
+            .ok_or_else(|| wrong("it is not valid UTF-8".to_owned()))?;
         let may = serde_json::from_str(text).map_err(|error| wrong(error.to_string()))?;
         Ok(Orders::On(may))
     }

@@ -54,7 +54,7 @@ impl Outer {
     /// Makes a process start in the sandbox.
     #[expect(
         unsafe_code,
-        reason = "only the new process itself can step into the ring, between fork and exec"
+        reason = "only the new process itself can enter the sandbox, between fork and exec"
     )]
     pub fn surround(self, command: &mut Command) {
         // SAFETY: between fork and exec only system calls are made; nothing is allocated and no

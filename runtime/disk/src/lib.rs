@@ -168,7 +168,7 @@ fn sync_both(first: &File, second: &File) -> io::Result<()> {
 /// more.
 fn start_writing(file: &File) {
     // This covers the whole file. Its result is ignored, because only the later sync counts.
-    #[expect(unsafe_code, reason = "nobody else has this call")]
+    #[expect(unsafe_code, reason = "no safe interface provides this call")]
     // SAFETY: the descriptor is open as long as the file is borrowed, and no memory is passed.
     unsafe {
         libc::sync_file_range(file.as_raw_fd(), 0, 0, libc::SYNC_FILE_RANGE_WRITE);

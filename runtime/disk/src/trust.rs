@@ -68,34 +68,35 @@ pub enum Foreign {
 fn explain(asked: &Path, at: &Path, why: &Foreign) -> String {
     let (us, place) = (rustix::process::geteuid().as_raw(), to_text(at));
     let end = match asked == at {
-        true => "so others decide what is in it".to_owned(),
-        false => format!("so others decide what {} is", to_text(asked)),
+        true => "so others control its contents".to_owned(),
+        false => format!("so others control {}", to_text(asked)),
     };
     match why {
         Foreign::Owner(OVERFLOW) => format!(
-            "{place} belongs to user {OVERFLOW} (nobody) and not to user {us}, who runs this, {end}: that is \
-             how files of users show whom this container does not know, and what root writes to NFS with \
-             root_squash; run this as the user who owns it, or use a directory on a disk of this machine"
+            "{place} belongs to user {OVERFLOW} (nobody), not to user {us} who runs this program, {end}: files \
+             of users that this container does not know look like this, and so do files that root writes to NFS \
+             with root_squash; run this as the owner, or use a directory on a local disk"
         ),
         Foreign::Owner(them) => format!(
-            "{place} belongs to user {them} and not to user {us}, who runs this, {end}: run this as user \
-             {them} (`docker run --user {them}`), or make it yours (`chown {us}`) after a look at what is in it"
+            "{place} belongs to user {them}, not to user {us} who runs this program, {end}: run this as user \
+             {them} (`docker run --user {them}`), or take ownership (`chown {us}`) after checking its contents"
         ),
         Foreign::World(mode) | Foreign::Group(mode, _) if mode & 0o1000 != 0 => format!(
-            "others may write to {place} (mode {mode:04o}; its sticky bit only protects what is there \
-             already), {end}: use a directory of your own below it ({}/NAME)",
+            "others may write to {place} (mode {mode:04o}; its sticky bit only protects existing entries), \
+             {end}: use a directory of your own below it ({}/NAME)",
             place.trim_end_matches('/')
         ),
         Foreign::World(mode) => format!(
-            "everybody may write to {place} (mode {mode:04o}), {end}: take that away (`chmod o-w`), or see to \
-             it that a directory's entries are their owners' (`chmod +t`) and keep what is yours below it"
+            "everyone may write to {place} (mode {mode:04o}), {end}: remove that permission (`chmod o-w`), or \
+             protect a directory's entries with the sticky bit (`chmod +t`) and use a directory of your own \
+             below it"
         ),
         Foreign::Group(mode, group) => format!(
-            "group {group} may write to {place} (mode {mode:04o}), {end}: take that away (`chmod g-w`), or \
-             see to it that a directory's entries are their owners' (`chmod +t`); only the private group of \
-             the user, of the same number, counts as the user"
+            "group {group} may write to {place} (mode {mode:04o}), {end}: remove that permission (`chmod g-w`), \
+             or protect a directory's entries with the sticky bit (`chmod +t`); only the user's private group, \
+             which has the same number, is trusted"
         ),
-        Foreign::Special => format!("{place} is no regular file, {end}"),
+        Foreign::Special => format!("{place} is not a regular file, {end}"),
     }
 }
 

@@ -166,7 +166,9 @@ fn check_directory(
             true => String::new(),
             false => format!(", `{}`", twice.join("`, `")),
         };
-        let text = format!("the archive has several members of one name{named}; the last is read");
+        let text = format!(
+            "the archive has several members with the same name{named}; the last one is read"
+        );
         faults.push(TextFault::new(Code::ArchiveDuplicate, 0, text));
     }
     let escaping: Vec<String> = (0..archive.len())
@@ -184,7 +186,7 @@ fn check_directory(
         .take(MOST_NAMED)
         .collect();
     for what in escaping {
-        let text = format!("{what}; it is never read");
+        let text = format!("{what}; it is not read");
         faults.push(TextFault::new(Code::ArchiveEscapes, 0, text));
     }
     Ok(())
@@ -196,10 +198,11 @@ fn refused(name: &str) -> String {
     match has_only_backslashes(name) {
         true => {
             format!(
-                "the member `{name_shown}` has a backslash in its name, and names in archives are parted by `/`"
+                "the member `{name_shown}` has a backslash in its name, but names in archives use `/` as \
+                 separator"
             )
         }
-        false => format!("the member `{name_shown}` leads out of the archive"),
+        false => format!("the member `{name_shown}` points outside the archive"),
     }
 }
 
@@ -322,7 +325,7 @@ fn damaged(packed: &[u8], error: &ZipError) -> TextFault {
             TextFault::new(Code::ArchiveTruncated, 0, text)
         }
         false => {
-            let text = "the file is no zip archive, although its name says so";
+            let text = "the file is not a zip archive, although its name says so";
             TextFault::new(Code::ArchiveMalformed, 0, text)
         }
     }

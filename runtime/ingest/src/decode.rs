@@ -99,7 +99,7 @@ fn open(bytes: &[u8]) -> Opening {
         | [0, 0, 0xFE, 0xFF, ..]
         | [0, 0, 0, b'<', ..]
         | [b'<', 0, 0, 0, ..] => {
-            let text = "the file is in UTF-32, which is not read; store it as UTF-8";
+            let text = "the file is in UTF-32, which is not supported; store it as UTF-8";
             found(
                 Charset::Utf8,
                 0,
@@ -119,7 +119,7 @@ fn is_utf16(encoding: &'static Encoding) -> bool {
 }
 
 fn transcoded(name: &str) -> TextFault {
-    let text = format!("the file is in {name}, not in UTF-8; places count its characters as UTF-8");
+    let text = format!("the file is in {name}, not in UTF-8; positions refer to its text in UTF-8");
     TextFault::new(Code::EncodingTranscoded, 0, text)
 }
 
@@ -162,8 +162,7 @@ fn contradiction(text: &[u8]) -> Option<TextFault> {
         return None;
     }
     let text = format!(
-        "the file declares encoding \"{label}\" but begins with a UTF-8 byte-order mark; the mark \
-         is believed"
+        "the file declares encoding \"{label}\" but begins with a UTF-8 byte-order mark; it is read as UTF-8"
     );
     Some(TextFault::new(Code::EncodingMismatch, offset + 3, text))
 }
@@ -252,7 +251,7 @@ fn utf8(bytes: Vec<u8>, faults: &mut Vec<TextFault>) -> (String, Option<Vec<u8>>
                 Code::EncodingMalformed,
                 text.len(),
                 format!(
-                    "the {} not valid UTF-8; wrong encoding declaration?",
+                    "the {} not valid UTF-8; the encoding declaration may be wrong",
                     hex(chunk.invalid())
                 ),
             ));

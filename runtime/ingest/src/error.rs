@@ -44,7 +44,7 @@ pub enum IngestError {
         exceeded: Exceeded,
     },
     /// The file changed or vanished during each of several consecutive reads.
-    #[error("read {}: it {what} while it was being read; it is read again once it has settled", path.display())]
+    #[error("read {}: it {what} while it was being read; it is read again when it no longer changes", path.display())]
     Unsettled {
         /// The file.
         path: PathBuf,

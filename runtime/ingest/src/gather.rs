@@ -362,7 +362,7 @@ impl<S: Source> Walk<'_, S> {
         match expansion.image(self.walking.max_image) {
             Some(image) => {
                 let made = self.source.expanded(&image)?;
-                Ok(made.map_err(|why| (format!("what it is expanded to {why}"), 0)))
+                Ok(made.map_err(|why| (format!("the expanded scenario {why}"), 0)))
             }
             None => {
                 let why = "its image would be larger than the limit max_image allows";

@@ -278,12 +278,13 @@ fn open(path: &Path, bytes: Vec<u8>, limits: &Limits) -> NamedText {
         bytes
     };
     if is_zip(&bytes) {
-        let text = "the file is a zip archive although its name promises XML; modular scenarios end in .mosc";
+        let text = "the file is a zip archive, although its name is that of an XML file; names of modular \
+                    scenarios end in .mosc";
         faults.push(TextFault::new(FaultCode::ArchiveMalformed, 0, text));
         return empty(path.to_path_buf(), faults);
     }
     if promises_gzip(path) && !packed && !bytes.is_empty() {
-        let text = "the name promises a gzip file, but the bytes are none";
+        let text = "the name is that of a gzip file, but the content is not gzip";
         faults.push(TextFault::new(FaultCode::GzipMalformed, 0, text));
     }
     decoded(path.to_path_buf(), bytes, faults, limits)
@@ -350,7 +351,8 @@ fn inflate(path: &Path, packed: &[u8], limits: &Limits, faults: &mut Vec<TextFau
         };
         faults.push(TextFault::new(code, 0, trouble.to_string()));
     } else if !promises_gzip(path) {
-        let text = "the file is packed by gzip although its name promises plain XML";
+        let text =
+            "the file is compressed with gzip, although its name is that of a plain XML file";
         faults.push(TextFault::new(FaultCode::EncodingTranscoded, 0, text));
     }
     inflated.bytes
@@ -404,12 +406,12 @@ impl Includes<'_> {
             return Err((FaultCode::IncludeMalformed, text));
         };
         let Some(boundary) = self.boundary else {
-            let text =
-                format!("the include of {written} was not read: the document came without a file");
+            let text = format!("the include of {written} was not read: the document has no file");
             return Err((FaultCode::IncludeMissing, text));
         };
         if written.contains("://") {
-            let text = format!("the include of {written} is not fetched; only files are included");
+            let text =
+                format!("the include of {written} is not fetched; only files can be included");
             return Err((FaultCode::IncludeMalformed, text));
         }
         if names_directory(written) {
@@ -483,7 +485,7 @@ fn inside(path: &Path, boundary: &Path, written: &str) -> Result<(), Refusal> {
         return Ok(());
     }
     let text = format!(
-        "the include of {written} leads out of {}; included files must lie inside",
+        "the include of {written} points outside {}; included files must be inside it",
         boundary.display()
     );
     Err((FaultCode::IncludeEscapes, text))

@@ -104,14 +104,14 @@ fn missing_reference(root: &Document<'_>, missing: &MissingDocument) -> Remark {
         path if *why == Absence::NotThere && !reference.trim_start().starts_with('/') => {
             let because = match missing.role {
                 DocumentRole::Scenario => "",
-                _ => ", because paths start at the directory of the file",
+                _ => ", because relative paths start at the directory of the file",
             };
-            format!("; it was looked for at `{path}`{because}")
+            format!("; the path resolves to `{path}`{because}")
         }
-        path => format!("; it was looked for at `{path}`"),
+        path => format!("; the path resolves to `{path}`"),
     };
     let unused = match (missing.role, missing.level) {
-        (DocumentRole::Catalog, Level::Information) => "; nothing of it is referred to",
+        (DocumentRole::Catalog, Level::Information) => "; no reference uses it",
         _ => "",
     };
     let behind = within.as_ref().map_or_else(String::new, |within| {
@@ -119,7 +119,7 @@ fn missing_reference(root: &Document<'_>, missing: &MissingDocument) -> Remark {
         format!("; {path}:{row}:{column} refers to it")
     });
     let text = format!("{what} `{reference}` {why}{looked}{unused}{behind}");
-    let open = format!("where {what} `{reference}` leads is not known");
+    let open = format!("the target of {what} `{reference}` is not known");
     let mut place = place_of(root, missing);
     place.elsewhere = within.as_ref().map(|within| OtherPlace {
         path: within.path.clone(),
@@ -159,7 +159,7 @@ pub fn resting(root: &Document<'_>, it: &Resting<'_>, binding: bool) -> Option<R
     let fact = format!("{} {} {}", name_of_role(it.role), it.path, standing_of(it));
     let (text, level) = match (binding, it.verdict) {
         (false, _) => (
-            format!("{fact}; the verdict on this file is its own (--own-verdict)"),
+            format!("{fact}; the verdict on this file does not depend on it (--own-verdict)"),
             Level::Information,
         ),
         (true, Some(Verdict::Rejected)) => (
@@ -177,7 +177,7 @@ pub fn resting(root: &Document<'_>, it: &Resting<'_>, binding: bool) -> Option<R
 pub fn unwatched(root: &Document<'_>, role: DocumentRole, path: &str, referred_at: u32) -> Remark {
     let what = name_of_role(role);
     let text =
-        format!("{what} {path} is not watched, so nobody judges it; watch its directory, too");
+        format!("{what} {path} is not watched, so it is not checked; watch its directory, too");
     rests_on_remark(root, referred_at, text, Level::Warning, None)
 }
 
@@ -190,7 +190,7 @@ fn rests_on_remark(
 ) -> Remark {
     Remark {
         checker: RESTS_ON_CHECKER.to_owned(),
-        description: String::from("What the file rests on is accepted itself."),
+        description: String::from("All files that the file depends on are accepted."),
         open,
         issue: Some(Issue {
             id: 0,
@@ -214,7 +214,7 @@ fn name_of_role(role: DocumentRole) -> &'static str {
 fn standing_of(it: &Resting<'_>) -> String {
     match (it.verdict, it.errors) {
         (Some(Verdict::Rejected), 0) => {
-            "is rejected, because it rests on a rejected file".to_owned()
+            "is rejected, because it depends on a rejected file".to_owned()
         }
         (Some(Verdict::Rejected), 1) => "is rejected: it has 1 error".to_owned(),
         (Some(Verdict::Rejected), errors) => format!("is rejected: it has {errors} errors"),
@@ -242,7 +242,7 @@ fn referring_place(root: &Document<'_>, referred_at: u32) -> Locations {
 fn reference_remark(text: String, open: String, level: Level, locations: Vec<Locations>) -> Remark {
     Remark {
         checker: String::from("qcbus_references"),
-        description: String::from("What the file refers to is there and can be read."),
+        description: String::from("All files that the file refers to exist and can be read."),
         open: (level == Level::Warning).then_some(open),
         issue: Some(Issue {
             id: 0,
@@ -313,7 +313,7 @@ pub fn faults_of_root(root: &Document<'_>) -> Vec<Remark> {
         let limit = fault.code.group() == FaultGroup::Limit;
         Remark {
             checker: String::from("qcbus_file"),
-            description: String::from("The file is whole and can be read."),
+            description: String::from("The file is complete and can be read."),
             open: limit.then(|| fault.text.to_owned()),
             issue: Some(Issue {
                 id: 0,

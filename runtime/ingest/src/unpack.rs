@@ -71,7 +71,7 @@ pub(crate) fn inflated_cap(packed: u64, max_bytes: u64, max_ratio: u32) -> Excee
     let (limit, what, allowed) = if by_ratio < max_bytes {
         (
             "max_ratio",
-            "inflated bytes or more for so small a stream",
+            "inflated bytes or more for such a small stream",
             by_ratio,
         )
     } else {

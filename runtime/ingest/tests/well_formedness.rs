@@ -142,8 +142,8 @@ fn what_can_be_read_of_a_faulty_file_is_in_the_tree() {
     assert_eq!(
         texts,
         [
-            "</a> where </b> is due, for the element opened in row 1",
-            "a second root element <d>; a file has one"
+            "found </a>, expected </b> for the element opened in row 1",
+            "a second root element <d>; only one is allowed"
         ]
     );
 }

@@ -208,7 +208,7 @@ fn split(
     let value = value.as_bytes();
     if value.iter().any(|byte| b"*?[\\".contains(byte)) {
         return Err(WhyCold::new(format!(
-            "the value of ${name} has characters that a shell acts on; put it in double quotes"
+            "the value of ${name} has characters that are special in a shell; put it in double quotes"
         )));
     }
     for byte in value {
@@ -243,7 +243,7 @@ impl Reader<'_> {
                 }
                 other => {
                     return Err(WhyCold::new(format!(
-                        "its command needs a shell, for `{}`",
+                        "its command needs a shell because of `{}`",
                         other.escape_debug()
                     )));
                 }
@@ -291,7 +291,7 @@ impl Reader<'_> {
                 Some('$') => self.variable(true)?,
                 Some(next @ ('`' | '\\')) => {
                     return Err(WhyCold::new(format!(
-                        "its command needs a shell, for `{next}`"
+                        "its command needs a shell because of `{next}`"
                     )));
                 }
                 Some(next) => self.push(next),
@@ -310,12 +310,12 @@ impl Reader<'_> {
         let closed = !in_braces || self.rest.next_if_eq(&'}').is_some();
         if !closed || name.is_empty() || name.starts_with(|it: char| it.is_ascii_digit()) {
             return Err(WhyCold::new(
-                "its command needs a shell, for a `$` that is more than $NAME or ${NAME}",
+                "its command needs a shell because of a `$` that is not $NAME or ${NAME}",
             ));
         }
         if SHELLS_OWN.contains(&name.as_str()) || name.starts_with("BASH") {
             return Err(WhyCold::new(format!(
-                "its command needs a shell, whose own variable ${name} is"
+                "its command needs a shell because ${name} is a variable of the shell"
             )));
         }
         let pieces = self.word.get_or_insert_default();
@@ -385,21 +385,21 @@ mod tests {
     #[test]
     fn what_needs_a_shell_is_said() {
         for (command, why) in [
-            ("a; b", "its command needs a shell, for `;`"),
-            ("a && b", "its command needs a shell, for `&`"),
-            ("a | b", "its command needs a shell, for `|`"),
-            ("a > b", "its command needs a shell, for `>`"),
-            ("a *.xml", "its command needs a shell, for `*`"),
-            ("a \\b", "its command needs a shell, for `\\\\`"),
-            ("~/a", "its command needs a shell, for `~`"),
-            ("a \"`b`\"", "its command needs a shell, for ``"),
-            ("a #b", "its command needs a shell, for `#`"),
-            ("a\nb", "its command needs a shell, for `\\n`"),
+            ("a; b", "its command needs a shell because of `;`"),
+            ("a && b", "its command needs a shell because of `&`"),
+            ("a | b", "its command needs a shell because of `|`"),
+            ("a > b", "its command needs a shell because of `>`"),
+            ("a *.xml", "its command needs a shell because of `*`"),
+            ("a \\b", "its command needs a shell because of `\\\\`"),
+            ("~/a", "its command needs a shell because of `~`"),
+            ("a \"`b`\"", "its command needs a shell because of ``"),
+            ("a #b", "its command needs a shell because of `#`"),
+            ("a\nb", "its command needs a shell because of `\\n`"),
             ("a 'b", "its command has a quote that is not closed"),
             ("a \"b", "its command has a quote that is not closed"),
             (
                 "a $PWD",
-                "its command needs a shell, whose own variable $PWD is",
+                "its command needs a shell because $PWD is a variable of the shell",
             ),
             ("  ", "the command is empty"),
         ] {

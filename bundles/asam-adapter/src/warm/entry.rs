@@ -89,18 +89,18 @@ fn find(name: &str, path: &OsStr, cwd: &Path) -> Result<PathBuf, WhyCold> {
         let program = PathBuf::from(name);
         if !program.is_absolute() {
             return Err(WhyCold::new(format!(
-                "`{name}` depends on the directory it is run in ({}); name it by its whole path",
+                "`{name}` depends on the working directory ({}); use its absolute path",
                 cwd.display()
             )));
         }
         return runnable(&program)
             .then_some(program)
-            .ok_or_else(|| WhyCold::new(format!("`{name}` is no file that can be run")));
+            .ok_or_else(|| WhyCold::new(format!("`{name}` is not an executable file")));
     }
     for directory in std::env::split_paths(path) {
         if !directory.is_absolute() {
             return Err(WhyCold::new(
-                "the PATH has a directory that is not absolute before the program is found",
+                "the PATH contains a relative directory before the directory of the program",
             ));
         }
         let program = directory.join(name);
@@ -163,13 +163,13 @@ fn script(word: &str) -> Result<Program, WhyCold> {
     let path = PathBuf::from(word);
     if !path.is_absolute() {
         return Err(WhyCold::new(format!(
-            "the script `{word}` depends on the directory of each job; name it by its whole path"
+            "the script `{word}` depends on the directory of each job; use its absolute path"
         )));
     }
     if path.is_file() {
         Ok(Program::Script(path))
     } else {
-        Err(WhyCold::new(format!("the script `{word}` is no file")))
+        Err(WhyCold::new(format!("the script `{word}` is not a file")))
     }
 }
 
@@ -180,7 +180,7 @@ fn option(word: String) -> Result<String, WhyCold> {
         Ok(word)
     } else {
         Err(WhyCold::new(format!(
-            "its interpreter has the option `{word}`, which only a plain run has"
+            "its interpreter has the option `{word}`, which only a plain run supports"
         )))
     }
 }
@@ -194,11 +194,11 @@ fn checked(interpreter: PathBuf) -> Result<PathBuf, WhyCold> {
         .map(|it| it.iter().all(|byte| byte.is_ascii_digit() || *byte == b'.'));
     let shown = interpreter.display();
     if version != Some(true) {
-        return Err(WhyCold::new(format!("`{shown}` is no Python program")));
+        return Err(WhyCold::new(format!("`{shown}` is not a Python program")));
     }
     if !interpreter.is_absolute() || !runnable(&interpreter) {
         return Err(WhyCold::new(format!(
-            "`{shown}` is no interpreter that can be run"
+            "`{shown}` is not an executable interpreter"
         )));
     }
     if head(&interpreter)?.starts_with(b"\x7fELF") {
@@ -212,7 +212,7 @@ fn checked(interpreter: PathBuf) -> Result<PathBuf, WhyCold> {
 
 /// Returns the interpreter from the first line of a script.
 fn shebang(program: &Path, head: &[u8], path: &OsStr) -> Result<(PathBuf, Vec<String>), WhyCold> {
-    let not_python = || WhyCold::new(format!("`{}` is no Python program", program.display()));
+    let not_python = || WhyCold::new(format!("`{}` is not a Python program", program.display()));
     let head = String::from_utf8_lossy(head);
     let mut lines = head.split('\n');
     let first = lines.next().and_then(|it| it.strip_prefix("#!"));

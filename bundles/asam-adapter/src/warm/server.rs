@@ -123,7 +123,7 @@ impl Server {
         let meanwhile = |file: std::path::PathBuf| {
             let file = file.display();
             WhyCold::new(format!(
-                "`{file}` changed while it was loaded; it will be again"
+                "`{file}` changed while it was loaded; it would change again at each load"
             ))
         };
         let stamps = Stamps::of(files, begun)
@@ -151,7 +151,9 @@ impl Server {
             return Err(SpawnError::Outdated(format!("`{}`", changed.display())));
         }
         if !self.entry.is_current() {
-            return Err(SpawnError::Outdated("what its command runs".to_owned()));
+            return Err(SpawnError::Outdated(
+                "the program of its command".to_owned(),
+            ));
         }
         let arguments = self.arguments(run)?;
         wire::ask(&self.socket, run, &arguments).map_err(|error| self.gone(error))?;
@@ -208,7 +210,7 @@ impl Server {
         if let Some(name) = difference(&plain(&self.environment), &theirs) {
             let name = name.to_string_lossy();
             return Err(WhyCold::new(format!(
-                "this job has another ${name} than it was loaded with"
+                "${name} of this job differs from its value at load time"
             )));
         }
         if !run.cwd.is_absolute() {
@@ -234,13 +236,12 @@ impl Server {
         if at_end.contains(&error.kind()) {
             let jobs = self.running.len();
             let text = format!(
-                "the interpreter that keeps it warm (process {pid}) has ended, with {jobs} jobs under way"
+                "its fork server (process {pid}) has ended, with {jobs} jobs still running"
             );
             return io::Error::new(io::ErrorKind::UnexpectedEof, text);
         }
         if error.kind() == io::ErrorKind::WouldBlock {
-            let text =
-                format!("the interpreter that keeps it warm (process {pid}) does not answer");
+            let text = format!("its fork server (process {pid}) does not answer");
             return io::Error::new(io::ErrorKind::TimedOut, text);
         }
         error
@@ -249,7 +250,7 @@ impl Server {
     fn strange(&self, answer: &Answer) -> io::Error {
         let pid = self.pid;
         io::Error::other(format!(
-            "the interpreter that keeps it warm (process {pid}) said {answer:?}"
+            "its fork server (process {pid}) sent an unexpected answer: {answer:?}"
         ))
     }
 }
@@ -319,8 +320,9 @@ impl Starting {
 
     /// Waits for the loading and returns the loaded files.
     fn wait(&mut self, patience: Duration) -> Result<Vec<std::path::PathBuf>, WhyCold> {
-        let broken =
-            |error: io::Error| WhyCold::new(format!("its interpreter cannot be heard: {error}"));
+        let broken = |error: io::Error| {
+            WhyCold::new(format!("cannot communicate with its interpreter: {error}"))
+        };
         self.socket
             .set_read_timeout(Some(patience))
             .map_err(broken)?;
@@ -334,7 +336,9 @@ impl Starting {
         match answer {
             Answer::Ready(files) => Ok(files),
             Answer::Cold(why) => Err(WhyCold::new(why)),
-            other => Err(broken(io::Error::other(format!("it said {other:?}")))),
+            other => Err(broken(io::Error::other(format!(
+                "unexpected answer: {other:?}"
+            )))),
         }
     }
 
@@ -349,9 +353,9 @@ impl Starting {
         let last = said.trim_end_matches(['\0', '\n']).lines().next_back();
         WhyCold::new(match last {
             Some(last) if !last.is_empty() => {
-                format!("its interpreter ended while it was loaded: {last}")
+                format!("its interpreter ended during loading: {last}")
             }
-            _ => "its interpreter ended while it was loaded".to_owned(),
+            _ => "its interpreter ended during loading".to_owned(),
         })
     }
 
@@ -408,7 +412,7 @@ fn check_environment(entry: &Entry, environment: &[(OsString, OsString)]) -> Res
         let set = !value.is_empty();
         if name == "PATH" && *value != entry.path {
             return Err(WhyCold::new(
-                "the PATH of the job is not the one its program was looked for in",
+                "the PATH of the job differs from the PATH in which its program was found",
             ));
         }
         if name == "PYTHONINSPECT" && set {
@@ -457,9 +461,7 @@ fn difference<'e>(
 /// Rejects a directory with importable files: `python -m` searches it first.
 fn nothing_to_import(cwd: &Path) -> Result<(), WhyCold> {
     let unreadable = |error: io::Error| {
-        WhyCold::new(format!(
-            "the directory of this job cannot be looked at: {error}"
-        ))
+        WhyCold::new(format!("the directory of this job cannot be read: {error}"))
     };
     for entry in cwd.read_dir().map_err(unreadable)? {
         let entry = entry.map_err(unreadable)?;
@@ -467,7 +469,7 @@ fn nothing_to_import(cwd: &Path) -> Result<(), WhyCold> {
         if stamps::is_importable(&name, &entry) {
             let name = name.to_string_lossy();
             return Err(WhyCold::new(format!(
-                "the directory of this job has `{name}`, which Python would look at before installed modules"
+                "the directory of this job has `{name}`, which Python would find before installed modules"
             )));
         }
     }

@@ -75,14 +75,14 @@ pub(super) fn answer(mut socket: &UnixStream) -> io::Result<Answer> {
     socket.read_exact(&mut length)?;
     let length = u32::from_le_bytes(length) as usize;
     if length > LONGEST {
-        return Err(io::Error::other("an answer that is too long"));
+        return Err(io::Error::other("the answer is too long"));
     }
     let mut body = vec![0; length];
     socket.read_exact(&mut body)?;
     let mut fields = body.split(|byte| *byte == 0);
     let kind = fields.next().unwrap_or_default().to_vec();
     let fields: Vec<&[u8]> = fields.collect();
-    read(&kind, &fields).ok_or_else(|| io::Error::other("an answer that cannot be read"))
+    read(&kind, &fields).ok_or_else(|| io::Error::other("the answer cannot be read"))
 }
 
 fn read(kind: &[u8], fields: &[&[u8]]) -> Option<Answer> {

@@ -333,7 +333,7 @@ sys.exit(2)
 import os
 os._exit(9)
 ",
-        "its interpreter ended while it was loaded",
+        "its interpreter ended during loading",
     ),
     (
         "dies_loudly",
@@ -342,7 +342,7 @@ import os
 os.write(2, b'first\nfor a reason\n')
 os._exit(9)
 ",
-        "its interpreter ended while it was loaded: for a reason",
+        "its interpreter ended during loading: for a reason",
     ),
     (
         "reads_env",

@@ -55,7 +55,7 @@ impl<'d> Finds<'d> {
         there: &'static str,
         text: String,
     ) -> Option<&mut Find<'d>> {
-        let find = Find::of(at, place(target), there, text, "it is taken here, too");
+        let find = Find::of(at, place(target), there, text, "it is also taken here");
         self.note(place(target), place(at), find)
     }
 
@@ -70,7 +70,7 @@ impl<'d> Finds<'d> {
         let start = document.root().map_or(0, |root| root.offset());
         let target = Place::Text(document, start);
         let target = document.root().map_or(target, Place::Node);
-        let find = Find::of(at, target, there, text, "it is referred to here, too");
+        let find = Find::of(at, target, there, text, "it is also referred to here");
         self.note(target, place(at), find)
     }
 
@@ -83,7 +83,7 @@ impl<'d> Finds<'d> {
         there: &'static str,
         text: String,
     ) -> Option<&mut Find<'d>> {
-        let find = Find::of(at, place(target), there, text, "it is put here, too");
+        let find = Find::of(at, place(target), there, text, "it is also set here");
         self.note(place(at), place(target), find)
     }
 

@@ -76,7 +76,10 @@ fn none<'d>(problem: &Problem<'d>, finds: &mut Finds<'d>) {
         }
     };
     if let (Some(find), Some(other)) = (find, first_entity(lacking)) {
-        find.besides(other, "what the reference tool takes for the actor instead");
+        find.besides(
+            other,
+            "the entity that the reference tool takes as the actor instead",
+        );
     }
 }
 
@@ -90,8 +93,8 @@ fn lost(reference: &Followed<'_>, group: Node<'_>, found: &mut Sink<'_>) {
         return;
     };
     let text = format!(
-        "the group `{}` has {} actors, but only the first, `{}`, takes part in what it refers to; for {} refer to it \
-         from a group of its own",
+        "the group `{}` has {} actors, but only the first, `{}`, takes part in the group that it refers to; for \
+         {}, refer to it from a separate group",
         name(reference.group),
         all.len(),
         entity(*first),
@@ -113,8 +116,8 @@ fn kept<'d>(reference: &Followed<'d>, group: Node<'d>, finds: &mut Finds<'d>) {
         return;
     };
     let text = format!(
-        "the group `{}`, which is referred to, has {} actors, but the actor of the referring group takes the place of \
-         the first, `{}`, only: {} as in the library; split it into groups of one actor",
+        "the group `{}`, which is referred to, has {} actors, but the actor of the referring group replaces only \
+         the first, `{}`: {} as in the library; split it into groups with one actor each",
         name(group),
         all.len(),
         entity(*first),
@@ -124,7 +127,12 @@ fn kept<'d>(reference: &Followed<'d>, group: Node<'d>, finds: &mut Finds<'d>) {
         }
     );
     let second = Spot::of(second, "entityRef");
-    finds.brought(reference.node.into(), second, "the actor that stays", text);
+    finds.brought(
+        reference.node.into(),
+        second,
+        "the actor that is not replaced",
+        text,
+    );
 }
 
 /// Notes an entity before the actors. The reference tool takes it for the actor.
@@ -136,8 +144,8 @@ fn before<'d>(reference: &Followed<'d>, group: Node<'d>, finds: &mut Finds<'d>) 
         return;
     }
     let text = format!(
-        "before its actor `{}` the group `{}` has `{}` in `{}`, which the reference tool takes for the actor, because it \
-         is the first `EntityRef`; put `Actors` first",
+        "before its actor `{}` the group `{}` has `{}` in `{}`, which the reference tool takes as the actor \
+         because it is the first `EntityRef`; put `Actors` first",
         entity(actor),
         name(group),
         entity(first),

@@ -19,7 +19,8 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         let archive = path.rsplit_once('!').map_or(path, |(archive, _)| archive);
         let remedy = match fault.code {
             FaultCode::ArchiveMemberMissing => {
-                "a modular scenario starts from `main.xosc`, spelt like that and in no folder of the archive"
+                "a modular scenario needs `main.xosc`, with this exact spelling and not in a folder of the \
+                 archive"
             }
             _ => "pack the scenario again",
         };

@@ -53,8 +53,8 @@ fn say(
 ) {
     let member = |archive: Archive<'_>| document(assembly, &format!("{}!{name}", archive.path));
     let text = format!(
-        "`{name}` lies in `{}` and, with other content, in `{}`, to which that refers; the reference tool unpacks both \
-         into one folder, so that the inner one takes the place of the outer one; give one of them another name",
+        "`{name}` is in `{}` and, with other content, in `{}`, to which the first one refers; the reference tool \
+         unpacks both into one folder, so the inner file replaces the outer one; give one of them another name",
         name_of(outer.path),
         name_of(inner.path),
     );

@@ -18,13 +18,15 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     for (document, fault) in of_archives(assembly, NAMES) {
         let archive = archive_of(document.path()).unwrap_or("");
         let why = match fault.code {
-            FaultCode::ArchiveDuplicate => "which one another tool reads is open; keep one of them",
+            FaultCode::ArchiveDuplicate => {
+                "other tools may read another one; keep only one of them"
+            }
             _ if fault.text.contains("has a backslash") => {
-                "some tools take it for a path and others for a name; pack the archive with `/`"
+                "some tools treat it as a path separator, others as part of the name; pack the archive with `/`"
             }
             _ => {
-                "a tool that unpacks the archive, as the reference tool does, may write over files beside its own by it; \
-                 members are files with relative names, with `/` and without `..`"
+                "a tool that unpacks the archive, such as the reference tool, may overwrite other files; members \
+                 must be files with relative names, with `/` and without `..`"
             }
         };
         let text = format!("`{}`: {}; {why}", name_of(archive), fault.text);
@@ -50,12 +52,13 @@ fn say_unpackable(assembly: &Assembly<'_>, document: Document<'_>, found: &mut S
         }
         let text = match has_only_backslashes(name) {
             true => format!(
-                "`{name}` cannot be packed into an archive as it is: names in archives are parted by `/`; write `{}`",
+                "`{name}` cannot be packed into an archive as it is: names in archives use `/` as separator; \
+                 write `{}`",
                 name.replace('\\', "/")
             ),
             false => format!(
-                "`{name}` cannot be packed into an archive: there, what is referred to lies in the archive or in a \
-                 directory of the search path; name the file without `..`, root, drive and backslash"
+                "`{name}` cannot be packed into an archive: there, the file must be in the archive or in a \
+                 directory of the search path; name it without `..`, root, drive and backslash"
             ),
         };
         let place = Place::attribute_or_node(reference, "scenarioFileName");

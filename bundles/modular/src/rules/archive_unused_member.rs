@@ -36,12 +36,12 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
             }
             let name = member.name;
             let advice = match name {
-                _ if name.ends_with(".mosc") => "refer to it, or leave it out",
+                _ if name.ends_with(".mosc") => "refer to it, or remove it",
                 _ if name.ends_with(".xosc") => {
-                    "refer to it, or leave it out; catalogs are looked for beside the archive, not in it"
+                    "refer to it, or remove it; catalogs are read from beside the archive, not from inside it"
                 }
                 _ => {
-                    "only scenarios are read from archives, and maps are looked for beside them; leave it out"
+                    "only scenarios are read from archives, and maps are read from beside them; remove it"
                 }
             };
             let archive = name_of(archive.path);

@@ -54,10 +54,10 @@ fn say_attributes(what: &str, own: Node<'_>, theirs: &[Node<'_>], found: &mut Si
             None => "has none".to_owned(),
         };
         let text = format!(
-            "`{name}` of {what} is `{value}` and is dropped: the group that takes its place {kept}; what is to hold \
-             belongs in the library file"
+            "`{name}` of {what} is `{value}` and is dropped: the group that replaces it {kept}; put the required \
+             value into the library file"
         );
-        let there = "what holds instead";
+        let there = "what applies instead";
         match other.attribute(name) {
             Some(kept) => found.issue(attribute, text).at(kept, there),
             None => found.issue(attribute, text).at(*other, there),
@@ -75,8 +75,8 @@ fn say_children(referring: Node<'_>, found: &mut Sink<'_>) {
             .find_map(|it| child.attr(it));
         let name = name.map_or_else(String::new, |name| format!(" `{name}`"));
         let text = format!(
-            "`{}`{name} of the referring group is dropped: other groups take the place of the whole group, and \
-             nothing of it but its name and its first actor stays; put it in a group of its own",
+            "`{}`{name} of the referring group is dropped: other groups replace the whole group, and only its \
+             name and its first actor are kept; put it in a separate group",
             child.name()
         );
         found.issue(child, text).level(Level::Warning);

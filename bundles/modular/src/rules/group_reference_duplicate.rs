@@ -12,5 +12,10 @@ pub static RULE: Rule<Modular> = Rule {
 };
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
-    say_all(assembly, found, &[What::GroupTwice], "the reference before");
+    say_all(
+        assembly,
+        found,
+        &[What::GroupTwice],
+        "the previous reference",
+    );
 }

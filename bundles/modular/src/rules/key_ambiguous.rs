@@ -24,7 +24,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
             true => Level::Error,
             false => Level::Warning,
         };
-        say(found, problem, "the attribute that both fit").level(level);
+        say(found, problem, "the attribute that both match").level(level);
     }
     for reference in &assembly.expansion.references {
         for one in &reference.uses {
@@ -77,8 +77,8 @@ fn say_spread(key: &Key<'_>, spread: &[Attribute<'_>], found: &mut Sink<'_>) {
         .map(|attribute| format!("`{}`", attribute.node().name()))
         .collect();
     let text = format!(
-        "the key `{}` gives `{}` to attributes of different elements, {}; write it with the element that is meant, as \
-         in `{}`",
+        "the key `{}` gives `{}` to attributes of different elements, {}; add the intended element to the key, \
+         as in `{}`",
         key.key,
         key.value.value(),
         elements.join(" and "),

@@ -28,7 +28,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let at = place(Spot::of(key.node, "key"));
-            let there = "the attribute at which the reference tool breaks off";
+            let there = "the attribute at which the reference tool fails";
             found.issue(at, text).at(attribute, there);
         }
     }
@@ -53,15 +53,12 @@ fn ending<'d>(
     let mut free = ends.filter(|end| !bare.contains(end));
     let attribute = free.find_map(|end| offers.named.get(end).copied())?;
     let instead = match offers.named.get(key.key) {
-        Some(&meant) => format!(
-            "; write it with the element before it, `{}`",
-            path(meant, 2)
-        ),
-        None => "; write it with the element before it".to_owned(),
+        Some(&meant) => format!("; put the element before it, `{}`", path(meant, 2)),
+        None => "; put the element before it".to_owned(),
     };
     let text = format!(
-        "the key `{}` ends with `{}`, an attribute that `{}` offers: the reference tool takes it for a path there, looks \
-         for an element in it and breaks off{instead}",
+        "the key `{}` ends with `{}`, an attribute that `{}` offers: the reference tool treats the key as a path \
+         there, searches for an element in it and fails{instead}",
         key.key,
         attribute.name(),
         attribute.node().name()
@@ -76,8 +73,8 @@ fn too_deep<'d>(key: &Key<'d>, offers: &Offers<'d>) -> Option<(Attribute<'d>, St
     let mut candidates = offers.ending(key.key).iter().copied();
     let attribute = candidates.find(|&attribute| named > depth(attribute))?;
     let text = format!(
-        "the key `{}` names {named} elements, but `{}` of `{}` lies in only {}: the reference tool climbs out of the \
-         document and breaks off",
+        "the key `{}` names {named} elements, but `{}` of `{}` is inside only {}: the reference tool goes above \
+         the root of the document and fails",
         key.key,
         attribute.name(),
         attribute.node().name(),

@@ -13,5 +13,5 @@ pub static RULE: Rule<Modular> = Rule {
 };
 
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
-    say_all(assembly, found, &[What::KeyTwice], "the key before");
+    say_all(assembly, found, &[What::KeyTwice], "the previous key");
 }

@@ -77,7 +77,7 @@ fn hint<'d>(problem: &Problem<'d>, one: &Use<'d>, offers: &Offers<'d>) -> Hint<'
     hint.text = match (hint.attributes.first(), of_group) {
         (Some(&first), _) => say_unoffered(first),
         (None, Some(_)) if is_listed => format!(
-            "; attributes of the `ManeuverGroup` itself are never replaced, though it lists them in `{OFFERS}`"
+            "; attributes of the `ManeuverGroup` itself are never replaced, although it lists them in `{OFFERS}`"
         ),
         (None, Some(_)) => {
             "; attributes of the `ManeuverGroup` itself are never replaced".to_owned()
@@ -98,7 +98,7 @@ fn say_unoffered(attribute: Attribute<'_>) -> String {
         // Another rule reports the fault in the list.
         Some(listed) if words.any(|word| word == name) => {
             return format!(
-                "; `{}` names `{name}` in `{OFFERS}`, but not as its name alone between commas: `{listed}`",
+                "; `{}` lists `{name}` in `{OFFERS}`, but not as a single name between commas: `{listed}`",
                 element.name()
             );
         }
@@ -106,7 +106,7 @@ fn say_unoffered(attribute: Attribute<'_>) -> String {
         None => format!("does not list it in `{OFFERS}`"),
     };
     format!(
-        "; `{}` has the attribute `{name}` but {lists}: have it offered in `{}`, or leave the key out",
+        "; `{}` has the attribute `{name}` but {lists}: add it there in `{}`, or remove the key",
         element.name(),
         short_name(element.document())
     )
@@ -117,8 +117,8 @@ fn meant<'d>(key: &'d str, offers: &Offers<'d>) -> String {
     if let Some(taken) = offers.taken_loosely(key).next() {
         let count = key.split('.').count();
         return format!(
-            "; the exact path is `{}`, for which the reference tool takes it, because it does not compare the elements \
-             in the middle",
+            "; the exact path is `{}`, and the reference tool accepts the key for it, because it does not \
+             compare the elements in the middle",
             path(taken, count)
         );
     }
@@ -137,7 +137,7 @@ fn meant<'d>(key: &'d str, offers: &Offers<'d>) -> String {
         listed = distinct(offers.all.iter().map(|&offer| path(offer, 2)));
     }
     match listed.len() {
-        0 => "; it offers none at all".to_owned(),
+        0 => "; it offers no attributes".to_owned(),
         1..=MOST_LISTED => format!("; it offers {}", quoted(&listed)),
         _ => format!("; it offers {}, …", quoted(&listed[..MOST_LISTED])),
     }

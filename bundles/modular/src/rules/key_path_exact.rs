@@ -64,20 +64,20 @@ fn say_loose(key: &Key<'_>, taken: Attribute<'_>, found: &mut Sink<'_>) {
     let of = format!("`{}` of `{}`", taken.name(), taken.node().name());
     let text = match key.fits.load(Ordering::Relaxed) {
         0 => format!(
-            "the key `{}` is not the path of {of}, which is `{exact}`; the reference tool does not compare the elements \
-             in the middle and replaces it",
+            "the key `{}` is not the path of {of}, which is `{exact}`; the reference tool does not compare the \
+             elements in the middle and replaces the attribute",
             key.key
         ),
         _ => format!(
-            "the reference tool takes the key `{}` for {of} as well, whose path is `{exact}`, because it does not \
-             compare the elements in the middle; here it keeps its value",
+            "the reference tool also applies the key `{}` to {of} with the path `{exact}`, because it does not \
+             compare the elements in the middle; here the attribute keeps its value",
             key.key
         ),
     };
     let at = place(Spot::of(key.node, "key"));
     found
         .issue(at, text)
-        .at(taken, "what the reference tool replaces");
+        .at(taken, "the attribute that the reference tool replaces");
 }
 
 /// Finds the faults in the lists of offered attributes of a group.
@@ -107,8 +107,8 @@ fn wrong_offer(list: Attribute<'_>) -> Option<String> {
     }
     if !absent.is_empty() {
         misspelt.push(format!(
-            "`{OFFERS}` lists {}, which this `{}` does not have, so no value can be put there: none is added where \
-             none is",
+            "`{OFFERS}` lists {}, which this `{}` does not have, so no value can be set: missing attributes are \
+             not added",
             absent.join(", "),
             element.name()
         ));
@@ -127,7 +127,7 @@ fn misspelt_offer(element: Node<'_>, name: &str) -> Option<String> {
     if is_list {
         let list: Vec<&str> = parts().collect();
         return Some(format!(
-            "`{OFFERS}` lists `{name}`, which is taken for one name: only a comma parts names, `{}`",
+            "`{OFFERS}` lists `{name}`, which is read as one name: separate names with commas only, `{}`",
             list.join(",")
         ));
     }
@@ -135,7 +135,8 @@ fn misspelt_offer(element: Node<'_>, name: &str) -> Option<String> {
     let is_path = last != name && element.attribute(last).is_some();
     is_path.then(|| {
         format!(
-            "`{OFFERS}` lists `{name}`, but only attributes of the element itself are offered, by their names: `{last}`"
+            "`{OFFERS}` lists `{name}`, but only attributes of the element itself can be offered, by their \
+             names: `{last}`"
         )
     })
 }

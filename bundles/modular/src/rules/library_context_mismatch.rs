@@ -57,8 +57,9 @@ fn note_prefix<'d>(taken: &Taken<'_, 'd>, finds: &mut Finds<'d>) {
         prefix => format!("{prefix}:{}", group.name()),
     };
     let text = format!(
-        "the group `{}` of `{}` is written with {}, and the group whose place it takes with {}: to most readers of the \
-         expanded scenario `{name}` is another element, which they pass over or refuse; write both alike",
+        "the group `{}` of `{}` is written with {}, and the group that it replaces with {}: most readers of the \
+         expanded scenario treat `{name}` as another element, which they ignore or refuse; write both in the \
+         same way",
         taken.own_name(),
         short_name(group.document()),
         written(theirs),
@@ -78,15 +79,15 @@ fn say_no_version(
         return;
     };
     let text = format!(
-        "`{}` names no version of the standard, and its groups are read by that of this scenario, {own}; give it a \
-         `FileHeader` with `revMajor` and `revMinor`",
+        "`{}` names no version of the standard, so its groups are read by the version of this scenario, {own}; \
+         give it a `FileHeader` with `revMajor` and `revMinor`",
         short_name(library)
     );
     let at = place(Spot::of(reference.node, "scenarioFileName"));
     let place = root.child("FileHeader").unwrap_or(root);
     found
         .issue(at, text)
-        .at(place, "where the library file would name its version");
+        .at(place, "the place for the version of the library file");
 }
 
 fn say_version<'d>(
@@ -107,8 +108,8 @@ fn say_version<'d>(
         return;
     };
     let text = format!(
-        "`{}` is written for version {theirs} of the standard and this scenario for {own}, by which its groups are \
-         read; let both name one version",
+        "`{}` is written for version {theirs} of the standard, but this scenario for {own}, by which its groups \
+         are read; use the same version in both",
         short_name(library)
     );
     let minor = match own.major == theirs.major {
@@ -142,8 +143,8 @@ fn say_map(assembly: &Assembly<'_>, taken: &Taken<'_, '_>, found: &mut Sink<'_>)
         return false;
     };
     let text = format!(
-        "the group `{}` of `{}` was written for the map `{their_path}` and this scenario has `{own_path}`: `{}` in it \
-         means a place of that map, unless keys give it others",
+        "the group `{}` of `{}` was written for the map `{their_path}`, but this scenario has `{own_path}`: `{}` \
+         in the group refers to a place on the other map, unless keys change it",
         taken.own_name(),
         short_name(library),
         bound.name()
@@ -154,7 +155,7 @@ fn say_map(assembly: &Assembly<'_>, taken: &Taken<'_, '_>, found: &mut Sink<'_>)
             Place::attribute_or_node(theirs, "filepath"),
             "the map of the library file",
         )
-        .at(bound, "what means a place of it");
+        .at(bound, "an element that refers to a place on it");
     true
 }
 

@@ -24,8 +24,8 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         let name = group.attr("name").filter(|name| name.contains('.'));
         if let Some(name) = name.filter(|_| seen.insert((reference.piece, group.index()))) {
             let text = format!(
-                "the referring group is called `{name}`; expansion puts a dot between its name and that of the group \
-                 that it takes, so a dot within a name leaves open where one ends and the next begins"
+                "the referring group is called `{name}`; expansion puts a dot between its name and the name of \
+                 the group that it takes, so a dot within a name makes the boundary ambiguous"
             );
             found.issue(place(Spot::of(group, "name")), text);
         }
@@ -36,8 +36,8 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
                     continue;
                 };
                 let text = format!(
-                    "the group is called `{name}` in its file; expansion puts a dot between the name of the referring \
-                     group and this one, so a dot within a name leaves open where one ends and the next begins"
+                    "the group is called `{name}` in its file; expansion puts a dot between the name of the \
+                     referring group and this one, so a dot within a name makes the boundary ambiguous"
                 );
                 let at = taken_at(reference, one);
                 finds.brought(at, spot, "its name in the library file", text);

@@ -40,8 +40,8 @@ fn note<'d>(
     finds: &mut Finds<'d>,
 ) {
     let text = format!(
-        "keys are given to the group `{}` of `{}`, but it offers nothing to be replaced: no element in it has \
-         `{OFFERS}`, which lists the attributes that keys may set",
+        "keys are given to the group `{}` of `{}`, but it offers no attributes: no element in it has `{OFFERS}`, \
+         which lists the attributes that keys may set",
         group.attr("name").unwrap_or(""),
         short_name(group.document())
     );
@@ -55,7 +55,7 @@ fn note<'d>(
     });
     for (key, attribute) in wanted.take(MOST) {
         let there = format!(
-            "the key `{}` would fit here, with `{OFFERS}=\"{}\"`",
+            "the key `{}` would match here, with `{OFFERS}=\"{}\"`",
             key.key,
             attribute.name()
         );

@@ -32,13 +32,13 @@ fn missing(node: Node<'_>, found: &mut Sink<'_>) {
     let text = match (node.attr("key"), node.attr("value")) {
         (Some(_), Some(_)) => return,
         (Some(key), None) => format!(
-            "`ParameterReference` has no `value`, so the attribute that its key `{key}` fits keeps the one it has"
+            "`ParameterReference` has no `value`, so the attribute that its key `{key}` matches keeps its value"
         ),
         (None, Some(value)) => {
-            format!("`ParameterReference` has no `key`, so its value `{value}` is for no attribute")
+            format!("`ParameterReference` has no `key`, so its value `{value}` is not used")
         }
         (None, None) => {
-            "`ParameterReference` has neither `key` nor `value`, and says nothing".to_owned()
+            "`ParameterReference` has neither `key` nor `value`, and has no effect".to_owned()
         }
     };
     found.issue(node, text);
@@ -52,12 +52,13 @@ fn further(attribute: Attribute<'_>, found: &mut Sink<'_>) {
     // The reference tool stores attributes in the order of their names.
     let effect = match name < "value" {
         true => {
-            ": the reference tool reads the first two in the order of the alphabet as key and value, and loses this value"
+            ": the reference tool takes the first two attributes in alphabetical order as key and value, and \
+             loses the value"
         }
-        false => " and nothing reads it",
+        false => " and is ignored",
     };
     let text = format!(
-        "`ParameterReference` has the attributes `key` and `value`, but `{name}` is neither{effect}"
+        "`ParameterReference` has only the attributes `key` and `value`, but `{name}` is neither{effect}"
     );
     found.issue(Place::Attribute(attribute), text);
 }

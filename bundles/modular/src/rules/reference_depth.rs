@@ -42,8 +42,8 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         let name = |node: Node<'_>| node.attr("scenarioFileName").unwrap_or("").to_owned();
         let names: Vec<String> = chain.iter().map(|step| name(step.node)).collect();
         let text = format!(
-            "scenarios refer to scenarios {} deep from here, `{}`; more than {MODEST} are hard to follow: refer to the inner \
-             ones directly",
+            "references between scenarios are {} deep from here, `{}`; more than {MODEST} levels are hard to \
+             follow: refer to the inner ones directly",
             chain.len(),
             names.join("` → `")
         );

@@ -84,7 +84,7 @@ fn note_nameless<'d>(assembly: &Assembly<'d>, finds: &mut Finds<'d>) {
     for &(reference, nameless) in &references {
         if let Some(name) = taken_after(reference, nameless) {
             texts.entry(nameless).or_insert_with(|| {
-                format!(", and the reference tool breaks off at it before it finds `{name}`")
+                format!(", and the reference tool fails at it before it finds `{name}`")
             });
         }
     }
@@ -119,16 +119,17 @@ fn say_unnamed(reference: &Followed<'_>, found: &mut Sink<'_>) {
         Some(_) => "the `name` of the referring group is empty",
     };
     let then = match (reference.form, reference.group.attr("name")) {
-        (Form::Direct, _) => "what takes its place has none either".to_owned(),
+        (Form::Direct, _) => "the group that replaces it has no name either".to_owned(),
         (Form::Named, None) => format!(
-            "what takes its place is called by the library's group alone, as `{own}`; the reference tool breaks off at it"
+            "the group that replaces it has only the name of the library's group, as `{own}`; the reference tool \
+             fails at it"
         ),
         (Form::Named, Some(_)) => format!(
-            "what takes its place is called by the library's group alone, as `{own}`; the reference tool calls it \
-             `.{own}`"
+            "the group that replaces it has only the name of the library's group, as `{own}`; the reference tool \
+             calls it `.{own}`"
         ),
     };
-    let text = format!("{lacks}, so {then}; give it one that no other group of the act has");
+    let text = format!("{lacks}, so {then}; give it a name that no other group of the act has");
     let finding = found.issue(place(Spot::of(reference.group, "name")), text);
     if let Some(taken) = taken {
         finding.at(taken.group, "the group that is referred to");

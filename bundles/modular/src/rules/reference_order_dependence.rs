@@ -56,22 +56,22 @@ fn trouble(
         (true, true) => (
             Level::Warning,
             format!(
-                "there is no `{name}`: the reference tool leaves a file of this name when it has expanded `{archive}` for \
-                 an earlier reference; refer to `{archive}`, which does not depend on the order"
+                "`{name}` does not exist: the reference tool creates a file of this name when it expands \
+                 `{archive}` for an earlier reference; refer to `{archive}`, which does not depend on the order"
             ),
         ),
         (true, false) => (
             Level::Error,
             format!(
-                "there is no `{name}`, and only a later reference names `{archive}`, of which the reference tool would \
-                 make it, so that it stops here; refer to `{archive}`"
+                "`{name}` does not exist, and only a later reference names `{archive}`, from which the reference \
+                 tool would create it, so that it stops here; refer to `{archive}`"
             ),
         ),
         (false, true) => (
             Level::Warning,
             format!(
-                "`{name}` is there, but an earlier reference names `{archive}`, and what the reference tool makes of that \
-                 it writes over `{name}`; give one of the two another name"
+                "`{name}` exists, but an earlier reference names `{archive}`, and the reference tool overwrites \
+                 `{name}` when it expands the archive; give one of the two another name"
             ),
         ),
         (false, false) => return None,

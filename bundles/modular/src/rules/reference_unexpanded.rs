@@ -85,8 +85,8 @@ fn note<'d>(
     let path = document.path();
     let file = path.rsplit(['/', '!']).next().unwrap_or(path);
     let text = format!(
-        "the group `{}` of `{file}` refers to others itself, which is followed here, but left as it is by the reference \
-         tool: it expands archives only; pack `{file}` as `.mosc` and refer to that",
+        "the group `{}` of `{file}` refers to other groups itself, which is followed here, but not by the \
+         reference tool: it expands archives only; pack `{file}` as `.mosc` and refer to that",
         group.attr("name").unwrap_or("")
     );
     let inner = group.child("ScenarioReference").unwrap_or(group);

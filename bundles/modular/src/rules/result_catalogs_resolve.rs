@@ -44,12 +44,17 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
                 Some(origin) => {
                     let text = format!("{} leads to no catalog entry: {wrong}", origin.what());
                     let at = origin.attribute().into();
-                    finds.given(at, attribute.into(), "the reference that gets it", text);
+                    finds.given(
+                        at,
+                        attribute.into(),
+                        "the reference that gets the value",
+                        text,
+                    );
                 }
                 None => {
                     let text = format!(
-                        "the group `{}` refers to a catalog entry that is not found in this scenario: {wrong}; the \
-                         `CatalogLocations` of `{}` do not come along",
+                        "the group `{}` refers to a catalog entry that is not found in this scenario: {wrong}; \
+                         the `CatalogLocations` of `{}` are not taken over",
                         taken.own_name(),
                         short_name(reference.document())
                     );

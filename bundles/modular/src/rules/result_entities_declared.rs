@@ -96,14 +96,14 @@ fn brought(
     let advice = match is_offered(attribute) {
         true => format!("give the key `{key}` the name of an entity of this scenario"),
         false => format!(
-            "declare `{name}` here, or offer `{what}` in `{}` by `parameterAttributes`, so that a key (`{key}`) can \
-             name another",
+            "declare `{name}` here, or offer `{what}` in `{}` by `parameterAttributes`, so that a key (`{key}`) \
+             can name another entity",
             short_name(element.document())
         ),
     };
     format!(
-        "`{what}` of `{}` in the group `{}` refers to `{name}`, but this scenario declares no entity of this name{}; \
-         the entities of a library file do not come along: {advice}",
+        "`{what}` of `{}` in the group `{}` refers to `{name}`, but this scenario declares no entity of this \
+         name{}; the entities of a library file are not taken over: {advice}",
         element.name(),
         taken.own_name(),
         known(scenario)

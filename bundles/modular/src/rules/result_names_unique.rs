@@ -92,7 +92,8 @@ fn say(act: Node<'_>, first: &Bearer<'_, '_>, second: &Bearer<'_, '_>, found: &m
         _ => "give one of the referring groups another name".to_owned(),
     };
     let text = format!(
-        "two groups of the act `{}` are called `{}` in the expanded scenario, so nobody can refer to either; {advice}",
+        "two groups of the act `{}` are called `{}` in the expanded scenario, so neither can be referred to; \
+         {advice}",
         act.attr("name").unwrap_or(""),
         second.name
     );

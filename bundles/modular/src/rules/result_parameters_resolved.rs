@@ -39,7 +39,12 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
                 if let Some(origin) = edit.and_then(|edit| origins.get(edit)) {
                     let text = given(origin, name, attribute, &scenario);
                     let at = origin.attribute().into();
-                    finds.given(at, attribute.into(), "the attribute that gets it", text);
+                    finds.given(
+                        at,
+                        attribute.into(),
+                        "the attribute that gets the value",
+                        text,
+                    );
                     continue;
                 }
                 let piece = taken.copy.piece;
@@ -52,7 +57,12 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
                     .entry((piece, own))
                     .or_insert_with(|| (attribute.into(), brought(&taken, attribute, own)))
                     .clone();
-                finds.brought(taken.at(), target, "the value that needs it", text);
+                finds.brought(
+                    taken.at(),
+                    target,
+                    "the value that needs the parameter",
+                    text,
+                );
             }
         }
     }
@@ -124,13 +134,13 @@ fn brought(taken: &Taken<'_, '_>, attribute: Attribute<'_>, name: &str) -> Strin
     );
     match declared {
         Some(declared) => format!(
-            "{start}; the declaration in `{file}` ({} `{}`) does not come along: declare `{name}` here, or do without \
-             it there",
-            declared.attr("parameterType").unwrap_or("of no type"),
+            "{start}; the declaration in `{file}` ({} `{}`) is not taken over: declare `{name}` here, or do not \
+             use it there",
+            declared.attr("parameterType").unwrap_or("untyped"),
             declared.attr("value").unwrap_or("")
         ),
         None => format!(
-            "{start}, and neither does `{file}`: declare `{name}` here, or do without it there"
+            "{start}, and neither does `{file}`: declare `{name}` here, or do not use it there"
         ),
     }
 }
@@ -148,7 +158,7 @@ fn given(
     let names = scenario.root().parameter_names().take(500);
     let near = closest(name, names).map_or_else(String::new, |near| format!("; `${near}` is"));
     format!(
-        "{who} needs the parameter `{name}`, which is not declared where `{}` of `{}` gets it{near}",
+        "{who} needs the parameter `{name}`, which is not declared at `{}` of `{}`{near}",
         target.name(),
         target.node().name()
     )

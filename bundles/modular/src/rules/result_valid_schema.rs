@@ -114,8 +114,8 @@ impl<'a, 'd> Judge<'a, 'd> {
                     continue;
                 }
                 let text = format!(
-                    "{} in the group `{}` of `{}` came with version {}, but this scenario is of version {}; name \
-                     version {} here, or take a group that does without",
+                    "{} in the group `{}` of `{}` exists since version {}, but this scenario is of version {}; \
+                     name version {} here, or take a group without it",
                     thing.what,
                     taken.own_name(),
                     short_name(library),
@@ -151,8 +151,8 @@ impl<'a, 'd> Judge<'a, 'd> {
                 continue;
             }
             let text = format!(
-                "the group `{}` of `{}` is written for version {theirs}, and in this scenario of version {} it is not \
-                 valid: {}",
+                "the group `{}` of `{}` is written for version {theirs}, and is not valid in this scenario of \
+                 version {}: {}",
                 taken.own_name(),
                 short_name(library),
                 self.own,

@@ -16,6 +16,6 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
         assembly,
         found,
         &[What::Placement],
-        "the element that it is in",
+        "the element that contains it",
     );
 }

@@ -67,8 +67,8 @@ fn bring<'d>(top: Node<'d>, at: Spot<'d>, finds: &mut Finds<'d>) {
 
 /// Searches for `<` in the values and texts of an element and its descendants.
 fn look<'d>(top: Node<'d>, say: &mut impl FnMut(Spot<'d>, String)) {
-    const AND: &str = "the reference tool writes it as a bare `<`, and the file that it makes is no XML; other words \
-                       (`less than`, `below`) do no harm";
+    const AND: &str = "the reference tool writes it as an unescaped `<`, and the resulting file is not valid \
+                       XML; use other words (`less than`, `below`)";
     let document = top.document();
     for index in top.index()..top.subtree_end() {
         let Some(node) = document.node(index) else {

@@ -49,12 +49,13 @@ const SHARE: (f64, f64) = (0.0, 1.0);
 /// Two turns each way: rounded or summed up, an angle in radians may exceed one turn.
 const ANGLE: (f64, f64) = (-2.0 * TAU, 2.0 * TAU);
 
-const BACKWARDS: &str = "a speed below zero drives backwards, which not every simulator does";
-const DISTANCE: &str = "a distance has no sign";
-const DURATION: &str = "a duration has no sign";
-const MAGNITUDE: &str = "a limit is a magnitude";
+const BACKWARDS: &str =
+    "a negative speed means driving backwards, which not every simulator supports";
+const DISTANCE: &str = "a distance cannot be negative";
+const DURATION: &str = "a duration cannot be negative";
+const MAGNITUDE: &str = "a limit cannot be negative";
 const RADIANS: &str = "angles are in radians";
-const SHARES: &str = "it is a share";
+const SHARES: &str = "it is a fraction";
 
 // The ranges follow the class descriptions of the standard. Only values that are commonly replaced
 // in groups are listed. The bundle for OpenSCENARIO has all ranges.
@@ -62,11 +63,11 @@ const SHARES: &str = "it is a share";
 const RANGES: &[Range] = &[
     range("AbsoluteSpeed", &["value"], POSITIVE, BACKWARDS),
     range("AbsoluteTargetSpeed", &["value"], POSITIVE, BACKWARDS),
-    range("Condition", &["delay"], POSITIVE, "a condition cannot hold before it is met"),
+    range("Condition", &["delay"], POSITIVE, "a delay cannot be negative"),
     range("DistanceCondition", &["value"], POSITIVE, DISTANCE),
     range("DynamicConstraints", &["maxAcceleration", "maxDeceleration", "maxSpeed"], POSITIVE, MAGNITUDE),
     range("EndOfRoadCondition", &["duration"], POSITIVE, DURATION),
-    range("Event", &["maximumExecutionCount"], COUNT, "what never runs could be left out"),
+    range("Event", &["maximumExecutionCount"], COUNT, "an event that never runs can be removed"),
     range("Fog", &["visualRange"], POSITIVE, DISTANCE),
     range("LateralDistanceAction", &["distance"], POSITIVE, DISTANCE),
     range("LongitudinalDistanceAction", &["distance", "timeGap"], POSITIVE, DISTANCE),
@@ -79,12 +80,12 @@ const RANGES: &[Range] = &[
     range("Precipitation", &["intensity"], SHARE, SHARES),
     range("ReachPositionCondition", &["tolerance"], POSITIVE, DISTANCE),
     range("RelativeDistanceCondition", &["value"], POSITIVE, DISTANCE),
-    range("RoadCondition", &["frictionScaleFactor"], POSITIVE, "friction has no sign"),
+    range("RoadCondition", &["frictionScaleFactor"], POSITIVE, "friction cannot be negative"),
     range("SpeedProfileEntry", &["time"], POSITIVE, DURATION),
     range("StandStillCondition", &["duration"], POSITIVE, DURATION),
     range("TimeHeadwayCondition", &["value"], POSITIVE, DURATION),
     range("TimeToCollisionCondition", &["value"], POSITIVE, DURATION),
-    range("TransitionDynamics", &["value"], POSITIVE, "a time, distance or rate has no sign here"),
+    range("TransitionDynamics", &["value"], POSITIVE, "a time, distance or rate cannot be negative here"),
     range("TraveledDistanceCondition", &["value"], POSITIVE, DISTANCE),
     range("WorldPosition", &["h", "p", "r"], ANGLE, RADIANS),
 ];
@@ -117,7 +118,12 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
                 range.instead(number)
             );
             let at = origin.attribute().into();
-            finds.given(at, attribute.into(), "the attribute that gets it", text);
+            finds.given(
+                at,
+                attribute.into(),
+                "the attribute that gets the value",
+                text,
+            );
         }
     }
     finds.say(found);

@@ -39,7 +39,12 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
                 attribute.node().name()
             );
             let at = origin.attribute().into();
-            finds.given(at, attribute.into(), "the attribute that gets it", text);
+            finds.given(
+                at,
+                attribute.into(),
+                "the attribute that gets the value",
+                text,
+            );
         }
     }
     finds.say(found);
@@ -58,7 +63,7 @@ fn wrong(value: &str, value_type: ValueType) -> Option<String> {
         }
         if let Some(near) = closest(value, words.iter().map(|word| &**word)) {
             return Some(format!(
-                "{shown}, which is none of its words; perhaps `{near}` is meant"
+                "{shown}, which is not an allowed word; perhaps `{near}` is meant"
             ));
         }
         let all: Vec<String> = words
@@ -68,11 +73,11 @@ fn wrong(value: &str, value_type: ValueType) -> Option<String> {
             .collect();
         let more = if words.len() > MOST { ", …" } else { "" };
         return Some(format!(
-            "{shown}, where one of {}{more} is due",
+            "{shown}, but expected one of {}{more}",
             all.join(", ")
         ));
     }
     let data_type = DataType::of_schema(value_type.name()?)?;
     let is_one = data_type.parse(value).is_some();
-    (!is_one).then(|| format!("{shown}, where {} is due", data_type.allowed()))
+    (!is_one).then(|| format!("{shown}, but expected {}", data_type.allowed()))
 }

@@ -21,16 +21,16 @@ const READ_NEVERTHELESS: &[FaultCode] =
 fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     for document in assembly.scenarios().filter(has_mark) {
         let text = format!(
-            "`{}` begins with a byte order mark (U+FEFF), which the reference tool takes for content and stops; store it \
-             without one",
+            "`{}` begins with a byte order mark (U+FEFF), which the reference tool treats as content and stops; \
+             store it without one",
             name_of(document.path())
         );
         assembly.say_of(found, (document, 0), text, "the byte order mark");
     }
     for (document, fault) in of(assembly, READ_NEVERTHELESS) {
         let text = format!(
-            "`{}`: {}; the reference tool refuses or damages such a file: store it as plain UTF-8 and say so in its XML \
-             declaration",
+            "`{}`: {}; the reference tool refuses or damages such a file: store it as plain UTF-8 and declare \
+             UTF-8 in its XML declaration",
             name_of(document.path()),
             fault.text
         );

@@ -17,9 +17,9 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
     let refused: Vec<_> = of(assembly, DOCTYPES).collect();
     for (document, fault) in &refused {
         let text = format!(
-            "`{}` has a document type declaration, which is refused, with all entities that it declares: the reference tool \
-             reads it and copies what the entities name, local files as well, into the result; leave it out and write \
-             the values themselves",
+            "`{}` has a document type declaration, which is refused, with all entities that it declares: the \
+             reference tool reads it and copies what the entities name, including local files, into the result; \
+             remove it and write the values themselves",
             name_of(document.path())
         );
         assembly.say_of(found, (*document, fault.offset), text, "the declaration");
@@ -32,8 +32,8 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "`{}` has a document type declaration that says nothing but the name of the root; it does no harm and is lost \
-             when the reference tool expands the scenario; leave it out",
+            "`{}` has a document type declaration that contains only the name of the root; it is harmless and is \
+             lost when the reference tool expands the scenario; remove it",
             name_of(document.path())
         );
         let finding = assembly.say_of(found, (document, at), text, "the declaration");

@@ -33,7 +33,7 @@ pub(super) fn literal(literal: &str) -> Outcome {
         return match literal.parse() {
             Ok(value) => exact(Number::Integer(value)),
             Err(_) => Err(format!(
-                "{} is larger than any integer, which is {} at most; followed by `.0` it is a double",
+                "{} is larger than any integer, which is at most {}; add `.0` to make it a double",
                 super::quoted(literal),
                 i64::MAX
             )),
@@ -194,7 +194,7 @@ fn exact(number: Number) -> Outcome {
 
 /// Returns an integer if the operation `by` did not overflow.
 fn integer(value: Option<i64>, by: &str) -> Outcome {
-    let overflow = || format!("the result of `{by}` is no integer of 64 bits");
+    let overflow = || format!("the result of `{by}` does not fit into a 64-bit integer");
     exact(Number::Integer(value.ok_or_else(overflow)?))
 }
 
@@ -230,7 +230,7 @@ fn watch_underflow(by: &str, x: Number, y: Number, outcome: Outcome) -> Outcome 
     let usual = |operand: Number| operand.value().is_finite() && !operand.is_zero();
     let mut computed = outcome?;
     if computed.number.is_zero() && usual(x) && usual(y) {
-        let remark = || format!("the result of `{by}` becomes 0, though no operand is");
+        let remark = || format!("the result of `{by}` becomes 0, although no operand is 0");
         computed.imprecise = computed.imprecise.or_else(|| Some(remark()));
     }
     Ok(computed)

@@ -123,7 +123,7 @@ impl Evaluator<'_> {
         };
         Typed::Untyped(match (self.lookup)(name) {
             Operand::Value(Value::Double(value)) if value.is_nan() => {
-                let what = "is not a number (NaN), and nothing follows from it";
+                let what = "is not a number (NaN), so the expression has no result";
                 return Typed::Number(Err(fault(FaultKind::Evaluation, what)));
             }
             Operand::Value(value) => return Typed::from(value),
@@ -131,10 +131,10 @@ impl Evaluator<'_> {
                 let what = format!("is of type {kind}; expressions take numbers and booleans");
                 fault(FaultKind::Evaluation, &what)
             }
-            Operand::Unresolved => fault(FaultKind::Unresolved, "is declared with a fault"),
+            Operand::Unresolved => fault(FaultKind::Unresolved, "has an invalid declaration"),
             Operand::Undeclared => {
                 let kind = FaultKind::Undeclared(name.to_owned());
-                fault(kind, "is no parameter that is declared here")
+                fault(kind, "is not a parameter declared here")
             }
             Operand::Variable => {
                 let kind = FaultKind::Variable(name.to_owned());

@@ -52,7 +52,7 @@ impl<'t> Lexer<'t> {
             lexer.take(OPENING.len());
             Ok(lexer)
         } else {
-            let text = format!("an expression begins with `{OPENING}`");
+            let text = format!("an expression must begin with `{OPENING}`");
             Err(Fault::evaluation(lexer.at, text))
         }
     }
@@ -109,7 +109,7 @@ impl<'t> Lexer<'t> {
         match misspelt(number) {
             None => Ok(length),
             Some(why) => {
-                let text = format!("{} is no number: {why}", quoted(number));
+                let text = format!("{} is not a number: {why}", quoted(number));
                 // Letters in a number are taken for an operand that does not exist.
                 let letters = number.contains(|c: char| c == '_' || c.is_ascii_alphabetic());
                 let kind = if why == FOREIGN_TO_NUMBERS && letters {
@@ -139,10 +139,13 @@ impl<'t> Lexer<'t> {
             Some((sign, way_out)) => (format!("`{sign}`"), *way_out),
             None => {
                 let found = self.rest.chars().next().map(shown);
-                (found.unwrap_or_default(), "its signs are `+ - * / % ( ) ,`")
+                (
+                    found.unwrap_or_default(),
+                    "the allowed signs are `+ - * / % ( ) ,`",
+                )
             }
         };
-        let text = format!("{found} does not belong to the expression language; {way_out}");
+        let text = format!("{found} is not part of the expression language; {way_out}");
         Err(Fault::new(FaultKind::Operator, self.at, text))
     }
 }
@@ -177,13 +180,13 @@ fn misspelt(text: &str) -> Option<&'static str> {
     {
         Some(FOREIGN_TO_NUMBERS)
     } else if whole.is_empty() {
-        Some("a digit goes before the point, like `0.5`")
+        Some("a digit must come before the point, like `0.5`")
     } else if fraction == Some("") {
-        Some("a digit goes behind the point, like `2.0`")
+        Some("a digit must come after the point, like `2.0`")
     } else if exponent == Some("") {
-        Some("a digit goes behind the `e`, like `1.5e3`")
+        Some("a digit must come after the `e`, like `1.5e3`")
     } else if padded(whole) || exponent.is_some_and(padded) {
-        Some("numbers and exponents have no leading zeros")
+        Some("numbers and exponents must not have leading zeros")
     } else {
         None
     }

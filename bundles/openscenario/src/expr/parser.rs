@@ -15,7 +15,7 @@ type Parsed<'t> = Result<Node<'t>, Fault>;
 pub(super) fn parse(text: &str) -> Parsed<'_> {
     if text.len() > MAX_LENGTH {
         let length = text.len();
-        let text = format!("{length} bytes are too long for an expression; {MAX_LENGTH} are read");
+        let text = format!("the expression has {length} bytes; at most {MAX_LENGTH} are allowed");
         return Err(Fault::new(FaultKind::Limit, 0, text));
     }
     let mut lexer = Lexer::new(text)?;
@@ -51,7 +51,7 @@ impl<'t> Parser<'t> {
             (at, left) => {
                 let found = quoted(left);
                 let text =
-                    format!("an expression is the whole value, but {found} follows its `}}`");
+                    format!("an expression must be the whole value, but {found} follows its `}}`");
                 Err(Fault::evaluation(at, text))
             }
         }
@@ -237,7 +237,7 @@ impl<'t> Parser<'t> {
         }
         let text = match text {
             "" => MISSING_END.to_owned(),
-            "+" => "`+` stands between two numbers; a positive number has no sign".to_owned(),
+            "+" => "`+` must be between two numbers; a positive number has no sign".to_owned(),
             _ => format!(
                 "an operand is missing before `{text}`: a number, `true`, `false`, a parameter \
                  like `$name`, a function or `(`"
@@ -257,12 +257,12 @@ impl<'t> Parser<'t> {
                 "`(` is not closed; a `)` is missing before the `}`",
             ),
             (Token::Word, ..) if !words::is_known(text) => {
-                self.unknown_word("its operators are `+ - * / % not and or`".to_owned())
+                self.unknown_word("the operators are `+ - * / % not and or`".to_owned())
             }
-            (Token::Sign, ")", _) => Fault::evaluation(at, "`)` closes no bracket"),
+            (Token::Sign, ")", _) => Fault::evaluation(at, "`)` has no opening bracket"),
             (Token::Sign, ",", _) => Fault::evaluation(
                 at,
-                "`,` stands between the arguments of a function only; fractions have a point, `0.5`",
+                "`,` is allowed only between the arguments of a function; fractions have a point, `0.5`",
             ),
             _ => {
                 let found = quoted(text);
@@ -276,11 +276,11 @@ impl<'t> Parser<'t> {
     fn unknown_word(&self, instead: String) -> Fault {
         let word = self.ahead.text;
         let way_out = match words::ignoring_case(word) {
-            Some(known) => format!("words are case-sensitive, it is written `{known}`"),
+            Some(known) => format!("words are case-sensitive; write `{known}`"),
             None => instead,
         };
         let found = quoted(word);
-        let text = format!("{found} does not belong to the expression language; {way_out}");
+        let text = format!("{found} is not part of the expression language; {way_out}");
         Fault::new(FaultKind::Operator, self.ahead.at, text)
     }
 
@@ -290,11 +290,11 @@ impl<'t> Parser<'t> {
         let is_called = self.lexer.clone().read().is_ok_and(|next| next.text == "(");
         if is_called {
             let names: Vec<&str> = words::FUNCTIONS.iter().map(|f| f.name).collect();
-            format!("its functions are `{}`", names.join("`, `"))
+            format!("the functions are `{}`", names.join("`, `"))
         } else if word == "e" {
-            format!("the number is written {E}")
+            format!("write the number as {E}")
         } else {
-            format!("a parameter is written {}", quoted(&format!("${word}")))
+            format!("write a parameter as {}", quoted(&format!("${word}")))
         }
     }
 }

@@ -93,39 +93,39 @@ pub(super) fn ignoring_case(word: &str) -> Option<&'static str> {
 pub(super) static FOREIGN: [(&str, &str); 28] = [
     ("**", POWER),
     ("^", POWER),
-    ("//", "a whole quotient is written `floor(7 / 2)`"),
-    ("&&", "it is written `and`"),
-    ("&", "it is written `and`"),
-    ("||", "it is written `or`"),
-    ("|", "it is written `or`"),
+    ("//", "write a whole quotient as `floor(7 / 2)`"),
+    ("&&", "write `and`"),
+    ("&", "write `and`"),
+    ("||", "write `or`"),
+    ("|", "write `or`"),
     ("==", COMPARISON),
     ("!=", COMPARISON),
     ("<=", COMPARISON),
     (">=", COMPARISON),
     ("<", COMPARISON),
     (">", COMPARISON),
-    ("=", "values are neither compared nor assigned"),
-    ("!", "it is written `not`"),
-    ("?", "there is no choice between values"),
+    ("=", "values cannot be compared or assigned here"),
+    ("!", "write `not`"),
+    ("?", "a choice between values is not supported"),
     ("'", TEXT),
     ("\"", TEXT),
     ("{", BRACKETS),
     ("[", BRACKETS),
     ("]", BRACKETS),
-    ("\u{d7}", "a product is written `2 * 3`"),
-    ("\u{b7}", "a product is written `2 * 3`"),
-    ("\u{f7}", "a quotient is written `7 / 2`"),
+    ("\u{d7}", "write a product as `2 * 3`"),
+    ("\u{b7}", "write a product as `2 * 3`"),
+    ("\u{f7}", "write a quotient as `7 / 2`"),
     ("\u{2212}", HYPHEN),
     ("\u{2013}", HYPHEN),
-    ("\u{3c0}", "from version 1.4 on it is written `pi`"),
-    ("\u{221a}", "a square root is written `sqrt(2)`"),
+    ("\u{3c0}", "write `pi` (since version 1.4)"),
+    ("\u{221a}", "write a square root as `sqrt(2)`"),
 ];
 
-const POWER: &str = "a power is written `pow(2, 3)`";
-const COMPARISON: &str = "values are not compared here but in conditions";
-const TEXT: &str = "expressions know numbers and booleans, but no text";
-const BRACKETS: &str = "all brackets are round";
-const HYPHEN: &str = "a minus is the hyphen of the keyboard, `-`";
+const POWER: &str = "write a power as `pow(2, 3)`";
+const COMPARISON: &str = "compare values only in conditions";
+const TEXT: &str = "expressions support numbers and booleans, but no text";
+const BRACKETS: &str = "use round brackets only";
+const HYPHEN: &str = "write a minus as the hyphen of the keyboard, `-`";
 
 impl Operator {
     const fn numbers(symbol: &'static str, action: OfTwo) -> Operator {

@@ -56,7 +56,7 @@ def wrong(bundle: Bundle, rule: Rule, example: Example) -> str | None:
     text, name = document(bundle, example)
     found, unlooked = bundle._native.check(name, text.encode(), rule.id)
     if unlooked:
-        return "\n".join(f"{checker} could not look: {why}" for checker, why in unlooked)
+        return "\n".join(f"{checker} could not run: {why}" for checker, why in unlooked)
     said = "\n".join(f"  {it.get('xpath', '')} {it['level']}: {it['text']}" for it in found) or "  nothing"
     places = [it.get("xpath", "") for it in found]
     if example.at is None:

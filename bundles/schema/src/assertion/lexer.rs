@@ -38,7 +38,7 @@ pub(super) fn tokens(text: &str) -> Result<Vec<Token<'_>>, String> {
                 let len = rest.find(|c: char| !is_word(c)).unwrap_or(rest.len());
                 (Token::Word(&rest[..len]), len)
             }
-            c => return Err(format!("the character `{c}` has no meaning here")),
+            c => return Err(format!("unexpected character `{c}`")),
         };
         all.push(token);
         rest = rest[len..].trim_start();

@@ -44,7 +44,7 @@ impl Expr {
 
 /// Reason why an XPath expression is not supported.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("understand the XPath `{text}`: {what}")]
+#[error("parse the XPath `{text}`: {what}")]
 pub struct XPathProblem {
     /// The expression.
     pub text: String,

@@ -21,7 +21,7 @@ impl Assertion {
         let mut at = 0;
         let root = read(&tokens, &mut at, names, 0)?;
         if at < tokens.len() {
-            Err("something follows the assertion".into())
+            Err("unexpected text after the assertion".into())
         } else {
             Ok(Assertion { root })
         }
@@ -71,10 +71,10 @@ fn read(
         Token::Number(text) => text
             .parse()
             .map(Expr::Number)
-            .map_err(|_| format!("`{text}` is no number")),
+            .map_err(|_| format!("expected a number, found `{text}`")),
         Token::Text(text) => Ok(Expr::Text(text.into())),
         Token::Sign("(") => read_call(tokens, at, names, depth),
-        Token::Sign(sign) => Err(format!("`{sign}` comes unexpectedly")),
+        Token::Sign(sign) => Err(format!("unexpected `{sign}`")),
     }
 }
 
@@ -85,7 +85,7 @@ fn read_call(
     depth: usize,
 ) -> Result<Expr, String> {
     let (Some(Token::Word(name)) | Some(Token::Sign(name))) = tokens.get(*at).copied() else {
-        return Err("an operator is missing".into());
+        return Err("expected an operator".into());
     };
     *at += 1;
     let mut parts = Vec::new();
@@ -93,7 +93,7 @@ fn read_call(
         parts.push(read(tokens, at, names, depth + 1)?);
     }
     *at += 1;
-    build(name, parts).ok_or_else(|| format!("`{name}` is used wrongly"))
+    build(name, parts).ok_or_else(|| format!("invalid use of `{name}`"))
 }
 
 fn build(name: &str, mut parts: Vec<Expr>) -> Option<Expr> {

@@ -20,7 +20,7 @@ impl Assertion {
         let root = parser.expression(0).map_err(problem)?;
         match parser.peek() {
             None => Ok(Assertion { root }),
-            Some(token) => Err(problem(format!("{token:?} comes unexpectedly"))),
+            Some(token) => Err(problem(format!("unexpected {token:?}"))),
         }
     }
 }
@@ -48,7 +48,7 @@ impl<'t> Parser<'t, '_> {
         if self.eat(token) {
             Ok(())
         } else {
-            Err(format!("{token:?} is missing"))
+            Err(format!("expected {token:?}"))
         }
     }
 
@@ -118,7 +118,9 @@ impl<'t> Parser<'t, '_> {
             Some(Token::Sign("(")) => self.grouped(depth),
             Some(Token::Number(text)) => {
                 self.at += 1;
-                let number = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+                let number = text
+                    .parse()
+                    .map_err(|_| format!("expected a number, found `{text}`"))?;
                 Ok(Expr::Number(number))
             }
             Some(Token::Text(text)) => {
@@ -133,7 +135,7 @@ impl<'t> Parser<'t, '_> {
                     self.path(word).map(Expr::Path)
                 }
             }
-            Some(token) => Err(format!("{token:?} comes unexpectedly")),
+            Some(token) => Err(format!("unexpected {token:?}")),
             None => Err("it ends too early".into()),
         }
     }
@@ -175,7 +177,7 @@ impl<'t> Parser<'t, '_> {
     fn path_argument(&mut self) -> Parsed<Path> {
         self.expect(Token::Sign("("))?;
         let Some(Token::Word(word)) = self.peek() else {
-            return Err("a path is missing".into());
+            return Err("expected a path".into());
         };
         self.at += 1;
         let path = self.path(word)?;
@@ -203,7 +205,7 @@ fn comparable(left: &Expr, right: &Expr, general: bool) -> Parsed<()> {
     if numbers || (general && mixed) {
         return Ok(());
     }
-    Err("only numbers with numbers, and attributes with literals (by = != < <= > >=) can be compared".into())
+    Err("a comparison must be between two numbers, or between an attribute and a literal (by = != < <= > >=)".into())
 }
 
 impl Path {

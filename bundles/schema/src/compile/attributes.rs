@@ -91,7 +91,7 @@ impl<'d> Compiler<'d, '_> {
             (None, None) => self.builtin(node, Builtin::AnySimple.name()),
             _ => Err(CompileError::at(
                 node,
-                Problem::Invalid("an attribute needs one type"),
+                Problem::Invalid("an attribute must have exactly one type"),
             )),
         }
     }

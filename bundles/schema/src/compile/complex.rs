@@ -146,7 +146,9 @@ impl<'d> Compiler<'d, '_> {
             } else {
                 Err(CompileError::at(
                     step,
-                    Problem::Invalid("the base has the other kind of content"),
+                    Problem::Invalid(
+                        "the base type must have the same kind of content (simple or complex)",
+                    ),
                 ))
             };
         }

@@ -69,7 +69,7 @@ pub enum Problem {
     #[error("the built-in type `{0}` is not supported")]
     Builtin(String),
     /// An included file that is missing in the input.
-    #[error("`{0}` was not given; all files of a schema lie in one directory")]
+    #[error("`{0}` is missing; all files of a schema must be in one directory")]
     NotGiven(String),
     /// A required attribute is missing.
     #[error("the attribute {0} is missing")]
@@ -85,7 +85,7 @@ pub enum Problem {
     Circular,
     /// A condition that would be evaluated again at every depth.
     #[error(
-        "a condition with // on the type `{0}`, whose elements can contain themselves, is not supported"
+        "a condition with // is not supported on the type `{0}`, because its elements can contain themselves"
     )]
     EndlessCondition(String),
     /// Nesting deeper than the limit.

@@ -51,7 +51,7 @@ impl<'d> Compiler<'d, '_> {
         else {
             return Err(CompileError::at(
                 node,
-                Problem::Invalid("one selector and one field are supported"),
+                Problem::Invalid("only one selector and one field are supported"),
             ));
         };
         let paths = self.selector(selector)?;

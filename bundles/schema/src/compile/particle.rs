@@ -259,7 +259,7 @@ pub(super) fn occurs(node: Node<'_>) -> Result<(u32, Option<u32>), CompileError>
     if max.is_some_and(|max| max < min) {
         return Err(CompileError::at(
             node,
-            Problem::Invalid("maxOccurs lies below minOccurs"),
+            Problem::Invalid("maxOccurs is less than minOccurs"),
         ));
     }
     Ok((min, max))

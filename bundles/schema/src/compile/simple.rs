@@ -106,7 +106,7 @@ impl<'d> Compiler<'d, '_> {
         if members.is_empty() {
             return Err(CompileError::at(
                 node,
-                Problem::Invalid("a union without members"),
+                Problem::Invalid("a union needs at least one member type"),
             ));
         }
         Ok(SimpleType {

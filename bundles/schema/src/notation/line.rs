@@ -37,13 +37,13 @@ impl<'t> Line<'t> {
     }
 
     pub(super) fn word(&mut self, what: &str) -> Parsed<&'t str> {
-        self.next().ok_or_else(|| format!("{what} is missing"))
+        self.next().ok_or_else(|| format!("expected {what}"))
     }
 
     pub(super) fn number<T: std::str::FromStr>(&mut self, what: &str) -> Parsed<T> {
         let word = self.word(what)?;
         word.parse()
-            .map_err(|_| format!("{what} `{word}` is no number"))
+            .map_err(|_| format!("expected {what}, found `{word}`"))
     }
 
     /// Checks whether a quoted text comes next.
@@ -56,8 +56,8 @@ impl<'t> Line<'t> {
         let body = self
             .rest
             .strip_prefix('"')
-            .ok_or("a quoted text is missing")?;
-        let end = closing_quote(body).ok_or("a quoted text is not closed")?;
+            .ok_or("expected a quoted text")?;
+        let end = closing_quote(body).ok_or("the quoted text is not closed")?;
         let (text, rest) = (&body[..end], &body[end + 1..]);
         self.rest = rest.trim_ascii_start();
         if text.contains('\\') {
@@ -94,7 +94,7 @@ fn unescape(text: &str) -> Parsed<String> {
             Some('r') => '\r',
             Some('t') => '\t',
             Some(plain @ ('"' | '\\')) => plain,
-            _ => return Err("an unknown escape".into()),
+            _ => return Err("unknown escape sequence".into()),
         });
     }
     Ok(out)

@@ -115,7 +115,7 @@ impl Reader {
             "when" => self.alternative(line)?,
             "key" | "unique" | "keyref" => self.constraint(word, line)?,
             "#" => {}
-            other => return Err(format!("`{other}` is no statement")),
+            other => return Err(format!("unknown statement `{other}`")),
         }
         Ok(())
     }
@@ -124,14 +124,14 @@ impl Reader {
         self.schema
             .names
             .intern(text)
-            .ok_or_else(|| "there are too many names".into())
+            .ok_or_else(|| "too many names".into())
     }
 
     fn complex_mut(&mut self) -> Parsed<&mut ComplexType> {
         self.schema
             .complex
             .last_mut()
-            .ok_or_else(|| "no complex type was begun".into())
+            .ok_or_else(|| "no complex type precedes this line".into())
     }
 
     fn simple(&mut self, line: &mut Line<'_>) -> Parsed<()> {
@@ -144,7 +144,7 @@ impl Reader {
             word = line.word("`=`")?;
         }
         if word != "=" {
-            return Err("`=` is missing".into());
+            return Err("expected `=`".into());
         }
         let (variety, mut facet) = variety(line)?;
         let mut facets = Facets::default();
@@ -189,7 +189,7 @@ impl Reader {
                 }
                 facets.enumeration = Some(values);
             }
-            other => return Err(format!("`{other}` is no restriction")),
+            other => return Err(format!("unknown restriction `{other}`")),
         }
         Ok(())
     }
@@ -214,7 +214,7 @@ impl Reader {
                 "+abstract" => ty.is_abstract = true,
                 "+mixed" => ty.mixed = true,
                 name if ty.name.is_none() => ty.name = Some(name.into()),
-                other => return Err(format!("`{other}` comes unexpectedly")),
+                other => return Err(format!("unexpected `{other}`")),
             }
         }
         self.schema.complex.push(ty);
@@ -234,7 +234,7 @@ impl Reader {
             match word {
                 "required" => attribute.required = true,
                 "fixed" => attribute.fixed = Some(line.quoted()?.into()),
-                other => return Err(format!("`{other}` comes unexpectedly")),
+                other => return Err(format!("unexpected `{other}`")),
             }
         }
         let ty = self.complex_mut()?;
@@ -262,7 +262,7 @@ impl Reader {
             match word {
                 "nillable" => element.nillable = true,
                 "required" => required = true,
-                other => return Err(format!("`{other}` comes unexpectedly")),
+                other => return Err(format!("unexpected `{other}`")),
             }
         }
         Ok((element, required))
@@ -275,7 +275,7 @@ impl Reader {
                 all.required |= u64::from(required) << all.members.len();
                 all.members.push(element);
             }
-            Content::All(_) => return Err("an `all` has at most 64 members".into()),
+            Content::All(_) => return Err("an `all` may have at most 64 members".into()),
             Content::Children(model) => model.children.push(element),
             content => {
                 *content = Content::Children(Model {
@@ -292,13 +292,13 @@ impl Reader {
         let number: usize = line.number("a number")?;
         let names = &mut self.schema.names;
         let Some(ty) = self.schema.complex.last_mut() else {
-            return Err("no complex type was begun".into());
+            return Err("no complex type precedes this line".into());
         };
         if matches!(ty.content, Content::Empty) {
             ty.content = Content::Children(Model::default());
         }
         let Content::Children(model) = &mut ty.content else {
-            return Err("a state without children".into());
+            return Err("a state in a type without children".into());
         };
         if number != model.states.len() {
             return Err("states must be numbered in order".into());
@@ -310,7 +310,7 @@ impl Reader {
         while let Some(word) = line.next() {
             match word.split_once('>') {
                 None if word == "end" => state.accepts = true,
-                None => return Err(format!("`{word}` comes unexpectedly")),
+                None => return Err(format!("unexpected `{word}`")),
                 Some(("*", to)) => state.wildcard = Some(state_number(to)?),
                 Some((name, to)) => {
                     model.edges.push(edge(names, &model.children, name, to)?);
@@ -332,7 +332,7 @@ impl Reader {
                 _ => None,
             },
         };
-        element.ok_or_else(|| "no element was begun".into())
+        element.ok_or_else(|| "no element precedes this line".into())
     }
 
     fn alternative(&mut self, line: &mut Line<'_>) -> Parsed<()> {
@@ -357,7 +357,7 @@ impl Reader {
         let field = line
             .word("a field")?
             .strip_prefix('@')
-            .ok_or("a field begins with `@`")?;
+            .ok_or("a field must begin with `@`")?;
         let field = self.name(field)?;
         let mut paths = Vec::new();
         while let Some(path) = line.next() {
@@ -386,7 +386,7 @@ impl Reader {
         let list = std::mem::take(&mut self.constraints);
         let dangling = |one: &Constraint| matches!(one.kind, ConstraintKind::Reference(to) if usize::from(to) >= list.len());
         if list.iter().any(dangling) {
-            return Err("a keyref refers to a key that is not there".into());
+            return Err("a keyref refers to an undefined key".into());
         }
         let merged = Constraints::new(list).ok_or("selectors have too many steps")?;
         self.last_element()?.constraints = Some(Box::new(merged));
@@ -422,7 +422,7 @@ fn variety<'t>(line: &mut Line<'t>) -> Parsed<(Variety, Option<&'t str>)> {
         }
         word => {
             let builtin =
-                Builtin::find(word).ok_or_else(|| format!("`{word}` is no built-in type"))?;
+                Builtin::find(word).ok_or_else(|| format!("unknown built-in type `{word}`"))?;
             Ok((Variety::Atomic(builtin), line.next()))
         }
     }
@@ -430,7 +430,7 @@ fn variety<'t>(line: &mut Line<'t>) -> Parsed<(Variety, Option<&'t str>)> {
 
 fn bound(line: &mut Line<'_>, exclusive: bool) -> Parsed<Bound> {
     let text = line.word("a bound")?;
-    let value = float_value(text).ok_or_else(|| format!("`{text}` is no number"))?;
+    let value = float_value(text).ok_or_else(|| format!("expected a number, found `{text}`"))?;
     Ok(Bound {
         text: text.into(),
         value,
@@ -442,7 +442,7 @@ fn edge(names: &mut Names, children: &[ElementDecl], name: &str, to: &str) -> Pa
     let id = names.find(name);
     let index = children.iter().position(|child| Some(child.name) == id);
     let (Some(name), Some(index)) = (id, index) else {
-        return Err(format!("`{name}` is no child of this type"));
+        return Err(format!("`{name}` is not a child of this type"));
     };
     let child = u16::try_from(index).map_err(|_| "too many children")?;
     Ok(Edge {
@@ -453,21 +453,22 @@ fn edge(names: &mut Names, children: &[ElementDecl], name: &str, to: &str) -> Pa
 }
 
 fn state_number(text: &str) -> Parsed<u16> {
-    text.parse().map_err(|_| format!("`{text}` is no state"))
+    text.parse()
+        .map_err(|_| format!("expected a state, found `{text}`"))
 }
 
 fn simple_number(text: &str) -> Parsed<u32> {
     let number = text
         .strip_prefix('s')
         .and_then(|number| number.parse().ok());
-    number.ok_or_else(|| format!("`{text}` is no simple type"))
+    number.ok_or_else(|| format!("expected a simple type, found `{text}`"))
 }
 
 fn complex_number(text: &str) -> Parsed<u32> {
     let number = text
         .strip_prefix('c')
         .and_then(|number| number.parse().ok());
-    number.ok_or_else(|| format!("`{text}` is no complex type"))
+    number.ok_or_else(|| format!("expected a complex type, found `{text}`"))
 }
 
 fn type_ref(text: &str) -> Parsed<TypeRef> {
@@ -517,7 +518,7 @@ fn check(schema: &Schema) -> Parsed<()> {
             .all(|attribute| is_simple(attribute.value));
         if !content || !attributes || !ty.base.is_none_or(is_complex) {
             return Err(format!(
-                "complex type {index} refers to something that is not there"
+                "complex type {index} refers to something undefined"
             ));
         }
     }

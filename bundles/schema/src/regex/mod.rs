@@ -21,7 +21,7 @@ pub struct Pattern {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PatternError {
     /// It is not a regular expression, or uses a construct that is not supported.
-    #[error("understand the pattern `{pattern}` at character {at}: {what}")]
+    #[error("parse the pattern `{pattern}` at character {at}: {what}")]
     Syntax {
         /// The pattern.
         pattern: String,
@@ -31,7 +31,7 @@ pub enum PatternError {
         what: &'static str,
     },
     /// It needs more states than the limit allows.
-    #[error("bound the pattern `{pattern}`: it needs more than {limit} states")]
+    #[error("compile the pattern `{pattern}`: it needs more than {limit} states")]
     TooLarge {
         /// The pattern.
         pattern: String,

@@ -100,8 +100,8 @@ impl Parser {
             '[' => self.class(depth).map(Tree::Set),
             '.' => Ok(Tree::Set(CharSet::dot())),
             '\\' => self.escape().map(Tree::Set),
-            '?' | '*' | '+' | '{' => Err("a quantifier without anything before it"),
-            '}' | ']' => Err("a bracket that was never opened"),
+            '?' | '*' | '+' | '{' => Err("a quantifier with nothing before it"),
+            '}' | ']' => Err("a closing bracket without an opening one"),
             c => Ok(Tree::Set(CharSet::one(c))),
         }
     }
@@ -111,7 +111,7 @@ impl Parser {
         if matches!(letter, 'p' | 'P' | 'w' | 'W') {
             return Err("Unicode categories (\\p, \\w) are not supported");
         }
-        CharSet::escape(letter).ok_or("an unknown escape")
+        CharSet::escape(letter).ok_or("unknown escape sequence")
     }
 
     fn quantified(&mut self, atom: Tree) -> Parsed<Tree> {
@@ -150,7 +150,7 @@ impl Parser {
             return Err("a quantifier is not closed");
         }
         if max < min {
-            return Err("a quantifier whose end lies before its start");
+            return Err("a quantifier with a maximum below its minimum");
         }
         Ok((min, Some(max)))
     }
@@ -163,7 +163,7 @@ impl Parser {
         self.at += digits.len();
         let number: u32 = digits.parse().map_err(|_| "a quantifier needs a number")?;
         if number > MAX_REPEAT {
-            Err("a quantifier beyond 1000")
+            Err("a quantifier greater than 1000")
         } else {
             Ok(number)
         }
@@ -180,7 +180,7 @@ impl Parser {
         loop {
             match self.next()? {
                 ']' => break,
-                '[' => return Err("an opening bracket within a class"),
+                '[' => return Err("an opening bracket inside a class"),
                 '-' if self.eat('[') => {
                     minus = Some(self.class(depth + 1)?);
                     if !self.eat(']') {
@@ -227,7 +227,7 @@ impl Parser {
             c => c,
         };
         if last < start {
-            Err("a range whose end lies before its start")
+            Err("a range with its end before its start")
         } else {
             Ok(CharSet::range(start, last))
         }

@@ -84,7 +84,7 @@ impl SimpleType {
                     .get(*item as usize)
                     .map(|item| item.expectation(schema).sentence());
                 format!(
-                    "a list, separated by blanks, of: {}",
+                    "a list, separated by spaces, of: {}",
                     item.unwrap_or_default()
                 )
             }
@@ -171,14 +171,14 @@ fn noun(builtin: Builtin) -> &'static str {
             "a text"
         }
         Builtin::Boolean => "true or false",
-        Builtin::Decimal => "a decimal number without exponent",
+        Builtin::Decimal => "a decimal number without an exponent",
         Builtin::Float | Builtin::Double => "a number",
         Builtin::Integer => "a whole number",
         Builtin::NonNegative => "a whole number of at least 0",
         Builtin::Positive => "a whole number of at least 1",
         Builtin::NonPositive => "a whole number of at most 0",
         Builtin::Negative => "a whole number of at most -1",
-        Builtin::Long => "a whole number of 64 bits",
+        Builtin::Long => "a 64-bit whole number",
         Builtin::Int => "a whole number from -2147483648 to 2147483647",
         Builtin::Short => "a whole number from -32768 to 32767",
         Builtin::Byte => "a whole number from -128 to 127",

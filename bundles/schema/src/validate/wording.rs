@@ -113,7 +113,7 @@ fn expected_here(
 pub(super) fn unknown_root(root: Node<'_>, known: &[&str], title: &str) -> Wording {
     let names: Vec<String> = known.iter().map(|name| (*name).to_owned()).collect();
     let text = format!(
-        "the root element <{}> is not one of {title}, which expects {}",
+        "the root element <{}> is not defined in {title}; expected {}",
         root.name(),
         elements(&names)
     );
@@ -235,10 +235,10 @@ pub(super) fn misplaced<'s>(
             format!("<{name}> in <{parent_name}> comes too late: it must come before <{later}>")
         }
         Some(Obstacle::Instead(other)) => format!(
-            "<{name}> cannot stand beside <{other}>: <{parent_name}> takes one or the other"
+            "<{name}> cannot occur together with <{other}>: <{parent_name}> takes one or the other"
         ),
         None => format!(
-            "<{name}> may occur in <{parent_name}>, but not at this place: children have a fixed order, expected here: {words}"
+            "<{name}> may occur in <{parent_name}>, but not here: children have a fixed order, expected here: {words}"
         ),
     };
     Wording::new(name, text)
@@ -332,7 +332,7 @@ pub(super) fn missing_children(
     let text = match there {
         0 => format!("<{}> lacks {}", node.name(), elements(&needed)),
         _ => format!(
-            "<{}> has {there} {}, and needs more of them",
+            "<{}> has {there} {}, but needs more",
             node.name(),
             elements(&needed)
         ),
@@ -356,7 +356,7 @@ pub(super) fn invalid_value(
     let suggestion =
         closest(value.trim(), expectation.values.iter().map(String::as_str)).map(str::to_owned);
     let text = format!(
-        "{}={} of <{}> does not fit, it must be {}{}",
+        "{}={} of <{}> is invalid; it must be {}{}",
         attribute.name(),
         quote(value),
         node.name(),
@@ -380,8 +380,8 @@ fn foreign_to_expressions(value: &str, expected: &[String]) -> String {
     let admitted = |c: char| c.is_ascii_alphanumeric() || " _+-*/%$().,".contains(c);
     match inner.chars().find(|c| !admitted(*c)) {
         Some(sign) => format!(
-            "; {} has no meaning in expressions, which are made of numbers, words, parameters and \
-             the signs + - * / % ( ) ,",
+            "; {} is not allowed in expressions, which consist of numbers, words, parameters and the signs + - * \
+             / % ( ) ,",
             quote(&sign.to_string())
         ),
         None => String::new(),
@@ -398,7 +398,7 @@ pub(super) fn invalid_text(
     let suggestion =
         closest(value.trim(), expectation.values.iter().map(String::as_str)).map(str::to_owned);
     let text = format!(
-        "the text {} of <{}> does not fit, it must be {}",
+        "the text {} of <{}> is invalid; it must be {}",
         quote(value),
         node.name(),
         expectation.sentence()
@@ -448,7 +448,7 @@ pub(super) fn unexpected_attribute(
         .filter(|name| !used(name));
     let free: Vec<String> = free.map(str::to_owned).collect();
     let text = format!(
-        "{} knows no attribute `{}` of `{}`",
+        "{} defines no attribute `{}` for `{}`",
         schema.title,
         attribute.name(),
         node.name()
@@ -467,11 +467,11 @@ pub(super) fn unexpected_attribute(
     let suggestion = suggestion.or_else(longer).or_else(shorter);
     let list = match (&suggestion, free.as_slice()) {
         (Some(_), _) => String::new(),
-        (None, []) if declared.is_empty() => ", which has none".to_owned(),
-        (None, []) => format!("; it has {}, and no more", names_of(declared, schema)),
+        (None, []) if declared.is_empty() => ", which has no attributes".to_owned(),
+        (None, []) => format!("; its only attributes are {}", names_of(declared, schema)),
         (None, free) => {
             let free: Vec<String> = free.iter().map(|name| format!("`{name}`")).collect();
-            format!("; it could have {}", free.join(", "))
+            format!("; further allowed attributes are {}", free.join(", "))
         }
     };
     Wording::new(attribute.name(), text + &list)
@@ -493,7 +493,7 @@ fn names_of(declared: &[AttributeUse], schema: &Schema) -> String {
 /// Reports an attribute such as `xsi:type` with a prefix that has another meaning or none.
 pub(super) fn unbound_prefix(node: Node<'_>, attribute: Attribute<'_>, prefix: &str) -> Wording {
     let text = format!(
-        "{} of <{}> means nothing: xmlns:{prefix} must be \"{XSI}\"",
+        "{} of <{}> has no meaning: xmlns:{prefix} must be \"{XSI}\"",
         attribute.name(),
         node.name()
     );
@@ -552,12 +552,15 @@ pub(super) fn no_type(
     let tests: Vec<String> = tests.map(|test| test.notation(&schema.names)).collect();
     let text = if undecided && !tests.is_empty() {
         format!(
-            "what <{}> may contain cannot be told: one of these must hold: {}",
+            "the allowed content of <{}> is undefined; one of these conditions must hold: {}",
             node.name(),
             tests.join(", ")
         )
     } else {
-        format!("the schema gives <{}> only an abstract type", node.name())
+        format!(
+            "the schema defines only an abstract type for <{}>",
+            node.name()
+        )
     };
     Wording::new("", text).expecting(tests)
 }
@@ -566,7 +569,7 @@ pub(super) fn bad_xsi_type(node: Node<'_>, written: &str) -> Wording {
     Wording::new(
         written,
         format!(
-            "xsi:type names {}, which is no type for <{}>",
+            "xsi:type names {}, which is not a valid type for <{}>",
             quote(written),
             node.name()
         ),
@@ -577,7 +580,7 @@ pub(super) fn condition_failed(node: Node<'_>, assertion: &Assertion, schema: &S
     let condition = assertion.notation(&schema.names);
     let known = defects::condition(node, &condition);
     let text = match defects::explanation(node, &condition) {
-        Some(words) => format!("<{}> is not as it must be: {words}", node.name()),
+        Some(words) => format!("<{}> is invalid: {words}", node.name()),
         None => format!(
             "<{}> breaks a condition of its type: {condition}",
             node.name()
@@ -600,7 +603,7 @@ pub(super) fn duplicate(attribute: Attribute<'_>, key: &str) -> Wording {
 
 pub(super) fn missing_key(node: Node<'_>, field: &str, key: &str) -> Wording {
     let text = format!(
-        "<{}> needs the attribute {field} to be told apart (key {key})",
+        "<{}> needs the attribute {field}, which identifies it (key {key})",
         node.name()
     );
     Wording::new("", text).expecting(vec![field.to_owned()])
@@ -627,7 +630,7 @@ pub(super) fn dangling(
     };
     let field = key.map_or("key", |key| schema.names.text(key.field));
     let text = format!(
-        "{} {} of <{}> refers to nothing: no {what} has it as its {field}",
+        "{} {} of <{}> is not defined: no {what} has it as its {field}",
         attribute.name(),
         quote(attribute.value()),
         attribute.node().name()

@@ -72,7 +72,7 @@ impl<'r> CheckerGroup<'r> {
         let standard = self.work.plan.bundle.standard;
         let Some(version) = self.work.subject.version() else {
             let reason =
-                format!("the rule applies to {standard} {range}; the file names no version");
+                format!("the rule applies to {standard} {range}; the file states no valid version");
             // The document lacks the version, so applicability is unknown.
             return Err(Outcome::without_run(Ending::Blocked {
                 by: Vec::new(),
@@ -91,7 +91,7 @@ impl<'r> CheckerGroup<'r> {
                 "the rule itself applies to {standard} {version}"
             ))),
             _ => Err(skips(format!(
-                "the rule applies to {standard} {range}; the file is {version}"
+                "the rule applies to {standard} {range}; the file has version {version}"
             ))),
         }
     }

@@ -213,7 +213,7 @@ impl RuleState {
             RuleState::FoundErrors => Some("found errors"),
             RuleState::NotApplicable | RuleState::Blocked => Some("was skipped"),
             RuleState::Failed => Some("failed"),
-            RuleState::Waits => Some("did not run before it"),
+            RuleState::Waits => Some("did not run before this checker"),
         }
     }
 

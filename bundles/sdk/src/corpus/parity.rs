@@ -76,7 +76,7 @@ impl Parity {
             Err(error) => panic!("{error}"),
         };
         let Some(mut comparisons) = comparisons else {
-            crate::run::complain(&format!("skipped: {} is not there\n", cases.display()));
+            crate::run::complain(&format!("skipped: {} is missing\n", cases.display()));
             return None;
         };
         for one in comparisons
@@ -94,9 +94,8 @@ impl Parity {
     fn page(&self, on_cases: &[Comparison], on_real_files: &[Comparison]) -> String {
         let mut page = self.introduction.to_owned();
         page.push_str(
-            "\n## ASAM's own test files\n\n\
-             A result agrees when status, number and levels of the issues are the same and the XPaths select\n\
-             the same elements; ours may name further places.\n",
+            "\n## ASAM's own test files\n\nA result agrees when status, number and levels of the issues are the \
+             same and the XPaths select\nthe same elements; our results may name further places.\n",
         );
         collection(&mut page, on_cases, self.on_cases);
         page.push_str(self.about_real_files);
@@ -121,7 +120,7 @@ pub fn agrees_or_says(path: &Path, text: &str) {
     let written = std::fs::read_to_string(path).unwrap_or_default();
     assert!(
         written == text,
-        "{} is not what the test finds; QCBUS_BLESS=1 writes it, review the difference",
+        "{} differs from the result of the test; QCBUS_BLESS=1 writes it, review the difference",
         path.display()
     );
 }

@@ -103,7 +103,7 @@ impl Edit {
     pub fn by(line: &str, file: PathBuf, key: &str) -> Result<Edit, String> {
         let (selector, action) = line
             .split_once(" | ")
-            .ok_or_else(|| format!("neither an edit nor a place: {line}"))?;
+            .ok_or_else(|| format!("expected an edit or a place, found: {line}"))?;
         let change = match (selector.trim(), action.trim()) {
             (".", "remove") => Change::Remove,
             (".", action) => match action.strip_prefix("write ") {
@@ -121,7 +121,7 @@ impl Edit {
         let top = BTreeSet::from([1]);
         let (new, rows) = match &self.change {
             Change::Write(_) if source.join(&self.file).exists() => {
-                return Err(format!("{} is there already", self.file.display()));
+                return Err(format!("{} already exists", self.file.display()));
             }
             Change::Write(text) => (Some(text.clone().into_bytes()), top),
             Change::Remove => {
@@ -193,7 +193,10 @@ pub fn beside(file: &Path, path: &str) -> Result<PathBuf, String> {
     let folder = file.parent().unwrap_or(Path::new(""));
     let path = normal(&folder.join(path));
     if path.starts_with("..") {
-        return Err(format!("not in the directory: {}", path.display()));
+        return Err(format!(
+            "the path leads out of the directory: {}",
+            path.display()
+        ));
     }
     Ok(path)
 }

@@ -55,7 +55,7 @@ impl Action {
     /// # Errors
     /// Returns an error for text that cannot be parsed.
     pub fn parse(text: &str) -> Result<Action, String> {
-        let bad = || format!("no edit: {text}");
+        let bad = || format!("not an edit: {text}");
         let (verb, rest) = text.split_once(' ').unwrap_or((text, ""));
         let owned = || rest.to_owned();
         let named = || rest.strip_prefix('@').ok_or_else(bad);
@@ -63,7 +63,9 @@ impl Action {
             "set" => {
                 let (name, value) = named()?.split_once('=').ok_or_else(bad)?;
                 if value.contains(['"', '<']) {
-                    return Err(format!("no attribute may have such a value: {text}"));
+                    return Err(format!(
+                        "an attribute value must not contain \" or <: {text}"
+                    ));
                 }
                 Action::Set(name.to_owned(), value.to_owned())
             }
@@ -111,10 +113,10 @@ impl Action {
         let rows = self.rows(scan, id);
         let edited = spliced(text, splices);
         if edited == text {
-            return Err(format!("changes nothing: {self:?}"));
+            return Err(format!("the edit changes nothing: {self:?}"));
         }
         if lines(&edited) != lines(text) {
-            return Err(format!("changes the number of lines: {self:?}"));
+            return Err(format!("the edit changes the number of lines: {self:?}"));
         }
         Ok((edited, rows))
     }
@@ -224,7 +226,9 @@ fn calculated(
     let attribute = scan.attribute(id, name);
     let attribute = attribute.ok_or_else(|| format!("no attribute {name}"))?;
     let old = &scan.text[attribute.value.clone()];
-    let number: f64 = old.parse().map_err(|_| format!("no number: {old}"))?;
+    let number: f64 = old
+        .parse()
+        .map_err(|_| format!("expected a number, found {old}"))?;
     Ok((attribute.value.clone(), to(number).to_string()))
 }
 
@@ -241,7 +245,7 @@ fn next(scan: &Scan<'_>, id: usize) -> Result<usize, String> {
     let mut later = scan.siblings(id).filter(|other| *other > id);
     later
         .next()
-        .ok_or_else(|| "nothing comes after it".to_owned())
+        .ok_or_else(|| "no element follows it".to_owned())
 }
 
 fn end_tag(element: &Element) -> Result<Range<usize>, String> {
@@ -263,7 +267,7 @@ fn quoted(text: &str, element: &Element) -> Result<Splices, String> {
     let quoted = element.attributes.iter().map(|attribute| {
         let value = &text[attribute.value.clone()];
         if value.contains('\'') {
-            return Err(format!("has a quote: {value}"));
+            return Err(format!("the value contains a quote: {value}"));
         }
         let range = attribute.value.start - 1..attribute.value.end + 1;
         Ok((range, format!("'{value}'")))
@@ -273,7 +277,7 @@ fn quoted(text: &str, element: &Element) -> Result<Splices, String> {
 
 fn reversed(text: &str, element: &Element) -> Result<(Range<usize>, String), String> {
     let [first, .., last] = &element.attributes[..] else {
-        return Err("less than two attributes".to_owned());
+        return Err("fewer than two attributes".to_owned());
     };
     let range = first.whole.start..last.whole.end;
     let attributes = element.attributes.iter().rev();

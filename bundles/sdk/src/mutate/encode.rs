@@ -28,7 +28,7 @@ impl Storage {
             "undeclare" => Storage::Undeclare,
             _ => {
                 let count = text.strip_prefix("cut ").and_then(|it| it.parse().ok());
-                Storage::Cut(count.ok_or_else(|| format!("no edit of a file: {text}"))?)
+                Storage::Cut(count.ok_or_else(|| format!("not an edit of a file: {text}"))?)
             }
         };
         Ok(storage)
@@ -64,12 +64,12 @@ impl Storage {
             Storage::Cut(count) => {
                 let all: Vec<&str> = text.split('\n').collect();
                 let kept = all.len().checked_sub(*count);
-                let kept = kept.ok_or("it has not so many lines")?;
+                let kept = kept.ok_or("the file has fewer lines")?;
                 all[..kept].join("\n").into_bytes()
             }
         };
         if changed == bytes {
-            return Err(format!("changes nothing: {self:?}"));
+            return Err(format!("the edit changes nothing: {self:?}"));
         }
         Ok(changed)
     }
@@ -102,5 +102,5 @@ fn narrow(text: &str, largest: u8) -> Result<Vec<u8>, String> {
     let narrow = text.chars().map(|c| byte(c).ok_or(c));
     narrow
         .collect::<Result<_, char>>()
-        .map_err(|c| format!("the encoding has no {c}"))
+        .map_err(|c| format!("the encoding has no character {c}"))
 }

@@ -4,7 +4,10 @@
 //! Edits change the text of a file and nothing else: rows stay the same. The directory of the files
 //! is mirrored by links, so that catalogs and maps beside a scenario can be edited, too.
 
-#![expect(clippy::unwrap_used, reason = "a test may fail and tell what it tried")]
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test may panic and report what it tried"
+)]
 
 mod change;
 mod edit;

@@ -45,7 +45,7 @@ impl Selector {
             words.push(compound);
         }
         if child || words.is_empty() || words[0].child {
-            return Err(format!("no selector: {text}"));
+            return Err(format!("not a selector: {text}"));
         }
         Ok(Selector {
             text: text.to_owned(),
@@ -67,7 +67,11 @@ impl Selector {
         let found: Vec<usize> = self.all(scan).collect();
         match found[..] {
             [one] => Ok(one),
-            _ => Err(format!("{} elements fit: {}", found.len(), self.text)),
+            _ => Err(format!(
+                "expected one element, found {}: {}",
+                found.len(),
+                self.text
+            )),
         }
     }
 }
@@ -89,7 +93,7 @@ fn split(text: &str) -> impl Iterator<Item = &str> {
 
 impl Compound {
     fn parse(word: &str, key: &str) -> Result<Compound, String> {
-        let bad = || format!("no word of a selector: {word}");
+        let bad = || format!("not a word of a selector: {word}");
         let end = word.find(['#', '[', ':']).unwrap_or(word.len());
         let (name, mut rest) = word.split_at(end);
         let mut compound = Compound {

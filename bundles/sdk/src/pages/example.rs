@@ -29,7 +29,7 @@ impl FromStr for Verdict {
             "bad" => Ok(Verdict::Bad),
             "skipped" => Ok(Verdict::Skipped),
             _ => Err(format!(
-                "`{word}` is none of `good`, `bad`, `skipped` and `also`"
+                "expected `good`, `bad`, `skipped` or `also`, found `{word}`"
             )),
         }
     }
@@ -69,7 +69,7 @@ pub(super) fn version_of(
     if let Some(version) = &example.version {
         return version
             .parse()
-            .map_err(|_| format!("`{version}` is no version"));
+            .map_err(|_| format!("`{version}` is not a version"));
     }
     let range: VersionRange = rule.facts().versions.parse().unwrap_or_default();
     let newest = bundle
@@ -242,8 +242,12 @@ fn fill(
             .collect::<Vec<_>>()
             .join(", ")
     };
-    let template =
-        template.ok_or_else(|| format!("there is no such template; there are: {}", names()))?;
+    let template = template.ok_or_else(|| {
+        format!(
+            "template not found; the available templates are: {}",
+            names()
+        )
+    })?;
     let whole = template.text.replace("{major}", &version.major.to_string());
     let whole = whole.replace("{minor}", &version.minor.to_string());
     let (before, after) = whole

@@ -29,8 +29,8 @@ pub fn assert_pages(bundle: &'static Bundle, rules_dir: &str) {
     let complaints = check_pages(bundle, Path::new(rules_dir));
     if !complaints.is_empty() {
         panic!(
-            "{} complaints about the pages of {} (QCBUS_BLESS=1 writes what the rules find into \
-             their pages; review the difference):\n\n{}",
+            "{} complaints about the pages of {} (QCBUS_BLESS=1 writes the findings of the rules into their \
+             pages; review the difference):\n\n{}",
             complaints.len(),
             bundle.name,
             complaints.join("\n\n")
@@ -75,7 +75,7 @@ fn of_the_list(bundle: &'static Bundle) -> Vec<String> {
     for (index, checker) in plan.checkers.iter().enumerate() {
         let id = &checker.id;
         if !seen.insert(id.as_str()) || id.is_empty() {
-            complaints.push(format!("`{id}`: the id is empty or taken"));
+            complaints.push(format!("`{id}`: the id is empty or already used"));
         }
         if checker.facts.uids.is_empty() || !checker.facts.uids.iter().all(|uid| is_uid(uid)) {
             complaints.push(format!(
@@ -173,7 +173,7 @@ fn pages_of_rules(
     }
     complaints.extend(
         open.iter()
-            .map(|rule| format!("`{}`: no file is named like it", rule.facts().id)),
+            .map(|rule| format!("`{}`: no file has a matching name", rule.facts().id)),
     );
     pairs
 }
@@ -270,7 +270,7 @@ impl PageTest<'_> {
         let set = page.examples.iter().flat_map(|example| &example.params);
         complaints.extend(
             set.filter(|(name, _)| !known(name))
-                .map(|(name, _)| format!("`{name}` is no parameter of the rule")),
+                .map(|(name, _)| format!("`{name}` is not a parameter of the rule")),
         );
         for param in self.rule.facts().params {
             if !uses(param.name)
@@ -326,7 +326,7 @@ impl PageTest<'_> {
             .find(|issue| !uids.contains(&issue.rule_uid.as_str()))
         {
             return Err(format!(
-                "an issue bears `{}`, which is no UID of the rule",
+                "an issue has the UID `{}`, which is not a UID of the rule",
                 issue.rule_uid
             ));
         }
@@ -390,7 +390,7 @@ impl Endings {
             .filter(|(_, _, outcome)| outcome.ending.status() == Status::Error);
         failed.next().map_or(Ok(()), |(index, _, outcome)| {
             Err(format!(
-                "`{}` fails on it: {}",
+                "`{}` fails on the example: {}",
                 checkers[*index].id,
                 outcome.ending.reason()
             ))

@@ -82,8 +82,8 @@ impl Page {
             })
         };
         match (page.title.is_empty(), page.summary.is_empty()) {
-            (true, _) => missing("a page begins with a title, `# …`"),
-            (_, true) => missing("under the title, a sentence says what the rule demands"),
+            (true, _) => missing("a page must begin with a title, `# …`"),
+            (_, true) => missing("a sentence under the title must say what the rule requires"),
             _ => Ok(page),
         }
     }
@@ -141,7 +141,7 @@ impl Page {
                     match word.split_once('=') {
                         Some(("file", value)) => name = Some(value.to_owned()),
                         Some(("in", value)) => template = Some(value.to_owned()),
-                        _ => return wrong(format!("`{word}` is none of `file=` and `in=`")),
+                        _ => return wrong(format!("expected `file=` or `in=`, found `{word}`")),
                     }
                 }
                 if name.is_none() {
@@ -209,7 +209,7 @@ impl Example {
 }
 
 fn unknown_word(word: &str) -> String {
-    format!("`{word}` is none of `in=`, `version=`, `file=` and `set:NAME=`")
+    format!("expected `in=`, `version=`, `file=` or `set:NAME=`, found `{word}`")
 }
 
 fn closing_fence(lines: &[&str], open: usize) -> Result<usize, PageError> {

@@ -41,7 +41,7 @@ pub(crate) fn put_there(subject: &Subject<'_>, place: &Place<'_>) -> Option<Loca
     let is_other = subject.is_expanded() && !matches!(place, Place::Attribute(it) if it.is("name"));
     let places = value_given(subject, place).filter(|_| is_other)?;
     Some(Locations {
-        description: "the value that is put there".to_owned(),
+        description: "the value that is inserted there".to_owned(),
         elsewhere: None,
         places,
     })

@@ -34,7 +34,7 @@ pub enum UsageError {
     #[error("`{0}` needs {1}")]
     Lacks(&'static str, &'static str),
     /// Two options that exclude each other.
-    #[error("`{0}` and `{1}` exclude each other")]
+    #[error("`{0}` and `{1}` cannot be used together")]
     Conflict(&'static str, &'static str),
 }
 
@@ -56,11 +56,12 @@ pub(super) fn parse(arguments: impl Iterator<Item = OsString>) -> Result<Mode, U
             Short('h') | Long("help") => return Ok(Mode::Help),
             Short('c') | Long("config") => config = Some(PathBuf::from(parser.value()?)),
             Long("format") => {
-                let known = |text: &str| Format::of(text).ok_or("it is neither text nor json");
+                let known = |text: &str| Format::of(text).ok_or("expected text or json");
                 format = Some(parser.value()?.parse_with(known)?);
             }
             Long("threads") => {
-                let number = |text: &str| threads_of(text).ok_or("it is no number from 1 to 1024");
+                let number =
+                    |text: &str| threads_of(text).ok_or("expected a number from 1 to 1024");
                 threads = Some(parser.value()?.parse_with(number)?);
             }
             Long("timings") => timings = true,

@@ -413,7 +413,7 @@ impl Daemon {
             ToPeer::Drain => self.draining = true,
             // The broker ends the session after `Refused`, and `Closed` follows. Results are for
             // reporters.
-            ToPeer::Refused { reason } => tracing::error!(reason, "the broker refused"),
+            ToPeer::Refused { reason } => tracing::error!(reason, "the broker refused this bundle"),
             ToPeer::Result(_) | ToPeer::Withdrawn(_) => {}
         }
     }
@@ -575,7 +575,7 @@ impl Daemon {
             && let Some(outside) = plan.files().iter().find(|it| sandbox.keeps_out(it))
         {
             let file = outside.display();
-            tracing::info!(%file, "the configuration names files that only a fresh process may read");
+            tracing::info!(%file, "the configuration names files that only a new process may read");
             self.outgrown = true;
             return None;
         }

@@ -244,7 +244,7 @@ fn as_text(path: &Path, pooled: &Pooled) -> String {
     let open = pooled.open().map(|it| {
         let what = match it.ending {
             Ending::Failed { .. } => "failed",
-            _ => "could not look",
+            _ => "could not run",
         };
         let (path, why) = (to_text(path), it.ending.reason());
         let text = format!("{path}: {} {what}: {why}", it.checker);

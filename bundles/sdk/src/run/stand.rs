@@ -70,7 +70,7 @@ impl Stand<'_> {
         // between counts as another one, and a fresh process reads it.
         let sandbox = Sandbox::around(&sandboxed.reads);
         if let Err(error) = qcbus_confine::confine(&sandboxed) {
-            tracing::warn!(%error, "this bundle is not wholly confined");
+            tracing::warn!(%error, "this bundle is not fully confined");
         }
         Some(sandbox)
     }

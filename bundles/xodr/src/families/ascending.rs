@@ -11,7 +11,7 @@ pub(crate) const TOLERANCE: Param = Param::number(
     "tolerance",
     1e-6,
     "m",
-    "starts that differ by no more than this count as equal",
+    "starts whose difference is at most this value count as equal",
 );
 
 /// A list of equally named records.
@@ -90,8 +90,8 @@ impl List<'_> {
     ) {
         let (name, by) = (node.name(), self.start);
         let text = format!(
-            "this `{name}` has {by} = {}, but the one listed before it has {by} = {}; `{name}` elements must be listed in \
-             ascending order of `{by}`",
+            "this `{name}` has {by} = {}, but the previous one has {by} = {}; `{name}` elements must be listed \
+             in ascending order of `{by}`",
             beside(start, ahead),
             number(ahead)
         );
@@ -100,7 +100,7 @@ impl List<'_> {
             Some(from) => finding.road(self.road, from + start, 0.0),
             None => finding,
         };
-        let finding = finding.at(before, "the one listed before it");
+        let finding = finding.at(before, "the previous one");
         if let Some(uid) = self.uid {
             finding.uid(uid);
         }
@@ -115,8 +115,8 @@ impl List<'_> {
     ) {
         let (name, by) = (node.name(), self.start);
         let text = format!(
-            "this `{name}` has {by} = {} like the one listed before it, which therefore never \
-             applies; each must start after the one before",
+            "this `{name}` has {by} = {} like the previous one, which therefore never applies; each must start \
+             after the previous one",
             number(start)
         );
         let finding = found

@@ -91,7 +91,7 @@ fn report(
     let place = Place::attribute_or_node(connection.node(), "contactPoint");
     let finding = found.issue(place, text).at_end(road, end);
     match road.link_node() {
-        Some(link) => finding.at(link, "what the connecting road is linked to"),
+        Some(link) => finding.at(link, "the link of the connecting road"),
         None => finding,
     };
 }

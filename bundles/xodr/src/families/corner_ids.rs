@@ -51,7 +51,7 @@ pub(crate) fn are_sequential(map: &RoadMap<'_>, sort: &'static str, found: &mut 
                 found
                     .issue(Place::attribute_or_node(here.0, "id"), text)
                     .stands(map, object)
-                    .at(before.0, "the corner before it");
+                    .at(before.0, "the previous corner");
             }
         }
     }

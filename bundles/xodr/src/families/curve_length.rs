@@ -11,7 +11,7 @@ pub(crate) const LENGTH_TOLERANCE: Param = Param::number(
     "length_tolerance",
     0.001,
     "m",
-    "largest difference between the curve's length and `@length` that is accepted",
+    "maximum accepted difference between the curve's length and `@length`",
 );
 
 /// Reports curves with this explicit `@pRange` whose length over the parameter range is not
@@ -31,12 +31,12 @@ pub(crate) fn range_fits(part: MapPart<'_, '_>, range: ParamRange, found: &mut S
             ParamRange::Normalized => ("normalized", "0 to 1".to_owned()),
         };
         let hint = match other_range(&curve, &mismatch, found.number(&LENGTH_TOLERANCE)) {
-            Some(other) => format!("; with `{other}` it would be that long"),
+            Some(other) => format!("; with `{other}` the lengths would agree"),
             None => String::new(),
         };
         let text = format!(
-            "with `pRange=\"{word}\"` the parameter runs from {interval}, over which the curve is {:.6} m \
-             long, not {} m as `length` says{hint}",
+            "with `pRange=\"{word}\"` the parameter runs from {interval}; over this range the curve is {:.6} m \
+             long, but `length` is {} m{hint}",
             mismatch.found, mismatch.length
         );
         report(&mismatch, text, found);
@@ -49,7 +49,7 @@ pub(crate) fn length_matches(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
     for_each_mismatch(part, found, |curve, mismatch, found| {
         if curve.range == ParamRange::Normalized {
             let text = format!(
-                "the curve is {:.6} m long, but `length` says {} m; they should agree within {} m",
+                "the curve is {:.6} m long, but `length` is {} m; they should agree within {} m",
                 mismatch.found,
                 mismatch.length,
                 found.number(&LENGTH_TOLERANCE)

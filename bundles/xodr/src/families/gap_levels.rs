@@ -13,13 +13,13 @@ pub(crate) const GAP_ERROR_FROM: Param = Param::number(
     "gap_error_from",
     0.1,
     "m",
-    "gaps from this size on are errors where the standard demands that there are none",
+    "minimum size of gaps that are errors where the standard allows none",
 );
 pub(crate) const GAP_BROKEN_FROM: Param = Param::number(
     "gap_broken_from",
     1.0,
     "m",
-    "from this distance on, what should meet does not at all, which is an error in every version",
+    "minimum distance at which two things do not meet at all, which is an error in every version",
 );
 
 /// Limits for steps in height.
@@ -27,13 +27,13 @@ pub(crate) const STEP_ERROR_FROM: Param = Param::number(
     "step_error_from",
     0.1,
     "m",
-    "steps from this height on are errors where the standard demands that there are none",
+    "minimum height of steps that are errors where the standard allows none",
 );
 pub(crate) const STEP_BROKEN_FROM: Param = Param::number(
     "step_broken_from",
     3.0,
     "m",
-    "steps from this height on are errors in every version",
+    "minimum height of steps that are errors in every version",
 );
 
 /// Limit for changes of direction, in plan view and crossfall.
@@ -41,7 +41,7 @@ pub(crate) const KINK_ERROR_FROM: Param = Param::number(
     "kink_error_from",
     0.2,
     "rad",
-    "kinks from this angle on are errors where the standard demands that there are none",
+    "minimum angle of kinks that are errors where the standard allows none",
 );
 
 /// Severity of a misfit.

@@ -37,8 +37,8 @@ const DEGREES: &[u32] = &[4326, 4979, 4258, 4269];
 pub(crate) fn flaws(text: &str) -> Vec<Flaw> {
     if text.starts_with("<![CDATA[") {
         return vec![warning(format!(
-            "the text begins with `{}`: the marks of CDATA are escaped and so part of the text, which then is no \
-             PROJ string; they must be written as they are, or be left out",
+            "the text begins with `{}`: the CDATA marks are escaped and therefore part of the text, which is \
+             then not a PROJ string; write them unescaped or remove them",
             short(text)
         ))];
     }
@@ -52,7 +52,7 @@ pub(crate) fn flaws(text: &str) -> Vec<Flaw> {
         return proj_string::flaws(text);
     }
     vec![warning(format!(
-        "`{}` is no PROJ string; it must name a projection, such as `+proj=utm +zone=32`",
+        "`{}` is not a PROJ string; it must name a projection, such as `+proj=utm +zone=32`",
         short(text)
     ))]
 }
@@ -98,9 +98,9 @@ pub(crate) fn code(text: &str) -> Option<Flaw> {
     let horizontal = code.split('+').next()?.trim();
     Some(match horizontal.parse() {
         Ok(number) if DEGREES.contains(&number) => no_plane(text),
-        Ok(1024..=32_767) => other_form("a code of EPSG"),
+        Ok(1024..=32_767) => other_form("an EPSG code"),
         _ => warning(format!(
-            "`{}` is no code of EPSG, which are numbers from 1024 to 32767",
+            "`{}` is not an EPSG code; EPSG codes are numbers from 1024 to 32767",
             short(text)
         )),
     })
@@ -110,15 +110,15 @@ fn other_form(form: &str) -> Flaw {
     Flaw {
         level: Level::Information,
         text: format!(
-            "`geoReference` is {form}, which not every reader of maps understands; a PROJ string is asked for, such \
-             as `+proj=utm +zone=32`"
+            "`geoReference` is {form}, which some map readers do not understand; the standard requires a PROJ \
+             string, such as `+proj=utm +zone=32`"
         ),
     }
 }
 
 fn no_plane(what: &str) -> Flaw {
     warning(format!(
-        "`{what}` gives degrees and no projection onto a plane, but x and y of the map are metres on one"
+        "`{what}` gives degrees and no projection onto a plane, but x and y of the map are metres on a plane"
     ))
 }
 

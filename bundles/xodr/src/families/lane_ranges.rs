@@ -89,8 +89,8 @@ fn check<'a>(
         },
     );
     let text = format!(
-        "the validity spans the lanes {from} to {to}, but `orientation=\"{orientation}\"` of {} on a road \
-         with {hand} traffic allows {sign} lane ids only; for lanes of both sides `orientation` must be `none`",
+        "the validity covers the lanes {from} to {to}, but `orientation=\"{orientation}\"` of {} on a road with \
+         {hand} traffic allows only {sign} lane ids; for lanes of both sides `orientation` must be `none`",
         named(holder)
     );
     let mut finding = found.issue(validity, text).stands(map, place);

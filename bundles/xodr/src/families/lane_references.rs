@@ -165,10 +165,10 @@ fn demand_lane(
         return;
     }
     let text = format!(
-        "`{attribute}=\"{id}\"` of `{}` refers to a lane that the lane section it leads to does not have",
+        "`{attribute}=\"{id}\"` of `{}` refers to a lane that is not defined in the linked lane section",
         link.name()
     );
     found
         .issue(qcbus_sdk::Place::attribute_or_node(link, attribute), text)
-        .at(section.node(), "the lane section without such a lane");
+        .at(section.node(), "the lane section without this lane");
 }

@@ -11,7 +11,7 @@ pub(crate) const TOLERANCE: Param = Param::number(
     "tolerance",
     0.05,
     "m",
-    "how much larger than the bounding volume the object may be",
+    "maximum accepted excess of the object over its bounding volume",
 );
 
 /// Factor of the size, and difference in metres, beyond which an object is far too large.

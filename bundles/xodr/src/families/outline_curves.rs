@@ -10,7 +10,7 @@ pub(crate) const LENGTH_TOLERANCE: Param = Param::number(
     "length_tolerance",
     0.001,
     "m",
-    "largest difference between the curve's length and `length` that is accepted",
+    "maximum accepted difference between the curve's length and `length`",
 );
 
 /// Returns every outline that consists of curves.
@@ -93,7 +93,7 @@ pub(crate) fn range_fits(map: &RoadMap<'_>, range: ParamRange, found: &mut Sink<
         let Some(length) = curve.length() else {
             if range == ParamRange::ArcLength {
                 let text = "with `pRange=\"arcLength\"` the parameter runs from 0 to the `length` of the \
-                            `curveLocal`, which has none";
+                            `curveLocal`, which is missing";
                 found.issue(curve.node(), text).on(
                     road,
                     object.s().unwrap_or(0.0),
@@ -115,8 +115,8 @@ pub(crate) fn range_fits(map: &RoadMap<'_>, range: ParamRange, found: &mut Sink<
         };
         if (claimed - length).abs() > tolerance && (alternative - length).abs() <= tolerance {
             let text = format!(
-                "with `pRange=\"{word}\"` the parameter runs from 0 to {said}, over which the curve is {claimed:.3} m \
-                 long, not {length} m as `length` says; with `{}` it would be",
+                "with `pRange=\"{word}\"` the parameter runs from 0 to {said}; over this range the curve is \
+                 {claimed:.3} m long, but `length` is {length} m; with `{}` the lengths would agree",
                 other.0
             );
             found

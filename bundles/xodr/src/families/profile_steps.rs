@@ -90,8 +90,8 @@ fn report(
     let worst = steps.max_by(|one, other| one.1.total_cmp(&other.1));
     if let Some((t, step)) = worst.filter(|(_, step)| *step > limit) {
         let text = format!(
-            "the {what} of road `{}` jumps at s = {}: the surface at t = {t:.2} by {step:.3} m; at most {limit} \
-             m is allowed",
+            "the {what} of road `{}` jumps at s = {}: the surface at t = {t:.2} changes by {step:.3} m; at most \
+             {limit} m is allowed",
             road.id(),
             number(s)
         );

@@ -67,8 +67,8 @@ pub(crate) fn flaws(text: &str) -> Vec<Flaw> {
     }
     if let Some(name) = projection.filter(|name| names(NO_PROJECTIONS).any(|one| one == *name)) {
         warn(format!(
-            "`+proj={name}` is no projection onto a plane, but x and y of the map are metres on one, such as \
-             `+proj=utm` or `+proj=tmerc` give"
+            "`+proj={name}` is not a projection onto a plane, but x and y of the map are metres on a plane; use \
+             a projection such as `+proj=utm` or `+proj=tmerc`"
         ));
     }
     if projection == Some("utm") {
@@ -79,7 +79,8 @@ pub(crate) fn flaws(text: &str) -> Vec<Flaw> {
         && latitude("lat_1") + latitude("lat_2") == 0.0
     {
         warn(format!(
-            "`+proj={cone}` needs the latitudes of its cone, `+lat_1` and mostly `+lat_2`, which must not cancel each other"
+            "`+proj={cone}` needs the latitudes of its cone, `+lat_1` and usually `+lat_2`; they must not cancel \
+             each other"
         ));
     }
     twice(&words, &mut warn);
@@ -131,10 +132,11 @@ fn flaw(word: &Word<'_>) -> Option<String> {
         return match degrees(value) {
             Some(angle) if angle.abs() <= *most => None,
             Some(_) => Some(format!(
-                "`+{key}={value}` is no {what}; it must lie between -{most}° and {most}°"
+                "`+{key}={value}` is not a valid {what}; it must be between -{most}° and {most}°"
             )),
             None => Some(format!(
-                "`+{key}={value}` is no {what}; it must be a number of degrees, with a point for the decimals"
+                "`+{key}={value}` is not a valid {what}; it must be a number of degrees, with a point as decimal \
+                 separator"
             )),
         };
     }
@@ -143,7 +145,7 @@ fn flaw(word: &Word<'_>) -> Option<String> {
             Some(number) if !positive || number > 0.0 => scale(key, value, number),
             Some(_) => Some(format!("`+{key}={value}` must be greater than zero")),
             None => Some(format!(
-                "`+{key}={value}` is no number; PROJ reads digits with a point for the decimals"
+                "`+{key}={value}` is not a number; PROJ reads digits with a point as decimal separator"
             )),
         };
     }
@@ -164,10 +166,11 @@ fn flaw(word: &Word<'_>) -> Option<String> {
 fn scale(key: &str, value: &str, number: f64) -> Option<String> {
     match key {
         "k" | "k_0" if !(0.5..=2.0).contains(&number) => Some(format!(
-            "`+{key}={value}` scales all lengths by that factor, which is 1 or little less, such as 0.9996"
+            "`+{key}={value}` scales all lengths by this factor, which must be 1 or slightly less, such as \
+             0.9996"
         )),
         "to_meter" if (number - 1.0).abs() > 1e-9 => Some(format!(
-            "`+{key}={value}` counts in units of {value} m, but x and y of the map are metres"
+            "`+{key}={value}` uses units of {value} m, but x and y of the map are metres"
         )),
         _ => None,
     }
@@ -176,21 +179,23 @@ fn scale(key: &str, value: &str, number: f64) -> Option<String> {
 fn unknown(key: &str, value: &str, what: &str, list: &'static str) -> Option<String> {
     if names(list).any(|name| name == value) {
         return (key == "units" && value != "m").then(|| {
-            format!("`+units={value}` counts in `{value}`, but x and y of the map are metres, `+units=m`")
+            format!(
+                "`+units={value}` uses `{value}`, but x and y of the map are metres, `+units=m`"
+            )
         });
     }
     let meant = match closest(value, names(list)) {
         Some(meant) => format!("; did you mean `{meant}`?"),
         None if names(list).count() < 15 => {
             format!(
-                "; it knows `{}`",
+                "; the valid names are `{}`",
                 names(list).collect::<Vec<_>>().join("`, `")
             )
         }
         None => String::new(),
     };
     Some(format!(
-        "`+{key}={value}`: PROJ knows no {what} of that name{meant}"
+        "`+{key}={value}`: PROJ has no {what} of this name{meant}"
     ))
 }
 
@@ -215,7 +220,7 @@ fn misspelt(key: &str) -> Option<String> {
     let plain = |name: &str| name.replace(['_', '-'], "").to_ascii_lowercase();
     let meant = keys().find(|name| name.len() > 1 && plain(name) == plain(key) && *name != key)?;
     Some(format!(
-        "PROJ knows no parameter `+{key}` and ignores it; did you mean `+{meant}`?"
+        "PROJ has no parameter `+{key}` and ignores it; did you mean `+{meant}`?"
     ))
 }
 
@@ -227,10 +232,10 @@ fn warn_of_zone(zone: Option<&str>, longitude: Option<&str>, warn: &mut impl FnM
                 .parse::<u8>()
                 .is_ok_and(|zone| (1..=60).contains(&zone)) => {}
         Some(zone) => warn(format!(
-            "`+zone={zone}` is no zone of UTM; there are zones 1 to 60, the south is named with `+south`"
+            "`+zone={zone}` is not a UTM zone; the zones are 1 to 60, and `+south` selects the south"
         )),
         None if longitude.is_none() => {
-            warn("`+proj=utm` has no `+zone`; it must be given, from 1 to 60".to_owned());
+            warn("`+proj=utm` has no `+zone`; it must have a zone from 1 to 60".to_owned());
         }
         None => {}
     }

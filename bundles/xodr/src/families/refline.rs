@@ -37,7 +37,7 @@ pub(crate) fn report_gaps<'d>(
             continue;
         }
         let text = format!(
-            "the geometry before it ({}) ends at ({:.3}, {:.3}), {gap:.3} m away from ({:.3}, {:.3}), where this \
+            "the previous geometry ({}) ends at ({:.3}, {:.3}), {gap:.3} m away from ({:.3}, {:.3}), where this \
              one ({}) starts; at most {limit} m is allowed",
             shape_name(one),
             end.x,
@@ -50,7 +50,7 @@ pub(crate) fn report_gaps<'d>(
         let finding = misfit
             .put(found.issue(next.node(), text))
             .on(road, next.s().unwrap_or(0.0), 0.0)
-            .at(one.node(), "the geometry before it")
+            .at(one.node(), "the previous geometry")
             .point(end.x, end.y, 0.0);
         complete(finding);
     }

@@ -8,7 +8,7 @@ pub(crate) const NARROW: Param = Param::number(
     "narrow",
     1.0,
     "m",
-    "a lane that is narrower than this is taken to begin or end there",
+    "width below which a lane counts as beginning or ending there",
 );
 
 /// Checks whether a lane is intended for through traffic of vehicles. This is stricter than being

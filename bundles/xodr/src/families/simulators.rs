@@ -30,7 +30,7 @@ pub(crate) fn further(count: usize) -> String {
     match count {
         0 => String::new(),
         1 => " (once more in this file)".to_owned(),
-        more => format!(" ({more} times more in this file)"),
+        more => format!(" ({more} more times in this file)"),
     }
 }
 

@@ -16,20 +16,16 @@ pub(crate) const GAP: Param = Param::number(
     "gap",
     0.01,
     "m",
-    "largest distance in the plan view at which two edges still match",
+    "maximum distance in the plan view at which two edges match",
 );
 pub(crate) const KINK: Param = Param::number(
     "kink",
     0.01,
     "rad",
-    "largest difference between two headings that is accepted",
+    "maximum accepted difference between two headings",
 );
-pub(crate) const STEP: Param = Param::number(
-    "step",
-    0.01,
-    "m",
-    "largest difference in height that is accepted",
-);
+pub(crate) const STEP: Param =
+    Param::number("step", 0.01, "m", "maximum accepted difference in height");
 
 /// Width in metres up to which a lane counts as zero at a contact with another lane. The direction
 /// of the edges of such lanes is meaningless.
@@ -204,9 +200,9 @@ impl Pair<'_, '_> {
             .issue(joint.node, text)
             .road(self.from.at.road.id(), s, point.t)
             .point(point.point.x, point.point.y, point.point.z)
-            .at(self.from.node(), "the one lane")
+            .at(self.from.node(), "the first lane")
             .at_lane_end(self.from, joint.from.end)
-            .at(self.to.node(), "the other lane")
+            .at(self.to.node(), "the second lane")
             .at_lane_end(self.to, joint.to.end)
     }
 }

@@ -12,7 +12,7 @@ pub(crate) const ZERO_WIDTH: Param = Param::number(
     "zero_width",
     0.001,
     "m",
-    "lanes that are not wider than this have a width of zero",
+    "lanes up to this width count as having a width of zero",
 );
 
 /// Checks for zero width at an end of the section. Separate rules check negative widths.
@@ -49,7 +49,7 @@ pub(crate) fn has_no_links(map: &RoadMap<'_>, end: ContactPoint, found: &mut Sin
             end,
         };
         let own: Vec<Node<'_>> = lane.links(end).map(|link| link.node()).collect();
-        let own_text = format!("it must have no `{}`", end.link_name());
+        let own_text = format!("it must not have a `{}`", end.link_name());
         report(lane, end, &own, &own_text, found);
         let text = "no lane link of a junction may start there";
         report(lane, end, junctions.from(at), text, found);

@@ -80,7 +80,7 @@ fn ids(document: &Document<'_>, schema: &OwnSchema<'_>, found: &mut Sink<'_>) {
                 _ => continue,
             };
             let text = format!(
-                "this {} has {fault}; it must have one by which others can refer to it",
+                "this {} has {fault}; it must have one, so that other elements can refer to it",
                 kind.name
             );
             found.issue(place, text);
@@ -100,7 +100,7 @@ fn check(needs: &Needs, node: Node<'_>, schema: &OwnSchema<'_>, found: &mut Sink
         return;
     }
     let text = format!(
-        "{} has no {}; it must have {}, without which it says nothing",
+        "{} has no {}; {} must be given, otherwise the element has no meaning",
         named(node),
         listed(&missing),
         listed(needs.attributes)

@@ -99,9 +99,9 @@ fn date(header: Node<'_>, found: &mut Sink<'_>) {
     }
     // The standard prefers one form but allows all of ISO 8601.
     let fault = if is_other_iso_8601(date) {
-        "is written in a form of ISO 8601 that readers may not know; preferred is"
+        "has a form of ISO 8601 that some readers do not know; the preferred form is"
     } else {
-        "is not written as ISO 8601 demands, such as"
+        "does not have the form that ISO 8601 requires, such as"
     };
     let text = format!("the date `{date}` {fault} `2026-01-31T12:30:00`");
     found
@@ -121,8 +121,8 @@ fn no_such_day(header: Node<'_>, date: &str, found: &mut Sink<'_>) {
     });
     if shape == [true; 3] && !is_day(day) {
         let text = format!(
-            "the date `{date}` names the day `{day}`, which there is not in any calendar; \
-             a date is written as year, month and day"
+            "the date `{date}` has the day `{day}`, which does not exist in any calendar; a date must be written \
+             as year, month and day"
         );
         found
             .issue(Place::attribute_or_node(header, "date"), text)

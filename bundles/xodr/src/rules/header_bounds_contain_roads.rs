@@ -20,7 +20,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     10.0,
     "m",
-    "how far reference lines may reach beyond the bounds",
+    "maximum distance by which reference lines may extend beyond the bounds",
 );
 
 /// Function for the distance of a point beyond a bound, negative within.
@@ -74,12 +74,13 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         .collect();
     let text = if is_any_within {
         format!(
-            "the roads reach out of the header's bounds, {}; the bounds must contain all roads (tolerance {tolerance} m)",
+            "the roads extend beyond the header's bounds, {}; the bounds must contain all roads (tolerance \
+             {tolerance} m)",
             sides.join(", ")
         )
     } else {
         format!(
-            "no road begins or ends within the header's bounds, they reach {}; the bounds must contain all \
+            "no road begins or ends within the header's bounds; the roads extend {}; the bounds must contain all \
              roads, in the same coordinates",
             sides.join(", ")
         )

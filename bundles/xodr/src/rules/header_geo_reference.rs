@@ -36,12 +36,12 @@ fn check(reference: Node<'_>, found: &mut Sink<'_>) {
         return;
     }
     let what = match reference.children().find(|child| !child.is("userData")) {
-        Some(child) => format!("holds `{}` and no text", child.name()),
+        Some(child) => format!("contains `{}` and no text", child.name()),
         None => "is empty".to_owned(),
     };
     let text = format!(
-        "`geoReference` {what}; it must name a projection, such as `+proj=utm +zone=32`, or be left out where the \
-         map lies nowhere on Earth"
+        "`geoReference` {what}; it must name a projection, such as `+proj=utm +zone=32`, or be omitted if the \
+         map has no place on Earth"
     );
     found.issue(reference, text);
 }

@@ -17,7 +17,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-const LIMIT: Param = Param::number("limit", 1e5, "m", "largest coordinate that is accepted");
+const LIMIT: Param = Param::number("limit", 1e5, "m", "maximum accepted coordinate");
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let limit = found.number(&LIMIT);
@@ -51,12 +51,12 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     }
     let place = header.child("offset").unwrap_or(header);
     let text = format!(
-        "the roads lie around x = {x:.0}, y = {y:.0}, with coordinates up to {:.0} m; they should lie around \
-         (0, 0), with the distance in `offset` (accepted: {limit} m)",
+        "the roads lie around x = {x:.0}, y = {y:.0}, with coordinates up to {:.0} m; they should lie around (0, \
+         0), with the distance in `offset` (at most {limit} m is accepted)",
         largest(farthest)
     );
     found
         .issue(place, text)
         .point(farthest.x, farthest.y, 0.0)
-        .here("where the distance belongs");
+        .here("the element for the distance");
 }

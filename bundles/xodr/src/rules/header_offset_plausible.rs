@@ -22,14 +22,14 @@ const DISTANCE: Param = Param::number(
     "distance",
     1e8,
     "m",
-    "largest x and y of the offset that a projection can give",
+    "maximum x and y of the offset that a projection can give",
 );
 
 const HEIGHT: Param = Param::number(
     "height",
     1e4,
     "m",
-    "largest z of the offset that is taken for a height on Earth",
+    "maximum z of the offset that counts as a height on Earth",
 );
 
 /// Smallest relevant heading. Smaller ones have no effect: at 100 km they are 0.1 mm.
@@ -45,7 +45,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let limit = found.number(limit);
         if let Some(number) = value(name).filter(|number| number.abs() > limit) {
             let text = format!(
-                "`{name}` of the offset is {number} m, which no place on Earth has in any projection (accepted: {limit} m)"
+                "`{name}` of the offset is {number} m; no place on Earth has this value in any projection (at \
+                 most {limit} m is accepted)"
             );
             found.issue(Place::attribute_or_node(offset, name), text);
         }
@@ -57,8 +58,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         (
             Level::Warning,
             format!(
-                "`hdg` of the offset is {heading} rad, more than a full turn of 6.283; was it meant in degrees? then it \
-                 is {:.6} rad",
+                "`hdg` of the offset is {heading} rad, more than a full turn of 6.283; if it was meant in \
+                 degrees, it is {:.6} rad",
                 heading.to_radians()
             ),
         )
@@ -66,7 +67,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         (
             Level::Information,
             format!(
-                "`hdg` of the offset turns the whole map by {:.3}°; rotation should be avoided, as many readers ignore it",
+                "`hdg` of the offset turns the whole map by {:.3}°; rotation should be avoided, because many \
+                 readers ignore it",
                 heading.to_degrees()
             ),
         )

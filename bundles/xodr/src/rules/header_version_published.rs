@@ -20,23 +20,23 @@ fn run(document: &Document<'_>, found: &mut Sink<'_>) {
         (1, 0..=9) => return,
         (0, _) => (
             Level::Warning,
-            "numbers before that were drafts, which readers of today do not know",
+            "earlier versions were drafts that current readers do not know",
         ),
         (1, 10) => (
             Level::Warning,
-            "the next one is not known yet; the file is judged as if it were 1.9",
+            "the next version is not known yet; the file is checked as version 1.9",
         ),
         (1, _) => (
             Level::Error,
-            "nobody can say what holds for such a file; it is judged as if it were 1.9",
+            "the rules for such a file are undefined; it is checked as version 1.9",
         ),
         _ => (
             Level::Error,
-            "nobody can say what holds for such a file; it is judged by the rules of 1.9 as far as they apply",
+            "the rules for such a file are undefined; it is checked by the rules of 1.9 as far as they apply",
         ),
     };
     let text = format!(
-        "the file says that its version is {}.{}; published are 1.0 to 1.9: {why}",
+        "the file says that its version is {}.{}; the published versions are 1.0 to 1.9; {why}",
         version.major, version.minor
     );
     let attribute = if version.major == 1 {

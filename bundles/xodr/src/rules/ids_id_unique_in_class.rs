@@ -32,7 +32,7 @@ fn check<'d>(kind: &Kind, document: &Document<'d>, found: &mut Sink<'_>) {
         if let Some(first) = exact.get(&(home, id)) {
             let whole = home.map_or("this file", |_| "the same parent");
             let text = format!(
-                "the id `{id}` belongs to another {} of {whole} already; each needs an id of its own",
+                "the id `{id}` is already used by another {} of {whole}; each needs its own id",
                 kind.name
             );
             found
@@ -46,8 +46,8 @@ fn check<'d>(kind: &Kind, document: &Document<'d>, found: &mut Sink<'_>) {
                 Some(like) => {
                     let other = like.attr("id").unwrap_or_default();
                     let text = format!(
-                        "the {name} ids `{id}` and `{other}` differ as text but are the same number; \
-                         readers that take ids for numbers mix them up",
+                        "the {name} ids `{id}` and `{other}` differ as text but are the same number; readers \
+                         that parse ids as numbers confuse them",
                         name = kind.name
                     );
                     found

@@ -224,7 +224,7 @@ fn of_another_type(
     let meant = others.find(|(word, class)| defined.anywhere(*class, id) && !is_itself(word));
     meant.map_or_else(String::new, |(word, class)| {
         let name = Kind::of(*class).name;
-        format!("; there is a {name} `{id}`: `{attribute}=\"{word}\"` may be meant")
+        format!("; a {name} `{id}` exists: did you mean `{attribute}=\"{word}\"`?")
     })
 }
 

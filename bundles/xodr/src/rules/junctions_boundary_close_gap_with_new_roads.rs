@@ -70,7 +70,8 @@ fn check(
             road.node().attr("junction").unwrap_or("-1")
         )
     } else if !neighbours.iter().any(|id| known.contains(id)) {
-        "is linked to no road of the junction; it must be linked to those beside it".to_owned()
+        "is not linked to any road of the junction; it must be linked to the roads beside it"
+            .to_owned()
     } else {
         return;
     };

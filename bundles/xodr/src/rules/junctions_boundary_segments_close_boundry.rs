@@ -8,7 +8,7 @@ const GAP: Param = Param::number(
     "gap",
     0.05,
     "m",
-    "largest distance between the end of a segment and the start of the next one",
+    "maximum distance between the end of a segment and the start of the next one",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -40,8 +40,8 @@ fn check(junction: &Junction<'_>, stretches: &[Stretch<'_>], found: &mut Sink<'_
         let gap = end.distance(start);
         if gap > limit {
             let text = format!(
-                "this segment of the boundary of junction `{}` ends {gap:.3} m away from the start of the next one; \
-                 at most {limit} m is allowed for the boundary to be closed",
+                "this segment of the boundary of junction `{}` ends {gap:.3} m away from the start of the next \
+                 one; at most {limit} m is allowed for a closed boundary",
                 junction.id()
             );
             found

@@ -20,8 +20,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             links.filter(|child| matches!(child.name(), "link" | "predecessor" | "successor"))
         {
             let text = format!(
-                "junction `{}` has an element `{}`; junctions have no predecessor and no successor, roads are \
-                 linked to them",
+                "junction `{}` has an element `{}`; junctions have no predecessor and no successor; roads are \
+                 linked to junctions",
                 junction.id(),
                 link.name()
             );

@@ -14,7 +14,7 @@ const NEAR: Param = Param::number(
     "near",
     0.1,
     "m",
-    "how near the edges of two lanes must be for one to go on as the other",
+    "maximum distance between the edges of two lanes for one to continue as the other",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -84,8 +84,8 @@ fn check(
             continue;
         };
         let text = format!(
-            "lane `{}` of the connecting road `{}` goes on as {}, but has no {}, so that routes end there; lanes of connecting roads \
-             must be linked at both ends",
+            "lane `{}` of the connecting road `{}` continues as {}, but has no {}, so routes end there; lanes of \
+             connecting roads must be linked at both ends",
             lane.id_text().unwrap_or_default(),
             road.id(),
             lane_name(next),
@@ -103,7 +103,7 @@ fn check(
             .issue(lane.node(), text)
             .level(level)
             .at_lane_end(lane, end)
-            .at(next.node(), "the lane that it goes on as");
+            .at(next.node(), "the lane that continues it");
     }
 }
 

@@ -32,8 +32,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             let enters = connection.contact_point() == Some(end);
             if is_open(road, end, found.number(&NARROW)) && (enters || !has_lane_links(road, end)) {
                 let text = format!(
-                    "the connecting road `{}` of junction `{}` has no {}, so that nobody can tell which road it \
-                     joins at its {end}; a connecting road must be linked at both ends",
+                    "the connecting road `{}` of junction `{}` has no {}, so the road that it joins at its {end} \
+                     is undefined; a connecting road must be linked at both ends",
                     road.id(),
                     junction.id(),
                     end.link_name()

@@ -33,8 +33,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         }
         let text = format!(
-            "road `{}` belongs to junction `{}`, but no connection of a junction names it, so that no route leads \
-             along it; a connecting road should be the `connectingRoad` of a connection",
+            "road `{}` belongs to junction `{}`, but no connection of a junction names it, so no route uses it; \
+             a connecting road should be the `connectingRoad` of a connection",
             road.id(),
             junction.id()
         );

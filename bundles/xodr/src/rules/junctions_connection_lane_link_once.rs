@@ -29,8 +29,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let text = format!(
-                "connection `{}` links lane `{from}` to lane `{to}` a second time; once says it all, and a second lane \
-                 link is probably meant for other lanes",
+                "connection `{}` links lane `{from}` to lane `{to}` a second time; one lane link is enough, and \
+                 the second one is probably meant for other lanes",
                 connection.id().unwrap_or_default()
             );
             found.issue(link.node(), text).at(*before, "the first one");

@@ -74,7 +74,7 @@ fn contradicted(
     found
         .issue(node, text)
         .at_lane_end(lane, end)
-        .at(place, "what the lane says");
+        .at(place, "the link of the lane");
 }
 
 /// Reports a connecting lane with a link to an incoming lane but without a lane link.
@@ -107,13 +107,13 @@ fn left_out(map: &RoadMap<'_>, bundle: &Bundle<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let without = if by_number {
-            "has no lane links, which stands for lanes of the same number only"
+            "has no lane links, so only lanes of the same number are linked"
         } else {
             "has no lane link for it"
         };
         let text = format!(
-            "{} goes on from lane `{from}` of road `{}`, but the connection between them {without}; nobody can turn \
-             there without a lane link",
+            "{} continues lane `{from}` of road `{}`, but the connection between them {without}; traffic cannot \
+             turn there without a lane link",
             lane_name(lane),
             incoming.id()
         );
@@ -154,8 +154,8 @@ fn unconnected<'a>(
         return;
     };
     let text = format!(
-        "{} goes on from lane `{from}` of road `{}`, but no connection leads from road `{}` onto road `{}` (its \
-         connections begin at the other end only); nobody can turn there without a connection",
+        "{} continues lane `{from}` of road `{}`, but no connection leads from road `{}` onto road `{}` (its \
+         connections begin only at the other end); traffic cannot turn there without a connection",
         lane_name(lane),
         incoming.id(),
         incoming.id(),
@@ -165,7 +165,7 @@ fn unconnected<'a>(
         .issue(lane.node(), text)
         .level(Level::Warning)
         .at_lane_end(lane, end)
-        .at(incoming.node(), "the road that it goes on from");
+        .at(incoming.node(), "the road that it continues");
 }
 
 /// Returns the permanent lanes to which a lane is linked at an end.

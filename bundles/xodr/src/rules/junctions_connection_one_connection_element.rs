@@ -18,8 +18,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for junction in map.junctions() {
         for (id, connections) in repeated(junction, |connection| connection.connecting_road()) {
             let text = format!(
-                "the connecting road `{id}` occurs in {} connections of junction `{}`; OpenDRIVE 1.7 \
-                 allows it in one only",
+                "the connecting road `{id}` occurs in {} connections of junction `{}`; OpenDRIVE 1.7 allows it \
+                 only in one",
                 connections.len(),
                 junction.id()
             );

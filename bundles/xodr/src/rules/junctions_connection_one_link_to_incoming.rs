@@ -45,7 +45,10 @@ fn against_traffic(map: &RoadMap<'_>, joint: &LaneJoint<'_>, found: &mut Sink<'_
         let fault = "traffic there leads out of the junction".to_owned();
         (from, joint.from.end, fault)
     } else if leaves(to, joint.to.end.other()) {
-        let fault = format!("{} runs towards the junction as well", lane_name(to));
+        let fault = format!(
+            "traffic on {} leads towards the junction as well",
+            lane_name(to)
+        );
         (to, joint.to.end, fault)
     } else {
         return;
@@ -59,5 +62,5 @@ fn against_traffic(map: &RoadMap<'_>, joint: &LaneJoint<'_>, found: &mut Sink<'_
     found
         .issue(joint.node, text)
         .at_lane_end(lane, end)
-        .at(lane.node(), "the lane in question");
+        .at(lane.node(), "the lane with the wrong direction");
 }

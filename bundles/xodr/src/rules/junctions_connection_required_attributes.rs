@@ -36,7 +36,7 @@ fn check(junction: &Junction<'_>, connection: Connection<'_>, found: &mut Sink<'
         .collect();
     if !missing.is_empty() {
         let text = format!(
-            "connection `{}` of junction `{}` has no {}; without it nobody can tell which road ends it joins",
+            "connection `{}` of junction `{}` has no {}, so the road ends that it joins are undefined",
             connection.id().unwrap_or_default(),
             junction.id(),
             listed(&missing)

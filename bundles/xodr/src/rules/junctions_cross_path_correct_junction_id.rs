@@ -52,7 +52,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             );
             found
                 .issue(Place::attribute_or_node(road.node(), "junction"), text)
-                .at(user, "where the junction uses it");
+                .at(user, "the reference of the junction to the road");
         }
     }
 }

@@ -9,7 +9,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.05,
     "m",
-    "how far beside the linked lane a crossing road may begin or end",
+    "maximum distance of an end of a crossing road beside the linked lane",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -56,8 +56,8 @@ fn is_nowhere(
         (Place::attribute_or_node(node, "s"), text)
     } else if !has_lane(other, s.clamp(0.0, length), landing.lane) {
         let text = format!(
-            "the {} of crossing road `{}` is linked to lane `{}` of road `{}`, which has none of this number at s = {s}; \
-             it must reach a lane of that road",
+            "the {} of crossing road `{}` is linked to lane `{}` of road `{}`, which has no such lane at s = \
+             {s}; it must reach a lane of that road",
             landing.end,
             crossing.road.id(),
             landing.lane,
@@ -110,7 +110,7 @@ fn check(crossing: &Crossing<'_, '_>, landing: &Landing<'_, '_>, found: &mut Sin
         )
     } else if along > 0.1 {
         format!(
-            "at s = {s:.2} of road `{}`, not at s = {} as the link says",
+            "at s = {s:.2} of road `{}`, but the link says s = {}",
             landing.other.id(),
             landing.s
         )

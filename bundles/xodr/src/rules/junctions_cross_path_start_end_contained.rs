@@ -8,7 +8,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.05,
     "m",
-    "how far a corner of the crossing road may lie outside of the linked lane",
+    "maximum distance of a corner of the crossing road outside the linked lane",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -37,8 +37,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let text = format!(
-                "a corner of crossing road `{}` at its {} lies {outside:.2} m outside of lane `{}` of road `{}`; the ends \
-                 of a crossing road must lie within the linked lanes with all of its lanes",
+                "a corner of crossing road `{}` at its {} lies {outside:.2} m outside lane `{}` of road `{}`; \
+                 the ends of a crossing road must lie within the linked lanes with all of its lanes",
                 crossing.road.id(),
                 landing.end,
                 landing.lane,

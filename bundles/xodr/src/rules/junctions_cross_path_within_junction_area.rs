@@ -11,7 +11,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.1,
     "m",
-    "how far a cross path may reach out of its junction",
+    "maximum distance by which a cross path may extend out of its junction",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -36,7 +36,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let limit = found.number(&TOLERANCE);
         if let Some((outside, corner)) = outside.filter(|(outside, _)| *outside > limit) {
             let text = format!(
-                "the cross path on road `{}` reaches {outside:.2} m out of junction `{}`; it must lie within",
+                "the cross path on road `{}` extends {outside:.2} m out of junction `{}`; it must lie within the \
+                 junction",
                 crossing.road.id(),
                 crossing.junction.id()
             );

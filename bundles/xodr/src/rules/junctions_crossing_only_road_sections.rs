@@ -28,16 +28,14 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             .filter(|child| FOREIGN.contains(&child.name()))
         {
             let text = format!(
-                "crossing `{id}` has an element `{}`; crossings must be described by `roadSection` elements \
-                 alone",
+                "crossing `{id}` has an element `{}`; crossings must be described only by `roadSection` elements",
                 child.name()
             );
             found.issue(child, text);
         }
         if junction.road_sections().next().is_none() {
-            let text = format!(
-                "crossing `{id}` has no `roadSection`, and so says nothing about what crosses"
-            );
+            let text =
+                format!("crossing `{id}` has no `roadSection`, so it is undefined what crosses");
             found.issue(junction.node(), text);
         }
     }

@@ -12,13 +12,13 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.1,
     "m",
-    "how far the overlap may reach beyond a section",
+    "maximum distance by which the overlap may extend beyond a section",
 );
 const CLEARANCE: Param = Param::number(
     "clearance",
     3.0,
     "m",
-    "roads that are farther apart in height lie over each other",
+    "height difference above which roads lie over each other",
 );
 
 /// Distance around a section in which roads are checked, in metres. The step and the inward shift

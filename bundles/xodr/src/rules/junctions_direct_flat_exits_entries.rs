@@ -5,12 +5,7 @@ use crate::families::direct_overlap::{SharedSpace, shared_spaces};
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::model::Roads;
 
-const STEP: Param = Param::number(
-    "step",
-    0.05,
-    "m",
-    "largest difference in height that is accepted",
-);
+const STEP: Param = Param::number("step", 0.05, "m", "maximum accepted difference in height");
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_direct_flat_exits_entries",

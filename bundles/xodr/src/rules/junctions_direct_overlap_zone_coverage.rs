@@ -9,7 +9,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.1,
     "m",
-    "how much longer than its zone an overlap may be",
+    "maximum length by which an overlap may exceed its zone",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -45,8 +45,8 @@ fn check(space: &SharedSpace<'_, '_>, at: usize, found: &mut Sink<'_>) {
         None => format!("without `overlapZone` the zone is {DEFAULT_ZONE} m long"),
     };
     let text = format!(
-        "{} and {} share their space for {length:.1} m from the junction on, but {says}; the zone must cover all \
-         of the overlap",
+        "{} and {} share their space for {length:.1} m from the junction, but {says}; the zone must cover the \
+         whole overlap",
         lane_name(arm.lane),
         lane_name(other.lane)
     );

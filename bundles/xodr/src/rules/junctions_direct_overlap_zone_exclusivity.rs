@@ -52,10 +52,10 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 );
                 let finding = found.issue(junction.node(), text);
                 let finding = finding
-                    .at(one.zone, "the first")
-                    .at(other.zone, "the second");
+                    .at(one.zone, "the first lane link")
+                    .at(other.zone, "the second lane link");
                 further.iter().fold(finding, |finding, link| {
-                    finding.at(link.zone, "a further one")
+                    finding.at(link.zone, "a further lane link")
                 });
             }
         }

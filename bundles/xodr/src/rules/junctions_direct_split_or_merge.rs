@@ -86,8 +86,9 @@ fn check(paths: &mut [Path<'_>], found: &mut Sink<'_>) {
     for pair in paths.windows(2) {
         let [one, other] = pair else { continue };
         if one.here < other.here - MARGIN && one.there > other.there + MARGIN {
-            let text = "this lane link and another one cross: the lane that lies further left before the junction lies \
-                        further right behind it; a direct junction may split or merge roads, but not cross traffic";
+            let text = "this lane link and another one cross: the lane farther left before the junction is \
+                        farther right after it; a direct junction may split or merge roads, but must not cross \
+                        traffic";
             found
                 .issue(other.joint.node, text)
                 .at(one.joint.node, "the lane link that it crosses");

@@ -10,7 +10,7 @@ const STEP: Param = Param::number(
     "step",
     0.05,
     "m",
-    "largest difference in height between road and grid that is accepted",
+    "maximum accepted difference in height between road and grid",
 );
 
 /// Number of places across the mouth of a road at which heights are compared.
@@ -93,8 +93,8 @@ fn check(
     let limit = found.number(&STEP);
     if let Some((step, here, there, t)) = worst.filter(|worst| worst.0.abs() > limit) {
         let text = format!(
-            "road `{}` meets junction `{}` at a height of {here:.3} m, where the elevation grid has {there:.3} m: a \
-             step of {:.3} m; without `transitionLength` at most {limit} m is smooth",
+            "road `{}` meets junction `{}` at a height of {here:.3} m, where the elevation grid has {there:.3} \
+             m: a step of {:.3} m; without `transitionLength`, at most {limit} m is allowed",
             road.id(),
             junction.id(),
             step.abs()

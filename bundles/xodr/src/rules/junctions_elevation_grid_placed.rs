@@ -25,8 +25,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             None => continue,
             Some(kind) => {
                 let text = format!(
-                    "junction `{}` of type `{}` has an `elevationGrid`, which is valid for common junctions (type \
-                     `default`) only",
+                    "junction `{}` of type `{}` has an `elevationGrid`; only common junctions (type `default`) \
+                     may have one",
                     junction.id(),
                     kind.as_str()
                 );
@@ -36,8 +36,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         }
         if junction.plan_view().geometries().is_empty() {
             let text = format!(
-                "the `elevationGrid` of junction `{}` lies along the junction's reference line, but there is none; \
-                 `planView` must give one, or nobody knows where the heights are",
+                "the `elevationGrid` of junction `{}` lies along the junction's reference line, but there is \
+                 none; `planView` must define one, otherwise the positions of the heights are undefined",
                 junction.id()
             );
             found.issue(grid.node(), text);

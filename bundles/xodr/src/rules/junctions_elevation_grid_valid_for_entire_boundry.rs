@@ -9,7 +9,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.01,
     "m",
-    "how far the junction may reach beyond the grid",
+    "maximum distance by which the junction may extend beyond the grid",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -49,7 +49,8 @@ fn check(
     let worst = beyond.max_by(|one, other| one.0.total_cmp(&other.0));
     if let Some((beyond, point)) = worst.filter(|(beyond, _)| *beyond > found.number(&TOLERANCE)) {
         let text = format!(
-            "the boundary of junction `{}` reaches {beyond:.2} m beyond its elevation grid; the grid must cover all of it",
+            "the boundary of junction `{}` extends {beyond:.2} m beyond its elevation grid; the grid must cover \
+             all of it",
             junction.id()
         );
         found.issue(grid.node(), text).point(point.x, point.y, 0.0);

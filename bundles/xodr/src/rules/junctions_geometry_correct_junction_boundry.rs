@@ -10,7 +10,7 @@ const GAP: Param = Param::number(
     "gap",
     0.05,
     "m",
-    "how far the line may lie from the boundary and still touch it",
+    "maximum distance between the line and the boundary at which they touch",
 );
 
 pub static RULE: Rule<Roads> = Rule {

@@ -9,7 +9,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.05,
     "m",
-    "how far the junction may reach beyond the ends of the line",
+    "maximum distance by which the junction may extend beyond the ends of the line",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -41,8 +41,8 @@ fn check(junction: &Junction<'_>, line: &Placed, ring: &[Point], found: &mut Sin
     let worst = beyond.max_by(|one, other| one.0.total_cmp(&other.0));
     if let Some((beyond, point)) = worst.filter(|(beyond, _)| *beyond > limit) {
         let text = format!(
-            "the junction `{}` reaches {beyond:.2} m beyond the end of its reference line; every point of it must lie \
-             at a right angle beside the line",
+            "the junction `{}` extends {beyond:.2} m beyond the end of its reference line; every point of the \
+             junction must be at a right angle to a point of the line",
             junction.id()
         );
         let node = junction

@@ -37,8 +37,8 @@ fn check(
     let lanes = routes_at(road, end, found.number(&NARROW));
     for lane in lanes.filter(|lane| enters(lane) && !used.contains(*lane, end)) {
         let text = format!(
-            "{} leads into junction `{}`, but no connection takes it up, so that nobody gets on from there; a lane \
-             that leads into a junction should be the `from` of a lane link",
+            "{} leads into junction `{}`, but no connection continues it, so traffic cannot go on from there; a \
+             lane that leads into a junction should be the `from` of a lane link",
             lane_name(lane),
             junction.id()
         );

@@ -43,8 +43,8 @@ fn unlinked(map: &RoadMap<'_>, arm: RoadEnd, links: &[RoadContact<'_>], found: &
     };
     let junction = connecting.junction().unwrap_or_default();
     let text = format!(
-        "{says}, but it is an incoming road of junction `{junction}`, whose road `{}` meets its {}; an incoming road \
-         must be linked to the junction, else the ways on from there cannot be found",
+        "{says}, but the road is an incoming road of junction `{junction}`, whose road `{}` meets its {}; an \
+         incoming road must be linked to the junction, otherwise its continuations cannot be found",
         connecting.id(),
         arm.end
     );
@@ -77,8 +77,8 @@ fn one_of_several(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         }
         if let Some((link, end)) = link_within(map, road, junction) {
             let text = format!(
-                "the {} of road `{}` is road `{}`, one of several that lead on from there in junction `{}`; the \
-                 road must be linked to the junction, else the other ways cannot be found",
+                "the {} of road `{}` is road `{}`, one of several that continue it in junction `{}`; the road \
+                 must be linked to the junction, otherwise the other continuations cannot be found",
                 end.link_name(),
                 road.id(),
                 link.road_id().unwrap_or_default(),
@@ -87,7 +87,7 @@ fn one_of_several(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             found
                 .issue(link.node(), text)
                 .at_end(road, end)
-                .at(connection.node(), "another way to go on");
+                .at(connection.node(), "another continuation");
         }
     }
 }

@@ -14,19 +14,19 @@ const AREA: Param = Param::number(
     "area",
     1.0,
     "m²",
-    "largest common area of roads of two junctions that is accepted",
+    "maximum accepted common area of roads of two junctions",
 );
 const DEPTH: Param = Param::number(
     "depth",
     0.1,
     "m",
-    "how far the boundary of one junction may reach into that of another",
+    "maximum distance by which the boundary of one junction may extend into that of another",
 );
 const CLEARANCE: Param = Param::number(
     "clearance",
     3.0,
     "m",
-    "junctions that are so far apart in height lie over each other",
+    "height difference from which junctions lie over each other",
 );
 
 /// Length of the compared pieces of roads, and inward shift of their edges, in metres.
@@ -214,7 +214,8 @@ fn check(
                 return false;
             };
             let text = format!(
-                "the boundaries of junctions `{}` and `{}` overlap by {deep:.2} m; the areas of junctions must not",
+                "the boundaries of junctions `{}` and `{}` overlap by {deep:.2} m; the areas of junctions must \
+                 not overlap",
                 one.junction.id(),
                 other.junction.id()
             );
@@ -318,7 +319,7 @@ fn roads_overlap(
         .level(Level::Warning)
         .point(point.x, point.y, 0.0)
         .at(one.junction.node(), "the other junction")
-        .at(a.node(), "the one road")
-        .at(b.node(), "the other road");
+        .at(a.node(), "the first road")
+        .at(b.node(), "the second road");
     true
 }

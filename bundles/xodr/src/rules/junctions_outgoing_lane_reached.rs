@@ -45,8 +45,8 @@ fn check(
     let lanes = routes_at(road, end, found.number(&NARROW));
     for lane in lanes.filter(|lane| leaves(lane) && !used.contains(*lane, end)) {
         let text = format!(
-            "{} leads out of junction `{}`, but no lane of the junction leads onto it, so that nobody gets there; a \
-             lane that leads out of a junction should be the one that a connecting lane goes on as",
+            "{} leads out of junction `{}`, but no lane of the junction leads onto it, so no traffic reaches it; \
+             a lane that leads out of a junction should continue a connecting lane",
             lane_name(lane),
             junction.id()
         );

@@ -58,8 +58,8 @@ fn check(junction: &Junction<'_>, found: &mut Sink<'_>) {
         return;
     };
     let text = format!(
-        "road `{high}` has priority over road `{low}`, but by the other records of junction `{}` road `{high}` gives \
-         way to it in turn; priorities that run in a circle let nobody go first",
+        "road `{high}` has priority over road `{low}`, but by the other records of junction `{}` road `{high}` \
+         must give way to it; priorities must not form a circle, because then no road goes first",
         junction.id()
     );
     let mut finding = found.issue(first.node(), text);

@@ -25,7 +25,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         if let Some(connecting) = connection.node().attribute("connectingRoad") {
             let text = format!(
                 "a connection of the direct junction `{}` has connectingRoad = `{}`; direct junctions have no \
-                 connecting roads, `linkedRoad` must be used",
+                 connecting roads; use `linkedRoad`",
                 junction.id(),
                 connecting.value()
             );

@@ -9,13 +9,13 @@ const TOLERANCE: Param = Param::number(
     "s_tolerance",
     0.001,
     "m",
-    "how far the place that a link names may lie from `sStart` or `sEnd`",
+    "maximum distance between the position that a link names and `sStart` or `sEnd`",
 );
 const GAP: Param = Param::number(
     "gap",
     0.01,
     "m",
-    "how far the road's end may really lie from that place, along the main road",
+    "maximum distance between the actual end of the road and that position, along the main road",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -56,7 +56,7 @@ fn report(
 ) {
     let what = match branches.first() {
         Some(branch) => format!("is linked to it at s = {}", branch.s),
-        None => "is linked to it at neither end".to_owned(),
+        None => "is not linked to it at either end".to_owned(),
     };
     let text = format!(
         "road `{}` belongs to the virtual junction `{}` of main road `{}`, but {what}; it must start or end \
@@ -88,8 +88,8 @@ fn check_place(branch: &Branch<'_, '_>, found: &mut Sink<'_>) {
     let (ahead, _) = seen_from(main, pose.point());
     if ahead.abs() > limit {
         let text = format!(
-            "the {} of road `{}` lies {:.3} m {} s = {} of main road `{}`; it must lie there within \
-             {limit} m",
+            "the {} of road `{}` lies {:.3} m {} s = {} of main road `{}`; it must lie within {limit} m of this \
+             position",
             branch.end,
             branch.road.id(),
             ahead.abs(),

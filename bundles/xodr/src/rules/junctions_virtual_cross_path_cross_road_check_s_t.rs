@@ -9,7 +9,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.05,
     "m",
-    "how far the crossing road may reach beyond the other road",
+    "largest distance by which the crossing road may extend beyond the other road",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -56,7 +56,8 @@ fn check(crossing: &Crossing<'_, '_>, landing: &Landing<'_, '_>, found: &mut Sin
     let worst = worst.max_by(|one, other| one.0.total_cmp(&other.0));
     if let Some((beyond, corner)) = worst.filter(|(beyond, _)| *beyond > limit) {
         let text = format!(
-            "crossing road `{}` reaches {beyond:.2} m beyond road `{}` at its {}; it must stay within its length and width",
+            "crossing road `{}` extends {beyond:.2} m beyond road `{}` at its own {}; it must stay within the \
+             length and width of that road",
             crossing.road.id(),
             landing.other.id(),
             landing.end

@@ -37,7 +37,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "the {} of road `{}` does not run along main road `{}`: their headings differ by {kink:.4} rad \
+            "the {} of road `{}` is not aligned with main road `{}`: their headings differ by {kink:.4} rad \
              ({:.2}°) at s = {}; at most {limit} rad is allowed",
             branch.end,
             branch.road.id(),

@@ -31,8 +31,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             && ![start, end].contains(&main)
         {
             let text = format!(
-                "connecting road `{}` of virtual junction `{}` leads from road `{start}` to road `{end}`; virtual \
-                 junctions must be used for branches off the main road `{main}` only",
+                "connecting road `{}` of virtual junction `{}` leads from road `{start}` to road `{end}`; \
+                 virtual junctions must only be used for branches off the main road `{main}`",
                 road.id(),
                 junction.id()
             );

@@ -21,8 +21,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         }
         for controller in junction.controllers() {
             let text = format!(
-                "virtual junction `{}` has controller `{}`; virtual junctions must not have controllers, and \
-                 therefore no traffic lights",
+                "virtual junction `{}` has controller `{}`; virtual junctions must not have controllers and \
+                 therefore cannot have traffic lights",
                 junction.id(),
                 controller.id().unwrap_or_default()
             );

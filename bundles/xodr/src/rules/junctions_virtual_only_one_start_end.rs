@@ -19,7 +19,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     1e-3,
     "m",
-    "how far beyond the ends of the main road is accepted",
+    "largest distance beyond the ends of the main road that is accepted",
 );
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
@@ -44,8 +44,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             };
             if s < -tolerance || s > length + tolerance {
                 let text = format!(
-                    "`{name}` is {s}, but the main road `{}` goes from s = 0 to s = {length}; the junction must \
-                     lie on it",
+                    "`{name}` is {s}, but the main road `{}` extends from s = 0 to s = {length}; the junction \
+                     must lie on it",
                     road.id()
                 );
                 found
@@ -64,7 +64,10 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             found
                 .issue(Place::attribute_or_node(node, "sEnd"), text)
                 .in_every_version(Level::Error)
-                .at(Place::attribute_or_node(node, "sStart"), "where it starts");
+                .at(
+                    Place::attribute_or_node(node, "sStart"),
+                    "the start of the virtual junction",
+                );
         }
     }
 }

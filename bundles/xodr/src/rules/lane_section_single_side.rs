@@ -23,8 +23,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         };
         if section.single_side() == Some(true) && has_lanes("left") && has_lanes("right") {
             let text = format!(
-                "this lane section of road `{}` has lanes on both sides, but says `singleSide=\"true\"`; a section \
-                 for one side must have lanes on that side only",
+                "this lane section of road `{}` has lanes on both sides, but has `singleSide=\"true\"`; a \
+                 single-sided section must have lanes on one side only",
                 section.road.id()
             );
             let finding = found.issue(Place::attribute_or_node(node, "singleSide"), text);

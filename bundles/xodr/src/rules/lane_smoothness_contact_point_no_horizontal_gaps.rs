@@ -24,7 +24,8 @@ const LANE_ERROR_FROM: Param = Param::number(
     "lane_error_from",
     0.01,
     "m",
-    "from 1.7 on, gaps between lanes from this size on are errors; in older files `gap_error_from` holds",
+    "from version 1.7 on, gaps between lanes of this size or more are errors; in older files `gap_error_from` \
+     applies",
 );
 
 pub static RULE: Rule<Roads> = Rule {

@@ -39,8 +39,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         let edge = pair.pitch(found.number(&GAP), found.number(&STEP));
         if let Some(edge) = edge.filter(|edge| edge.amount > limit) {
             let text = format!(
-                "the slopes of their {} edges differ by {:.2} % where they touch; they should not by more than \
-                 {:.2} %",
+                "the slopes of their {} edges differ by {:.2} % where they touch; they should not differ by more \
+                 than {:.2} %",
                 edge.side,
                 100.0 * edge.amount,
                 100.0 * limit

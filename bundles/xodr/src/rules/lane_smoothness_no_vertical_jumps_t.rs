@@ -66,8 +66,8 @@ fn check<'m, 'a>(one: LaneRef<'m, 'a>, edge: Edge, other: LaneRef<'m, 'a>, found
     if let Some((step, ds, border)) = worst.filter(|(step, ..)| step.abs() > limit) {
         let s = one.at.s().unwrap_or(0.0) + ds.x();
         let text = format!(
-            "{} lies {:.3} m {} than its neighbour `{}` where they meet at s = {s:.2}; between drivable lanes there \
-             should be no step (at most {limit} m)",
+            "{} lies {:.3} m {} than its neighbour `{}` where they meet at s = {s:.2}; there should be no step \
+             between drivable lanes (at most {limit} m is accepted)",
             lane_name(other),
             step.abs(),
             if step > 0.0 { "higher" } else { "lower" },

@@ -121,8 +121,8 @@ fn report(
 ) {
     let s = lane.at.s().unwrap_or(0.0) + ds;
     let text = format!(
-        "an edge of {} jumps sideways by {:.3} m at s = {}, where this `{}` begins; within a lane section drivable \
-         lanes should have no gaps (at most {} m)",
+        "an edge of {} jumps sideways by {:.3} m at s = {}, where this `{}` begins; drivable lanes should have \
+         no gaps within a lane section (at most {} m is accepted)",
         lane_name(lane),
         gap.abs(),
         number(s),

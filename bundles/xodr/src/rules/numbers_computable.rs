@@ -10,19 +10,19 @@ const MOST: Param = Param::number(
     "most",
     1e9,
     "m",
-    "a place, size or angle beyond this cannot be computed with",
+    "largest position, size or angle that can be used in computations",
 );
 const EARTH: Param = Param::number(
     "earth",
     1e8,
     "m",
-    "a place or size beyond this is farther than once around the Earth",
+    "positions and sizes beyond this exceed the circumference of the Earth",
 );
 const COEFFICIENT: Param = Param::number(
     "coefficient",
     1e30,
     "",
-    "a coefficient of first or higher degree beyond this cannot be computed with",
+    "largest coefficient of first or higher degree that can be used in computations",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -149,7 +149,8 @@ fn of_texts<'a>(root: Node<'a>) -> impl Iterator<Item = Odd<'a>> {
             attribute,
             level: Level::Error,
             text: format!(
-                "`{}` of `<{}>` is `{}`, which is no number; it must be one, in metres and with a point before decimals",
+                "`{}` of `<{}>` is `{}`, which is not a number; it must be a number in metres, with a point as \
+                 the decimal separator",
                 attribute.name(),
                 attribute.node().name(),
                 shown(text)
@@ -201,7 +202,7 @@ fn judge(written: Written, measure: Measure, found: &Sink<'_>) -> Option<(Level,
         }
         // Infinity is as good as the words for "no limit" if a reader understands it.
         Written::Infinite if measure == Measure::Speed => {
-            let why = "which is infinite; where there is no limit, the word is `no limit`";
+            let why = "which is infinite; if there is no limit, use `no limit`";
             return Some((Level::Warning, why.to_owned()));
         }
         Written::Infinite => {
@@ -209,8 +210,8 @@ fn judge(written: Written, measure: Measure, found: &Sink<'_>) -> Option<(Level,
             return Some((Level::Error, why.to_owned()));
         }
         Written::Overflow => {
-            let why = "which is more than a number of double precision can hold (about 1.8e308) and is read as \
-                       infinite; it must be a finite number";
+            let why = "which exceeds the range of double precision (about 1.8e308) and is read as infinite; it \
+                       must be a finite number";
             return Some((Level::Error, why.to_owned()));
         }
         Written::Finite(value) => value.abs(),
@@ -226,8 +227,8 @@ fn judge(written: Written, measure: Measure, found: &Sink<'_>) -> Option<(Level,
         Measure::Speed | Measure::Other => return None,
     };
     let why = match level {
-        Level::Error => "with which no geometry can be computed",
-        _ => "which is farther than once around the Earth",
+        Level::Error => "which cannot be used in geometric computations",
+        _ => "which exceeds the circumference of the Earth",
     };
-    (value > most).then(|| (level, format!("{why}; at most {most:e} is sensible here")))
+    (value > most).then(|| (level, format!("{why}; at most {most:e} is accepted here")))
 }

@@ -10,19 +10,19 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     1e-6,
     "m or rad",
-    "how far apart two curves may lie and still be the same",
+    "largest difference at which two curves count as the same",
 );
 const TURN: Param = Param::number(
     "turn",
     1e-6,
     "rad",
-    "how far two lines may differ in heading and still be one",
+    "largest difference in heading at which two lines count as one",
 );
 const GAP: Param = Param::number(
     "gap",
     0.01,
     "m",
-    "how far apart two lines may lie and still be one",
+    "largest distance at which two lines count as one",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -63,7 +63,7 @@ fn of_lines(road: &Road<'_>, found: &mut Sink<'_>) {
     let (gap, turn) = (found.number(&GAP), found.number(&TURN));
     for [one, next] in in_lines(road.plan_view(), gap, turn) {
         let text =
-            "this line goes on in the direction of the line before it; one `geometry` would do";
+            "this line continues in the direction of the line before it; one `geometry` is enough";
         found
             .issue(next.node(), text)
             .on(road, next.s().unwrap_or(0.0), 0.0)
@@ -93,12 +93,12 @@ fn of_lane(lane: LaneRef<'_, '_>, found: &mut Sink<'_>) {
 fn text(repeated: &Repeated<'_, '_>) -> String {
     if repeated.to <= repeated.from {
         return format!(
-            "this `{}` says the same as the one before it, and never applies; it should be left out",
+            "this `{}` repeats the one before it and never applies; it should be removed",
             repeated.second.node().name()
         );
     }
     format!(
-        "this `{}` says the same as the one before it, from {} to {} m; it should be left out",
+        "this `{}` repeats the one before it from {} to {} m; it should be removed",
         repeated.second.node().name(),
         shown::number(repeated.from),
         shown::number(repeated.to)

@@ -50,8 +50,8 @@ fn report<'d>(
         return;
     };
     let text = format!(
-        "the id of the {name} is `{id}`, but CARLA reads ids of {name}s as whole numbers up to {most}; anything else \
-         becomes another number, mostly 0{}",
+        "the id of the {name} is `{id}`, but CARLA reads ids of {name}s as integers up to {most}; any other id \
+         becomes another number, usually 0{}",
         further(others.count())
     );
     found.issue(Place::attribute_or_node(first, "id"), text);

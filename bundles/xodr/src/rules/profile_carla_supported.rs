@@ -20,18 +20,20 @@ const GAPS: &[Gap] = &[
     Gap {
         element: "border",
         is_meant: lane_border,
-        text: "CARLA takes the width of a lane from `width` alone, and a default where there is none; this lane has \
-               only `border`",
+        text: "CARLA reads the width of a lane only from `width` and uses a default if it is missing; this lane \
+               has only `border`",
     },
     Gap {
         element: "geometry",
         is_meant: begins_otherwise,
-        text: "CARLA takes the first element within `geometry` for its shape, and leaves out the piece if that is none",
+        text: "CARLA reads the first element in `geometry` as its shape and omits the geometry if that element \
+               is not a shape",
     },
     Gap {
         element: "connection",
         is_meant: is_direct,
-        text: "CARLA reads `connectingRoad` of a connection and no `linkedRoad`, so direct junctions lead to road 0",
+        text: "CARLA reads `connectingRoad` of a connection but not `linkedRoad`, so direct junctions lead to \
+               road 0",
     },
 ];
 
@@ -43,7 +45,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         && (version.major, version.minor) > NEWEST
     {
         let text = format!(
-            "CARLA is written for OpenDRIVE 1.4, and this file says {version}: what came later is not read"
+            "CARLA is written for OpenDRIVE 1.4, but this file has version {version}; features that were added \
+             later are not read"
         );
         let attribute = if version.major == 1 {
             "revMinor"

@@ -21,17 +21,17 @@ const GAPS: &[Gap] = &[
     Gap {
         element: "border",
         is_meant: lane_border,
-        text: "esmini takes the width of a lane from `width` alone; this lane has only `border`",
+        text: "esmini reads the width of a lane only from `width`; this lane has only `border`",
     },
     Gap {
         element: "crossfall",
         is_meant: any,
-        text: "esmini does not read `crossfall`; the road stays level across",
+        text: "esmini does not read `crossfall`; the cross section of the road stays level",
     },
     Gap {
         element: "shape",
         is_meant: is_of_road,
-        text: "esmini does not read `shape` of a road; its surface stays as `superelevation` says",
+        text: "esmini does not read `shape` of a road; its surface only follows `superelevation`",
     },
     Gap {
         element: "CRG",

@@ -19,7 +19,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.01,
     "m",
-    "a first record that starts no later than this counts as one at s = 0",
+    "a first record that starts at or before this s counts as a record at s = 0",
 );
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
@@ -57,8 +57,8 @@ fn check(road: &Road<'_>, what: &str, profile: &Profile<'_>, found: &mut Sink<'_
         return;
     }
     let text = format!(
-        "the first record of the {what} of road `{}` starts at s = {}, and nothing says what holds before; there \
-         should be one at s = 0",
+        "the first record of the {what} of road `{}` starts at s = {}, so the value before it is undefined; \
+         there should be a record at s = 0",
         road.id(),
         number(s)
     );

@@ -88,7 +88,8 @@ fn check(road: &Road<'_>, node: Node<'_>, names: &[&str], found: &mut Sink<'_>) 
         return;
     }
     let text = format!(
-        "this `{}` of road `{}` has no {}; it should have all of {}, for readers make up what is missing",
+        "this `{}` of road `{}` has no {}; it should have all of {}, because readers assume a value for each \
+         missing attribute",
         node.name(),
         road.id(),
         missing.join(" and no "),

@@ -31,14 +31,14 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             };
             let names: Vec<&str> = sorts.iter().map(Node::name).collect();
             let text = format!(
-                "the outline mixes {}; all of its points must be of one sort",
+                "the outline mixes {}; all of its points must be of the same kind",
                 listed(&names)
             );
             found
                 .issue(outline, text)
                 .stands(map, object)
-                .at(*first, "the first of one sort")
-                .at(*other, "the first of another");
+                .at(*first, "the first element of one kind")
+                .at(*other, "the first element of another kind");
         }
     }
 }

@@ -20,7 +20,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let Some(mode @ ("attached" | "attached0")) = record.attr("mode") else {
             continue;
         };
-        let because = format!("the mode `{mode}`, but with `genuine` and `global` only");
+        let because = format!("the mode `{mode}`; it is allowed with `genuine` and `global` only");
         let attributes = [("hOffset", 0.0)];
         crg::must_not_have(
             record,

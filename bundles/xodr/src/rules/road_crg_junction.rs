@@ -35,8 +35,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "road `{}` has a CRG surface, but junction `{id}`, to which it belongs, has one of its own; \
-             only one of them may",
+            "road `{}` has a CRG surface, but its junction `{id}` has one as well; only one of them may have a \
+             CRG surface",
             road.id()
         );
         found

@@ -21,8 +21,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         };
         if record.attr("orientation") == Some("opposite") {
             let text = format!(
-                "the CRG record has the orientation `opposite` in the mode `{mode}`; \
-                 only `attached` and `attached0` can be turned round"
+                "the CRG record has the orientation `opposite` in the mode `{mode}`; only the modes `attached` \
+                 and `attached0` allow this orientation"
             );
             found.issue(Place::attribute_or_node(record, "orientation"), text);
         }

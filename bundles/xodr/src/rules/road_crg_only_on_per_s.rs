@@ -20,7 +20,13 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-const TOLERANCE: Param = Param::number("s_tolerance", 1e-3, "m", "how far two records may overlap");
+const TOLERANCE: Param = Param::number(
+    "s_tolerance",
+    1e-3,
+    "m",
+    "largest overlap of two records that is \
+    accepted",
+);
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);

@@ -38,7 +38,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             }
             Some(mode @ ("attached" | "attached0" | "genuine")) if knows_xy => {
                 let attributes = [("xOffset", 0.0), ("yOffset", 0.0)];
-                let because = format!("the mode `{mode}`, but with `global` only");
+                let because = format!("the mode `{mode}`; it is allowed with `global` only");
                 crg::must_not_have(
                     record,
                     &attributes,

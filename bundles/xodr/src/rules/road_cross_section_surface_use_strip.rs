@@ -43,8 +43,8 @@ fn check_only(strip: &Strip<'_>, side: Side, found: &mut Sink<'_>) {
         found.issue(Place::attribute_or_node(strip.node(), "id"), text);
     }
     if let Some(width) = strip.node().child("width") {
-        let text = "the only strip on its side has a width; it reaches to the edge of the road, and a \
-                    width must not be given";
+        let text = "the only strip on its side has a width; it extends to the edge of the road and must not have \
+                    a width";
         found.issue(width, text);
     }
 }
@@ -64,7 +64,7 @@ fn check_ids(strips: &[Strip<'_>], found: &mut Sink<'_>) {
         }
         if !matches!(id, -2 | -1 | 1 | 2) {
             let text = format!(
-                "the strip has id {id}; allowed are 1 and -1 for inner strips, 2 and -2 for outer ones"
+                "the strip has id {id}; inner strips must have id 1 or -1, outer strips must have id 2 or -2"
             );
             found.issue(place, text);
         } else if let Some(first) = seen.get(&id) {

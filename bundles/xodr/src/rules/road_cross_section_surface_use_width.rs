@@ -18,7 +18,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     1e-6,
     "m",
-    "how far below zero a width is accepted",
+    "largest amount below zero that is accepted for a width",
 );
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
@@ -33,8 +33,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             };
             if strip.width.is_empty() {
                 let text = format!(
-                    "strip {inner} has no width, although there is strip {} beyond it; the inner one of two \
-                     strips must have a width",
+                    "strip {inner} has no width, but strip {} lies outside of it; the inner one of two strips \
+                     must have a width",
                     2 * inner
                 );
                 found
@@ -58,7 +58,7 @@ fn check_width(strip: &Strip<'_>, road: &Road<'_>, found: &mut Sink<'_>) {
         if least.value < -tolerance {
             let s = stretch.from + least.at;
             let text = format!(
-                "the width of the strip at s = {s} is {} m, but must not be negative",
+                "the width of the strip at s = {s} is {} m; it must not be negative",
                 least.value
             );
             found

@@ -56,13 +56,13 @@ fn check(
     };
     let (text, level) = if let Some(chord) = by_length {
         let text = format!(
-            "the curve ends {chord:.3} m from its start, but the next one starts {distance:.3} m from it; an outline \
-             must be continuous"
+            "the curve ends {chord:.3} m from its start, but the next curve starts {distance:.3} m from that \
+             start; an outline must be continuous"
         );
         (text, Level::Error)
     } else if let Some(widest) = too_far {
         let text = format!(
-            "the next curve starts {distance:.3} m away, but an arc of this curvature gets no farther than \
+            "the next curve starts {distance:.3} m away, but an arc of this curvature reaches at most \
              {widest:.3} m; an outline must be continuous"
         );
         (text, Level::Error)
@@ -71,7 +71,7 @@ fn check(
         .filter(|gap| *gap > limit)
     {
         let text = format!(
-            "with its `hdg` the curve ends {gap:.3} m away from the start of the next one; an outline must be \
+            "with its `hdg`, the curve ends {gap:.3} m away from the start of the next curve; an outline must be \
              continuous"
         );
         (text, Level::Warning)

@@ -26,7 +26,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         };
         if (real - length).abs() > tolerance {
             let text = format!(
-                "the curve is {real:.4} m long, but `length` says {length} m; they should agree within {tolerance} m"
+                "the curve is {real:.4} m long, but its `length` is {length} m; they should agree within \
+                 {tolerance} m"
             );
             found
                 .issue(Place::attribute_or_node(curve.node(), "length"), text)

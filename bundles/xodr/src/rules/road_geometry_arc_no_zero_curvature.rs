@@ -33,8 +33,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                     continue;
                 };
                 let text = format!(
-                    "the curvature of the arc is {curvature}; an arc should have a curvature other than zero, \
-                     a straight piece is a `line`"
+                    "the curvature of the arc is {curvature}; it should not be zero; a straight geometry should \
+                     be a `line`"
                 );
                 let finding = found.issue(Place::attribute_or_node(arc, "curvature"), text);
                 if let Some(s) = geometry.s() {

@@ -9,7 +9,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     1e-6,
     "m",
-    "values of s that differ by less are equal",
+    "values of s that differ by less than this count as equal",
 );
 
 pub static RULE: Rule<Roads> = Rule {

@@ -11,7 +11,7 @@ const TURNS: Param = Param::number(
     "turns",
     2.5,
     "",
-    "number of full turns up to which a heading is taken for radians",
+    "largest number of full turns at which a heading counts as radians",
 );
 
 /// Distance in metres from which two ends do not meet.
@@ -77,10 +77,11 @@ fn report(road: &Road<'_>, odd: &[Odd], found: &mut Sink<'_>) {
     let proof = odd.iter().find_map(|odd| match odd.fit? {
         Fit::Meets => None,
         Fit::Misses(gap) => Some(format!(
-            "; with it, the piece ends {gap:.2} m away from what follows"
+            "; with this heading, the geometry ends {gap:.2} m away from the next one"
         )),
         Fit::MeetsInDegrees(gap) => Some(format!(
-            "; with it, the piece ends {gap:.2} m away from what follows, and would meet it if the heading were in degrees"
+            "; with this heading, the geometry ends {gap:.2} m away from the next one, but would meet it if the \
+             heading were in degrees"
         )),
     });
     let mut places = odd
@@ -93,8 +94,8 @@ fn report(road: &Road<'_>, odd: &[Odd], found: &mut Sink<'_>) {
     let certain = proof.is_some();
     let proof = proof.unwrap_or_default();
     let text = format!(
-        "the heading is {hdg:.6}, which is {turns:.1} full turns; headings are in radians, not in degrees, and less \
-         than a full turn (6.28) says all{proof}"
+        "the heading is {hdg:.6}, which is {turns:.1} full turns; headings are in radians, not in degrees, and \
+         less than a full turn (6.28) is sufficient{proof}"
     );
     let mut finding = found.issue(Place::attribute_or_node(first.node(), "hdg"), text);
     if certain {

@@ -12,13 +12,13 @@ const BACKWARDS: Param = Param::number(
     "backwards",
     0.5,
     "m",
-    "how far the edge of a lane may run backwards",
+    "largest distance over which the edge of a lane may run backwards",
 );
 const RADIUS: Param = Param::number(
     "radius",
     1.0,
     "m",
-    "a curve of less than this must not turn around more than once",
+    "a curve with a smaller radius must not make more than one full turn",
 );
 
 /// Radius in metres above which a curve has enough space for any lanes.
@@ -108,8 +108,8 @@ fn winds(
         return false;
     }
     let text = format!(
-        "the curve of road `{}` has a radius of {:.4} m and goes around {turns:.1} times; a curvature is one through \
-         the radius, and curves with a radius of less than {least} m must not go around more than once",
+        "the curve of road `{}` has a radius of {:.4} m and makes {turns:.1} full turns; a curvature is 1 / \
+         radius, and curves with a radius of less than {least} m must not make more than one full turn",
         road.id(),
         1.0 / curvature.abs()
     );
@@ -156,8 +156,8 @@ fn folds(geometry: &Geometry<'_>, length: f64, road: &Road<'_>, found: &mut Sink
         return;
     };
     let text = format!(
-        "the curve has a radius of {:.2} m at s = {:.2}, but the outer edge of {} lies {:.2} m to that side and runs \
-         {backwards:.2} m backwards; the lanes on the inside of a curve must fit within its radius",
+        "the curve has a radius of {:.2} m at s = {:.2}, but the outer edge of {} lies {:.2} m to the inside and \
+         runs {backwards:.2} m backwards; lanes on the inside of a curve must fit within its radius",
         fold.radius,
         fold.s,
         lane_name(fold.lane),

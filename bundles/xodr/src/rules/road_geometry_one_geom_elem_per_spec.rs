@@ -18,8 +18,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         for geometry in road.plan_view().geometries() {
             let mut shapes = geometry.shapes();
             let Some(first) = shapes.next() else {
-                let text = "the `geometry` says nothing about its shape; it must contain exactly one of \
-                            `line`, `spiral`, `arc`, `poly3` and `paramPoly3`";
+                let text = "the `geometry` has no shape; it must contain exactly one of `line`, `spiral`, `arc`, \
+                            `poly3` and `paramPoly3`";
                 found.issue(geometry.node(), text);
                 continue;
             };

@@ -15,7 +15,7 @@ const HARMFUL: Param = Param::number(
     "harmful",
     0.01,
     "m and rad",
-    "shift or rotation beyond which it is an error",
+    "shift or rotation above which the finding is an error",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -51,8 +51,8 @@ fn check(road: &Road<'_>, geometry: &Geometry<'_>, curve: &ParamPoly3, found: &m
         return;
     }
     let text = format!(
-        "aU = {}, bU = {}, aV = {}, bV = {}: the curve starts {shift:.6} m away from the geometry's x \
-         and y, turned by {turn:.6} rad against its hdg; it should have aU = aV = bV = 0 and bU > 0",
+        "aU = {}, bU = {}, aV = {}, bV = {}: the curve starts {shift:.6} m away from the geometry's x and y and \
+         is rotated by {turn:.6} rad from its hdg; it should have aU = aV = bV = 0 and bU > 0",
         curve.u.a, curve.u.b, curve.v.a, curve.v.b
     );
     let harms = !forward || shift > harmful || turn > harmful;

@@ -40,8 +40,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         for geometry in road.plan_view().geometries() {
             if let Some(at) = standstill(geometry) {
                 let text = format!(
-                    "the {} has no direction at parameter {at}: both of its coordinates stand still there; a \
-                     reference line should have no kinks",
+                    "the {} has no direction at parameter {at}, because both of its coordinates are stationary \
+                     there; a reference line should have no kinks",
                     shape_name(geometry)
                 );
                 found
@@ -61,8 +61,8 @@ fn check(road: &Road<'_>, one: &Geometry<'_>, next: &Geometry<'_>, found: &mut S
         return;
     };
     let text = format!(
-        "the geometry before it ({}) ends with a heading of {:.4} rad, this one ({}) starts with {:.4} rad; \
-         they should not differ by more than {limit} rad, but do so by {kink:.4} rad ({:.2}°)",
+        "the geometry before it ({}) ends with a heading of {:.4} rad, but this one ({}) starts with {:.4} rad; \
+         they should differ by at most {limit} rad, but differ by {kink:.4} rad ({:.2}°)",
         shape_name(one),
         end.hdg,
         shape_name(next),

@@ -20,7 +20,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     1e-3,
     "m",
-    "largest deviation that is accepted, on long roads a millionth of the sum",
+    "largest deviation that is accepted; on long roads, a millionth of the sum",
 );
 const GRAVE: Param = Param::number(
     "grave",
@@ -62,18 +62,19 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         };
         let more = match further {
             0 => String::new(),
-            1 => "; a further `geometry` of this road deviates, too".to_owned(),
-            many => format!("; {many} further `geometry` elements of this road deviate, too"),
+            1 => "; another `geometry` of this road deviates as well".to_owned(),
+            many => format!("; {many} further `geometry` elements of this road deviate as well"),
         };
         let demand = match sum {
             0.0 => "the reference line starts at s = 0".to_owned(),
             _ => format!(
-                "the geometries before this one are {} m long together",
+                "the geometries before this one have a total length of {} m",
                 number(sum)
             ),
         };
         let text = format!(
-            "s is {}, but {demand}; s must be the sum of all lengths before (accepted: {tolerance} m){more}",
+            "s is {}, but {demand}; s must be the sum of all lengths before it (accepted deviation: {tolerance} \
+             m){more}",
             number(s)
         );
         let finding = found

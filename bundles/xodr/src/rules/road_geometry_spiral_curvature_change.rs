@@ -21,7 +21,7 @@ const LEAST: Param = Param::number(
     "least",
     1e-12,
     "1/m",
-    "a difference of curvatures up to this counts as none",
+    "a difference of curvatures up to this counts as zero",
 );
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
@@ -38,8 +38,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 }
                 let instead = if start.abs() <= least { "line" } else { "arc" };
                 let text = format!(
-                    "the spiral starts with curvature {} and ends with {}; they should differ; a \
-                     piece of constant curvature is written as `{instead}`",
+                    "the spiral starts with curvature {} and ends with {}; they should differ; a geometry of \
+                     constant curvature should be a `{instead}`",
                     shown::number(start),
                     shown::number(end)
                 );

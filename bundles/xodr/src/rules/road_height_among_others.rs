@@ -8,7 +8,7 @@ const APART: Param = Param::number(
     "apart",
     100.0,
     "m",
-    "a road that is not linked may lie up to so much above or below all others",
+    "largest distance above or below all other roads that is accepted for a road without links",
 );
 
 /// Minimum ratio of the two groups. Only a small group is odd; of two halves it is unclear which.
@@ -69,8 +69,8 @@ impl<'m, 'd> Span<'m, 'd> {
 
     fn report(&self, (step, limit): (f64, f64), word: &str, found: &mut Sink<'_>) {
         let text = format!(
-            "road `{}` lies {} m {word} the rest of the map and is linked to nothing there; roads of one place lie at \
-             about one height (accepted: {limit} m)",
+            "road `{}` lies {} m {word} the rest of the map and is not linked to it; roads of one place should \
+             lie at similar heights (accepted difference: {limit} m)",
             self.road.id(),
             number(step.round())
         );

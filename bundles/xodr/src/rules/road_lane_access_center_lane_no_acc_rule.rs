@@ -18,7 +18,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     center_lane::has_no(
         map.part(part),
         "access",
-        "nobody drives on it; access rules belong to the lanes beside it",
+        "it carries no traffic; access rules belong to the lanes beside it",
         found,
     );
 }

@@ -8,7 +8,7 @@ const SAME_PLACE: Param = Param::number(
     "same_place",
     1e-6,
     "m",
-    "records that start closer together than this start at the same place",
+    "records whose starts differ by less than this start at the same place",
 );
 
 /// Maximum number of previous records for comparisons. It limits the work on hostile files.
@@ -52,8 +52,8 @@ fn compare(
         return;
     }
     let text = format!(
-        "the rule is `{later}` at s = {own} m of the lane section, where another record says \
-         `{earlier}`, on {}; at one place either only `allow` or only `deny` may be used",
+        "the rule is `{later}` at s = {own} m of the lane section on {}, but another record there has the rule \
+         `{earlier}`; at one place either only `allow` or only `deny` may be used",
         lane_name(lane)
     );
     found

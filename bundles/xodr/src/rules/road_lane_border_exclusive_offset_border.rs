@@ -27,7 +27,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 continue;
             };
             let shifting = offsets.iter().find(|offset| !is_zero(offset));
-            let text = "a lane has a `border` while the road has a `laneOffset`; borders count from the \
+            let text = "a lane has a `border`, but the road has a `laneOffset`; borders are measured from the \
                         reference line and must not be used together with an offset";
             let (level, offset) = match shifting {
                 Some(shifting) => (Level::Error, shifting),

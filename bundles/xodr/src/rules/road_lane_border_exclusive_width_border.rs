@@ -25,8 +25,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 continue;
             };
             let text = format!(
-                "the {} lanes of this section use both `width` and `border`; a lane group must use \
-                 one of them alone",
+                "the {} lanes of this section use both `width` and `border`; a lane group must use only one of \
+                 them",
                 word(side)
             );
             let group = border.ancestors().nth(1).unwrap_or(border);

@@ -9,7 +9,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     1e-6,
     "m",
-    "how far a border may lie within an inner one",
+    "largest distance by which a border may lie inside an inner one",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -52,8 +52,8 @@ fn compare(side: Side, inner: LaneRef<'_, '_>, outer: LaneRef<'_, '_>, found: &m
     }
     let t = |lane: LaneRef<'_, '_>| lane.borders().at(lowest.at).unwrap_or(f64::NAN);
     let text = format!(
-        "the border of {} lies at t = {:.3} m, {:.6} m within the border of lane `{}` at t = {:.3} m, \
-         {:.3} m after the start of the lane section; it must not lie further in than that of an inner lane",
+        "the border of {} lies at t = {:.3} m, {:.6} m inside the border of lane `{}` at t = {:.3} m, {:.3} m \
+         after the start of the lane section; it must not lie further inside than the border of an inner lane",
         lane_name(outer),
         t(outer),
         -lowest.value,

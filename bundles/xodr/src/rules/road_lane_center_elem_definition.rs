@@ -50,7 +50,7 @@ fn no_center_at_all(road: &Road<'_>, is_new: bool, found: &mut Sink<'_>) {
         return;
     };
     let text = format!(
-        "road `{}` has no center lane in any lane section; each must have one",
+        "road `{}` has no center lane in any lane section; each lane section must have one",
         road.id()
     );
     let finding = found.issue(place, text);
@@ -75,7 +75,8 @@ fn check(section: SectionRef<'_, '_>, is_new: bool, found: &mut Sink<'_>) {
         }
         [group] => check_lanes(*group, is_permanent, is_new, found),
         [first, second, ..] => {
-            let text = "the lane section has a second `center`; there must be one at every s";
+            let text =
+                "the lane section has a second `center`; there must be exactly one at every s";
             found.issue(*second, text).at(*first, "the first one");
         }
     }
@@ -92,11 +93,11 @@ fn check_lanes(group: Node<'_>, is_permanent: bool, is_new: bool, found: &mut Si
             } else {
                 SINGULAR
             };
-            let text = "`center` holds no lane; it must hold exactly one";
+            let text = "`center` contains no lane; it must contain exactly one";
             found.issue(group, text).level(level).uid(uid);
         }
         [first, second, ..] => {
-            let text = "`center` holds a second lane; it must hold exactly one";
+            let text = "`center` contains a second lane; it must contain exactly one";
             found
                 .issue(*second, text)
                 .level(level)

@@ -19,8 +19,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         let text = match lane.side() {
             None if id != 0 => format!("the center lane has id {id}; it must have id 0"),
             Some(_) if id == 0 => {
-                "this lane beside the center lane has id 0, which belongs to the center \
-                 lane alone"
+                "this lane beside the center lane has id 0, which is reserved for the center lane"
                     .to_owned()
             }
             _ => continue,

@@ -19,7 +19,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         center_lane::has_no(
             map.part(part),
             element,
-            "it is a line without any extent",
+            "it is a line and has no extent",
             found,
         );
     }

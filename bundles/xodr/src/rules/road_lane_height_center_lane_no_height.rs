@@ -18,7 +18,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
     center_lane::has_no(
         map.part(part),
         "height",
-        "it lies on the road surface and must not be lifted",
+        "it lies on the road surface and must not be raised",
         found,
     );
 }

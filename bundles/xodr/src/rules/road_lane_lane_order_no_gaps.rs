@@ -27,8 +27,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                     (one, last) => format!("{} to {} are", number(side, one), number(side, last)),
                 };
                 let text = format!(
-                    "lane {} is followed by lane {} on the way outward; {missing} missing, but ids must \
-                     be consecutive",
+                    "lane {} is followed outward by lane {}; {missing} missing, but ids must be consecutive",
                     number(side, inner),
                     number(side, outer)
                 );

@@ -40,8 +40,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "all lanes for traffic in this lane section of road `{}` have `direction=\"reversed\"`, on both sides; \
-             to change between right-hand and left-hand traffic, `rule` of the road must be used",
+            "all traffic lanes on both sides of this lane section of road `{}` have `direction=\"reversed\"`; to \
+             change between right-hand and left-hand traffic, `rule` of the road must be used",
             section.road.id()
         );
         found
@@ -49,7 +49,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             .in_lane(left, 0.0)
             .at(
                 Place::attribute_or_node(right.node(), "direction"),
-                "on the other side",
+                "a lane on the other side",
             );
     }
 }

@@ -27,7 +27,7 @@ const GRAVE: Param = Param::number(
     "grave",
     0.1,
     "m",
-    "in versions before 1.9, a first section that starts no farther from 0 is a warning",
+    "in versions before 1.9, a first section that starts at most this far from 0 is a warning",
 );
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -33,7 +33,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             .filter(|layer| layer.section_count() == 0)
         {
             let text = format!(
-                "these `lanes` of road `{}` hold no `laneSection`; there must be at least one",
+                "these `lanes` of road `{}` contain no `laneSection`; there must be at least one",
                 road.id()
             );
             found.issue(layer.node(), text);

@@ -9,7 +9,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.001,
     "m",
-    "how far the border of a lane may lie on the other side of the center lane",
+    "largest distance by which the border of a lane may lie on the other side of the center lane",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -74,8 +74,8 @@ fn on_wrong_side(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) 
     let worst = lowest.min_by(|one, other| one.0.total_cmp(&other.0));
     if let Some((value, ds)) = worst.filter(|(value, _)| *value < -found.number(&TOLERANCE)) {
         let text = format!(
-            "the border of {} lies at t = {:.3} m, {ds:.3} m after the start of the lane section: on the other side \
-             of the center lane; lanes to the {} must lie there",
+            "the border of {} lies on the wrong side of the center lane, at t = {:.3} m, {ds:.3} m after the \
+             start of the lane section; borders of lanes to the {} must lie on that side",
             lane_name(lane),
             value * side.sign(),
             word(side)

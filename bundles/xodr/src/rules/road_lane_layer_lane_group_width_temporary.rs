@@ -10,7 +10,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.01,
     "m",
-    "how far temporary lanes may reach beyond permanent ones",
+    "largest distance by which temporary lanes may extend beyond permanent ones",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -69,8 +69,8 @@ fn check(section: SectionRef<'_, '_>, side: Side, below: &[Piece], found: &mut S
             Side::Right => "right",
         };
         let text = format!(
-            "the temporary lanes of road `{}` reach {:.3} m beyond its permanent lanes on the {name} at s = {:.2}; \
-             they must lie on them",
+            "the temporary lanes of road `{}` extend {:.3} m beyond its permanent lanes on the {name} at s = \
+             {:.2}; temporary lanes must lie on permanent lanes",
             road.id(),
             worst.value,
             worst.at

@@ -21,8 +21,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         for element in ["height", "material"] {
             for child in lane.elements(element) {
                 let text = format!(
-                    "a lane of the temporary layer has a `{element}`; height and material of the surface \
-                     are given by the permanent layer alone"
+                    "a lane of the temporary layer has a `{element}`; only the permanent layer may define the \
+                     height and material of the surface"
                 );
                 found.issue(child, text);
             }

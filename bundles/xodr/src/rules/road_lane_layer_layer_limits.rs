@@ -41,7 +41,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             .count();
         if let Some(layer) = only.filter(|_| others == 0) {
             let text = format!(
-                "road `{}` has a temporary lane layer, but no permanent one; it must have exactly one",
+                "road `{}` has a temporary lane layer, but no permanent one; it must have exactly one permanent \
+                 layer",
                 road.id()
             );
             found.issue(layer.node(), text);

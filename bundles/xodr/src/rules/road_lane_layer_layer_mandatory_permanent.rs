@@ -24,8 +24,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         };
         for section in layer.sections(road) {
             if section.lanes().next().is_none() {
-                let text = "the lane section of the permanent layer holds no lane at all; there must be at \
-                            least one at every s of the road";
+                let text = "the lane section of the permanent layer contains no lane; there must be at least one \
+                            at every s of the road";
                 found.issue(section.node(), text);
             }
         }
@@ -43,9 +43,9 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             // A section for a single side may lie beside another one that continues.
             if end < next - tolerance && section.single_side() != Some(true) {
                 let text = format!(
-                    "this section of the permanent layer ends at s = {end} (s = {s} and length = {length}), \
-                     which leaves the road without permanent lanes up to s = {next}; there must be at least \
-                     one lane at every s"
+                    "this section of the permanent layer ends at s = {end} (s = {s} and length = {length}), so \
+                     the road has no permanent lanes from there to s = {next}; there must be at least one lane \
+                     at every s"
                 );
                 found
                     .issue(Place::attribute_or_node(section.node(), "length"), text)

@@ -20,8 +20,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         }
         if let Some(length) = section.node().attribute("length") {
             let text = format!(
-                "this lane section of the permanent layer has length = {}; only sections of a temporary \
-                 layer may have a length of their own",
+                "this lane section of the permanent layer has length = {}; only sections of a temporary layer \
+                 may have a length",
                 length.value()
             );
             found.issue(length, text);

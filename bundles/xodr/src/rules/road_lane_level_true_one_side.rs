@@ -34,8 +34,8 @@ fn outward(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) {
             (Some(true), None) => level = Some(lane),
             (Some(false), Some(inner)) => {
                 let text = format!(
-                    "{} follows the lateral profile, but lane `{}` further in has `level=\"true\"`; \
-                     from there to the edge of the road every lane must have it",
+                    "{} follows the lateral profile, but lane `{}` further inside has `level=\"true\"`; from \
+                     that lane to the edge of the road, every lane must have it",
                     lane_name(lane),
                     inner.id_text().unwrap_or_default()
                 );
@@ -43,7 +43,7 @@ fn outward(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) {
                 found
                     .issue(Place::attribute_or_node(lane.node(), "level"), text)
                     .in_lane(lane, middle)
-                    .at(inner.node(), "the lane further in");
+                    .at(inner.node(), "the lane further inside");
             }
             _ => {}
         }
@@ -60,8 +60,7 @@ fn along(map: &RoadMap<'_>, joint: &LaneJoint<'_>, found: &mut Sink<'_>) {
     };
     if here != there {
         let text = format!(
-            "`level` changes from {here} in {} to {there} in {}, which is linked to it; it should stay \
-             the same",
+            "`level` changes from {here} in {} to {there} in the linked {}; it should stay the same",
             lane_name(from),
             lane_name(to)
         );

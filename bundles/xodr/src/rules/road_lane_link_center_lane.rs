@@ -20,8 +20,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         for end in ContactPoint::BOTH {
             for link in lane.links(end).filter(|link| link.id() == Some(0)) {
                 let text = format!(
-                    "the {} of {} is lane `0`; the center lane has no width and nobody drives on it, so that no other \
-                     lane can go on as it",
+                    "the {} of {} is lane `0`; the center lane has no width and carries no traffic, so no other \
+                     lane can continue as the center lane",
                     end.link_name(),
                     lane_name(lane)
                 );
@@ -41,8 +41,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let text = format!(
-                "the lane link leads from lane `{}` to lane `{}`, but lane `0` is the center lane, which has no width \
-                 and on which nobody drives; both lanes must be others",
+                "the lane link leads from lane `{}` to lane `{}`, but lane `0` is the center lane, which has no \
+                 width and carries no traffic; neither of the lanes may be the center lane",
                 link.node().attr("from").unwrap_or_default(),
                 link.node().attr("to").unwrap_or_default()
             );

@@ -10,7 +10,7 @@ const FAR: Param = Param::number(
     "far",
     10.0,
     "m",
-    "a linked lane that lies farther away is the wrong one, whatever its direction",
+    "a linked lane that lies farther away than this is a wrong link, regardless of its direction",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -66,8 +66,8 @@ fn against(
         return None;
     };
     match (one == joint.from.end, other == joint.to.end) {
-        (true, true) => Some("traffic on both runs towards the other"),
-        (false, false) => Some("traffic on both runs away from the other"),
+        (true, true) => Some("traffic on each of them runs towards the other"),
+        (false, false) => Some("traffic on each of them runs away from the other"),
         _ => None,
     }
 }
@@ -105,12 +105,12 @@ fn report(
     let [one, other] = [from.at.road.id(), to.at.road.id()];
     let because = match rules {
         Some([here, there]) => {
-            format!(", because road `{one}` has {here} and road `{other}` {there} (`rule`)")
+            format!(", because road `{one}` has {here} and road `{other}` has {there} (`rule`)")
         }
         None => String::new(),
     };
     let text = format!(
-        "the {} of {} is {}, but {collide}{because}; lanes that are linked must have the same direction of travel",
+        "the {} of {} is {}, but {collide}{because}; linked lanes must have the same direction of travel",
         joint.from.end.link_name(),
         lane_name(from),
         lane_name(to)

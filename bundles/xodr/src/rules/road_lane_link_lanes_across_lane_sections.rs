@@ -11,7 +11,7 @@ const OVERLAP: Param = Param::number(
     "overlap",
     0.5,
     "",
-    "share of the narrower lane's width that two lanes must have in common to be one lane",
+    "fraction of the narrower lane's width that two lanes must share to count as one lane",
 );
 
 /// UID in the spelling of annex F, for findings without a counterpart in ASAM's checker.
@@ -65,8 +65,8 @@ fn not_linked_at_all(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'
             continue;
         };
         let text = format!(
-            "{} goes on as {}, but neither names the other; lanes that continue must be linked in \
-             both directions",
+            "{} continues as {}, but neither lane links to the other; lanes that continue must be linked in both \
+             directions",
             lane_name(from.lane),
             lane_name(to.lane)
         );
@@ -75,7 +75,7 @@ fn not_linked_at_all(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'
             .level(Level::Warning)
             .uid(ANNEX_F)
             .at_lane_end(from.lane, end)
-            .at(to.lane.node(), "the lane that it goes on as");
+            .at(to.lane.node(), "the lane that continues it");
     }
 }
 
@@ -101,8 +101,8 @@ fn not_returned(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
         }
         let back = joint.to.end.link_name();
         let text = format!(
-            "{} names {} as its {}, which does not name it as its {back}; lanes that continue must \
-             be linked in both directions",
+            "{} has {} as its {}, but that lane does not have the first one as its {back}; lanes that continue \
+             must be linked in both directions",
             lane_name(from),
             lane_name(to),
             joint.from.end.link_name()
@@ -111,7 +111,7 @@ fn not_returned(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
             .issue(to.node(), text)
             .here(&what_it_says(map, joint, from, to))
             .at_lane_end(to, joint.to.end)
-            .at(joint.node, "the link that is not returned");
+            .at(joint.node, "the link that has no link back");
     }
 }
 
@@ -130,7 +130,7 @@ fn what_it_says<'a>(
     let target = map.linked_end(to.at.road, end).map(|contact| contact.to);
     match target.and_then(|target| Some((target.end, map.road_at(target.road)?))) {
         Some((other, road)) if leads && !joint.is_within_road() => format!(
-            "its {back} `{id}` leads to the {other} of road `{}` (`contactPoint`), not back here",
+            "its {back} `{id}` leads to the {other} of road `{}` (`contactPoint`), not back to this end",
             road.id()
         ),
         _ => format!("has no `{back}` with the id `{id}`"),

@@ -12,7 +12,7 @@ const NEAR: Param = Param::number(
     "near",
     0.1,
     "m",
-    "how near the edges of two lanes must be for one to go on as the other",
+    "largest distance between the edges of two lanes at which one lane continues as the other",
 );
 
 /// Minimum width of lanes that count as continuing, in metres.
@@ -84,13 +84,14 @@ fn check(
     };
     if let Some((next, _)) = theirs.iter().find(goes_on) {
         let text = format!(
-            "{} goes on as {}, but neither names the other; lanes that continue should be linked in both directions",
+            "{} continues as {}, but neither lane links to the other; lanes that continue should be linked in \
+             both directions",
             lane_name(*lane),
             lane_name(*next)
         );
         found
             .issue(lane.node(), text)
             .at_lane_end(*lane, end)
-            .at(next.node(), "the lane that it goes on as");
+            .at(next.node(), "the lane that continues it");
     }
 }

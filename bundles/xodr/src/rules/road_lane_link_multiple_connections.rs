@@ -28,7 +28,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
 fn check<'a>(map: &RoadMap<'a>, lane: LaneRef<'_, 'a>, end: ContactPoint, found: &mut Sink<'_>) {
     if lane.width_at(end).is_some_and(|width| width <= NO_WIDTH) {
         let text = format!(
-            "{} has several `{}`s, but no width at its {end}; lanes that split or merge must have width there",
+            "{} has several `{}` links, but no width at its {end}; lanes that split or merge must have width \
+             there",
             lane_name(lane),
             end.link_name()
         );
@@ -43,8 +44,8 @@ fn check<'a>(map: &RoadMap<'a>, lane: LaneRef<'_, 'a>, end: ContactPoint, found:
         };
         if there.width_at(at).is_some_and(|width| width <= NO_WIDTH) {
             let text = format!(
-                "{} is one of several `{}`s of {}, but has no width where they meet; lanes that split or merge must \
-                 have width there",
+                "{} is one of several `{}` lanes of {}, but has no width where they meet; lanes that split or \
+                 merge must have width there",
                 lane_name(there),
                 end.link_name(),
                 lane_name(lane)

@@ -34,7 +34,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         );
         found
             .issue(from.node(), text)
-            .here("the lane that goes on")
+            .here("the lane that continues")
             .at(to.node(), "the lane that has no width here")
             .at_lane_end(to, joint.to.end)
             .at(joint.node, "the link");

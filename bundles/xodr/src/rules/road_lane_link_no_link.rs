@@ -41,7 +41,7 @@ fn nothing_to_link(map: &RoadMap<'_>, road: &Road<'_>, end: ContactPoint) -> Opt
         let is_touched = map.contacts_of(here).next().is_some();
         return (!is_touched).then(|| {
             format!(
-                "the road has no {}, so that it leads nowhere",
+                "the road itself has no {} and leads nowhere",
                 end.link_name()
             )
         });
@@ -49,7 +49,9 @@ fn nothing_to_link(map: &RoadMap<'_>, road: &Road<'_>, end: ContactPoint) -> Opt
     let id = link.junction_id()?;
     let is_virtual = |junction: &Junction<'_>| junction.kind() == Some(JunctionType::Virtual);
     let is_cut = !map.junction(id).is_some_and(is_virtual);
-    is_cut.then(|| format!("junction `{id}` lies there, whose connections say which lanes follow"))
+    is_cut.then(|| {
+        format!("junction `{id}` lies there, and its connections define which lanes follow")
+    })
 }
 
 fn check<'a>(

@@ -90,8 +90,8 @@ fn check(lane: LaneRef<'_, '_>, end: ContactPoint, found: &mut Sink<'_>) {
         return;
     }
     let text = format!(
-        "{} has no `{}` on the permanent layer at the {end} of the temporary lanes; without one \
-         nobody can {} it",
+        "{} has no `{}` on the permanent layer at the {end} of the temporary lanes; without one, vehicles cannot \
+         {} it",
         lane_name(lane),
         end.link_name(),
         match end {

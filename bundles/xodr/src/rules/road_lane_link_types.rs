@@ -36,8 +36,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         }
         let text = format!(
-            "{}, a lane of the type `{}`, goes on as {}, which has the type `{}`; what vehicles drive on should not go \
-             on as something that they do not",
+            "{}, a lane of type `{}`, continues as {}, which has type `{}`; a lane for vehicles should not \
+             continue as a lane that is not for vehicles, or the reverse",
             lane_name(from),
             from.kind().unwrap_or_default(),
             lane_name(to),

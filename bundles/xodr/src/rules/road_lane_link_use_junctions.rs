@@ -37,8 +37,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "{} and {} are both linked to the {} of {}; where it is not clear which lane goes on there, a junction \
-             must be used",
+            "{} and {} are both linked to the {} of {}; if it is not clear which lane continues there, a \
+             junction must be used",
             lane_name(*first),
             lane_name(*other),
             end.end,

@@ -9,19 +9,19 @@ const MOST: Param = Param::number(
     "most",
     50.0,
     "m",
-    "how far beside the reference line lanes may be shifted",
+    "largest lateral shift of lanes from the reference line that is accepted",
 );
 const SLOPE: Param = Param::number(
     "slope",
     1.0,
     "",
-    "how steeply lanes may be shifted, as metres aside per metre along the road",
+    "largest lateral shift of lanes that is accepted, in metres sideways per metre along the road",
 );
 const LENGTH: Param = Param::number(
     "length",
     5.0,
     "m",
-    "over how many metres lanes must be shifted too steeply to be told",
+    "smallest length over which a too steep shift of lanes is reported",
 );
 
 /// Offset in metres above which another rule reports the number as invalid.
@@ -58,8 +58,8 @@ fn one(road: &Road<'_>, layer: &LaneLayer<'_>, found: &mut Sink<'_>) {
     for stretch in layer.offset().stretches(length) {
         if let Some((ds, offset)) = far(&stretch, found) {
             let text = format!(
-                "the lanes of road `{}` are shifted by {} m beside the reference line at s = {:.1}; more than {} m \
-                 is hardly meant",
+                "the lanes of road `{}` are shifted by {} m from the reference line at s = {:.1}; more than {} m \
+                 is implausible",
                 road.id(),
                 brief(offset, 1),
                 stretch.from + ds,
@@ -77,8 +77,8 @@ fn one(road: &Road<'_>, layer: &LaneLayer<'_>, found: &mut Sink<'_>) {
     }
     if let Some((stretch, (ds, slope, over))) = steep {
         let text = format!(
-            "the lanes of road `{}` are shifted by up to {} m per metre along the road; more than {} m per metre, \
-             here over {over:.1} m, is hardly meant",
+            "the lanes of road `{}` are shifted sideways by up to {} m per metre along the road; more than {} m \
+             per metre, here over {over:.1} m, is implausible",
             road.id(),
             brief(slope.abs(), 2),
             brief(found.number(&SLOPE), 2)

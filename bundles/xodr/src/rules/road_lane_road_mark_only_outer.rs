@@ -49,8 +49,9 @@ fn check(lane: LaneRef<'_, '_>, mark: &LaneRecord<'_>, found: &mut Sink<'_>) {
     };
     if nearest > half {
         let text = format!(
-            "every line of this road mark lies at least {nearest:.2} m away from the outer border of {}, more than \
-             half of the {:.2} m that it is wide; a road mark describes the marking at the outer border",
+            "every line of this road mark lies at least {nearest:.2} m away from the outer border of {}, which \
+             is more than half of the lane's width of {:.2} m; a road mark describes the marking at the outer \
+             border",
             lane_name(lane),
             2.0 * half
         );

@@ -18,13 +18,15 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         let node = section.node();
         let text = match (section.s(), node.attr("s")) {
             (Some(s), _) if s < 0.0 => format!(
-                "the lane section starts at s = {s}; `s` must not be negative, roads start at s = 0"
+                "the lane section starts at s = {s}; `s` must not be negative, because roads start at s = 0"
             ),
             (Some(_), _) => continue,
             (None, Some(text)) => {
                 format!("`s` of the lane section is `{text}`; it must be a finite number [m]")
             }
-            (None, None) => "the lane section has no `s`; it must say where it starts".to_owned(),
+            (None, None) => {
+                "the lane section has no `s`; it must define where the section starts".to_owned()
+            }
         };
         found.issue(Place::attribute_or_node(node, "s"), text);
     }

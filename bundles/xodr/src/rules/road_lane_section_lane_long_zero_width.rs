@@ -84,8 +84,8 @@ fn report(lane: LaneRef<'_, '_>, from: f64, to: f64, found: &mut Sink<'_>) {
     let limit = found.number(&LENGTH);
     if to - from > limit {
         let text = format!(
-            "{} has no width over {:.2} m, from s = {from:.2} to s = {to:.2}; that should be avoided over more than \
-             {limit} m",
+            "{} has no width over {:.2} m, from s = {from:.2} to s = {to:.2}; a length of more than {limit} m \
+             without width should be avoided",
             lane_name(lane),
             to - from
         );

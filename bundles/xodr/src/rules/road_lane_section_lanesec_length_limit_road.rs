@@ -18,7 +18,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     1e-3,
     "m",
-    "how far beyond the end of the road is accepted",
+    "largest distance beyond the end of the road that is accepted",
 );
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -33,8 +33,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             let Some((ds, what)) = place else { continue };
             let s = lane.at.s().unwrap_or(0.0) + ds;
             let text = format!(
-                "{} {what} at s = {s:.2}, in the middle of its lane section; where the number of lanes changes, a new \
-                 lane section must be defined",
+                "{} {what} at s = {s:.2} within its lane section; a new lane section must be defined where the \
+                 number of lanes changes",
                 lane_name(lane)
             );
             found.issue(lane.node(), text).in_lane(lane, ds);

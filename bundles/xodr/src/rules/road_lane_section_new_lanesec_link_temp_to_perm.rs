@@ -18,7 +18,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     1e-3,
     "m",
-    "largest distance between link and start of a section",
+    "largest distance between a link and the start of a section that is accepted",
 );
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
@@ -65,7 +65,7 @@ fn check(section: SectionRef<'_, '_>, end: ContactPoint, starts: &[f64], found: 
     }
     let text = format!(
         "a temporary lane is linked to the permanent layer at s = {s}, but no section of the permanent layer \
-         starts there; a new one must be defined where the layers are linked"
+         starts there; a new section must be defined where the layers are linked"
     );
     found
         .issue(link.node(), text)

@@ -15,7 +15,7 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-const LEAST: Param = Param::number("least", 0.0, "m", "a length up to this counts as none");
+const LEAST: Param = Param::number("least", 0.0, "m", "a length up to this counts as zero");
 const SHORT: Param = Param::number("short", 0.01, "m", "a length up to this is a warning");
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
@@ -55,11 +55,11 @@ fn report(
     } else {
         (
             Level::Warning,
-            "so short a section may count as none where lengths are rounded",
+            "a section this short may count as empty if lengths are rounded",
         )
     };
     let text = format!(
-        "the lane section starts at s = {} and {what} at s = {}, which makes it {} m long; {allowed}",
+        "the lane section starts at s = {} and {what} at s = {}, so the section is {} m long; {allowed}",
         number(s),
         number(end),
         number(length)
@@ -75,7 +75,7 @@ fn report(
             let node = own.unwrap_or(section.road.node());
             finding.at(
                 Place::attribute_or_node(node, "length"),
-                "where its end comes from",
+                "the length that defines its end",
             )
         }
     };

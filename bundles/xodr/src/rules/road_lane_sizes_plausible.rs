@@ -5,23 +5,19 @@ use qcbus_sdk::{Level, Param, Place, Rule, Sink};
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::model::{Part, Roads};
 
-const MARK_WIDTH: Param = Param::number(
-    "mark_width",
-    1.0,
-    "m",
-    "greatest width of a line that is believed",
-);
+const MARK_WIDTH: Param =
+    Param::number("mark_width", 1.0, "m", "largest plausible width of a line");
 const MARK_HEIGHT: Param = Param::number(
     "mark_height",
     0.5,
     "m",
-    "greatest height of a road mark that is believed",
+    "largest plausible height of a road mark",
 );
 const LANE_HEIGHT: Param = Param::number(
     "lane_height",
     1.0,
     "m",
-    "greatest height of a lane above or below the road that is believed",
+    "largest plausible height of a lane above or below the road",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -105,7 +101,7 @@ fn say(
     found: &mut Sink<'_>,
 ) {
     let text = format!(
-        "{what} is {value} m, on {}; more than {limit} m is hardly meant, sizes are in metres",
+        "{what} is {value} m, on {}; more than {limit} m is implausible; sizes are in metres",
         lane_name(lane)
     );
     let finding = found.issue(Place::attribute_or_node(node, name), text);

@@ -9,21 +9,22 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.001,
     "m",
-    "how far below zero a width is no more than a matter of rounding",
+    "largest amount below zero at which a width counts as a rounding error",
 );
 
 const SMALL: Param = Param::number(
     "small",
     0.01,
     "m",
-    "how far below zero a width may come of a fitted curve, which is a warning",
+    "largest amount below zero at which a width counts as an effect of a fitted curve, which is a warning",
 );
 
 const NOTHING: Param = Param::number(
     "nothing",
     1e-6,
     "m",
-    "how far below zero a width counts as zero, as coefficients of some digits give it",
+    "largest amount below zero at which a width counts as zero, because coefficients have a limited number of \
+     digits",
 );
 
 pub static RULE: Rule<Roads> = Rule {

@@ -10,25 +10,25 @@ const LEAST: Param = Param::number(
     "least",
     1.5,
     "m",
-    "width from which on vehicles find room in a lane",
+    "smallest width of a lane that has room for vehicles",
 );
 const MOST: Param = Param::number(
     "most",
     12.0,
     "m",
-    "width up to which a lane for vehicles is one lane",
+    "largest plausible width of a single lane for vehicles",
 );
 const ANY: Param = Param::number(
     "any",
     500.0,
     "m",
-    "width up to which any other lane is believed",
+    "largest plausible width of any other lane",
 );
 const LENGTH: Param = Param::number(
     "length",
     10.0,
     "m",
-    "over how many metres a lane must be narrow or wide to be told",
+    "smallest length over which a too narrow or too wide lane is reported",
 );
 
 /// Change of width in metres above which a lane counts as opening or closing.
@@ -101,7 +101,7 @@ fn report_wide(
         (found.number(&ANY), "lane")
     };
     let text = format!(
-        "{} is up to {} m wide; a {what} of more than {most} m is hardly meant, widths are in metres",
+        "{} is up to {} m wide; a {what} of more than {most} m is implausible; widths are in metres",
         lane_name(lane),
         brief(width, 1)
     );

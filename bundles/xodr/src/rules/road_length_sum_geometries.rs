@@ -21,14 +21,14 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     1e-3,
     "m",
-    "largest difference that is accepted, on long roads a millionth of the length",
+    "largest difference that is accepted; on long roads, a millionth of the length",
 );
 const BROKEN_FROM: Param = Param::number(
     "broken_from",
     1.0,
     "m",
-    "from this difference on a part of the road has no place, or a part of its line no road, which is an error \
-     in every version",
+    "from this difference on, a part of the road has no position, or a part of its reference line has no road; \
+     this is an error in every version",
 );
 /// Relative tolerance for a sum of lengths that are written with few digits.
 const RELATIVE: f64 = 1e-6;
@@ -51,8 +51,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         };
         if (length - sum).abs() > tolerance.max(RELATIVE * sum) {
             let text = format!(
-                "road `{}` is said to be {} m long, but its geometries are {} m long together; the \
-                 two should be equal (accepted: {tolerance} m)",
+                "the given length of road `{}` is {} m, but its geometries have a total length of {} m; the two \
+                 should be equal (accepted difference: {tolerance} m)",
                 road.id(),
                 number(length),
                 number(sum)

@@ -61,8 +61,8 @@ fn direct_junctions(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             && !ContactPoint::BOTH.iter().any(|end| names(road, *end))
         {
             let text = format!(
-                "road `{}` comes into direct junction `{}`, but neither its predecessor nor its successor is that \
-                 junction; the link must be defined on both sides",
+                "road `{}` is an incoming road of direct junction `{}`, but neither its predecessor nor its \
+                 successor is that junction; the link must be defined on both sides",
                 road.id(),
                 junction.id()
             );
@@ -105,7 +105,7 @@ fn to_road(
     let Some(other) = map.road(id) else { return };
     if other.index() == road.index() && contact == end {
         let text = format!(
-            "the {} of road `{id}` is its own {end}; an end of a road cannot lie at itself",
+            "the {} of road `{id}` is its own {end}; an end of a road cannot be linked to itself",
             end.link_name()
         );
         found.issue(link.node(), text);
@@ -137,8 +137,8 @@ fn to_road(
         None => format!("road `{}` ({end})", road.id()),
     };
     let text = format!(
-        "the {mine} of road `{}` is road `{id}` ({contact}), but {but}; both sides must agree, so that it has to \
-         be {expected}",
+        "the {mine} of road `{}` is road `{id}` ({contact}), but {but}; both sides must agree, so the link back \
+         must lead to {expected}",
         road.id()
     );
     found.issue(link.node(), text).at(place, "the other side");

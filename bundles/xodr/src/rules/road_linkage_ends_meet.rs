@@ -16,7 +16,8 @@ const FAR: Param = Param::number(
     "far",
     20.0,
     "m",
-    "how far a road may end from a junction that has no connection for it, or the junction's size if that is more",
+    "largest accepted distance of a road end from a junction that has no connection for it; the size of the \
+     junction applies if it is larger",
 );
 
 /// Distance in metres below which a road counts as the intended one.
@@ -154,8 +155,8 @@ fn check<'m, 'a>(
         format!(" (the {end} of road `{}` lies there)", road.id())
     });
     let text = format!(
-        "{says} says that the {} of road `{}` meets the {} of road `{}`, but they lie {} m apart{meant}; ends that \
-         meet must lie at one place (less than {limit} m apart)",
+        "{says} states that the {} of road `{}` meets the {} of road `{}`, but they lie {} m apart{meant}; ends \
+         that meet must lie at the same place (less than {limit} m apart)",
         contact.from.end,
         one.id(),
         contact.to.end,
@@ -165,7 +166,7 @@ fn check<'m, 'a>(
     found
         .issue(contact.node, text)
         .at_end(one, contact.from.end)
-        .at(one.node(), "the one road")
+        .at(one.node(), "the first road")
         .at(other.node(), "the other road")
         .at_end(other, contact.to.end);
 }
@@ -278,8 +279,9 @@ fn junction(
         return;
     };
     let text = format!(
-        "the {} of road `{}` is junction `{id}`, but the nearest end of one of the junction's roads lies {apart:.1} m \
-         away, farther than the junction is wide; a road must end at the junction that it names",
+        "the {} of road `{}` is junction `{id}`, but the nearest end of one of the junction's roads lies \
+         {apart:.1} m away, which is more than the size of the junction; a road must end at the junction to \
+         which it links",
         end.link_name(),
         road.id()
     );

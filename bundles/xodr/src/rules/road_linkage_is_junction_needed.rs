@@ -41,7 +41,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "{} to the {} of road `{}`; only one may be linked to an end directly, more than one need a junction",
+            "{} to the {} of road `{}`; only one road may be linked to an end directly, and several roads need a \
+             junction",
             who(&links),
             end.end,
             road.id()

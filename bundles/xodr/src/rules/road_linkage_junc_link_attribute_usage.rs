@@ -29,8 +29,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
 
 fn check(map: &RoadMap<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
     let Some(id) = link.element_id() else {
-        let text = "the link leads to a junction, but has no `elementId` that says to which one; links to \
-                    junctions must have `elementType` and `elementId`";
+        let text = "the link leads to a junction, but has no `elementId` to identify it; links to junctions must \
+                    have `elementType` and `elementId`";
         found.issue(link.node(), text);
         return;
     };
@@ -50,7 +50,7 @@ fn check(map: &RoadMap<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
         };
         if let Some(attribute) = link.node().attribute(name) {
             let text = format!(
-                "the link to junction `{id}` has the attribute `{name}`, which belongs to links to roads; links \
+                "the link to junction `{id}` has the attribute `{name}`, which is only for links to roads; links \
                  to junctions have `elementType` and `elementId`"
             );
             found.issue(attribute, text).level(level);

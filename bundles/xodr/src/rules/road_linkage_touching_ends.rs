@@ -11,13 +11,13 @@ const NEAR: Param = Param::number(
     "near",
     0.05,
     "m",
-    "how near two road ends must be to touch, also in height",
+    "largest distance between two road ends that touch, also in height",
 );
 const TURN: Param = Param::number(
     "turn",
     0.05,
     "rad",
-    "largest difference between their directions",
+    "largest difference between the directions of two road ends that touch",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -103,8 +103,8 @@ fn touch(one: &Open<'_, '_>, other: &Open<'_, '_>, near: f64, turn: f64) -> bool
 
 fn report(one: &Open<'_, '_>, other: &Open<'_, '_>, found: &mut Sink<'_>) {
     let text = format!(
-        "the {} of road `{}` goes on as the {} of road `{}`, but neither names the other, so that routes end there; \
-         roads that go on should be linked in both directions",
+        "the {} of road `{}` continues as the {} of road `{}`, but neither road links to the other, so routes \
+         end there; roads that continue should be linked in both directions",
         one.end,
         one.road.id(),
         other.end,

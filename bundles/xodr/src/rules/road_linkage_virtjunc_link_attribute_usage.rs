@@ -60,7 +60,7 @@ fn superfluous(link: RoadLink<'_>, found: &mut Sink<'_>) {
         };
         let text = format!(
             "the link has `{}`, which is for links into the middle of the main road of a virtual junction; this \
-             one leads to an end of a road and needs `contactPoint` only",
+             link leads to an end of a road and only needs `contactPoint`",
             attribute.name()
         );
         found.issue(attribute, text).level(Level::Information);
@@ -81,8 +81,8 @@ fn within(map: &RoadMap<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
     }
     if let Some(contact) = link.node().attribute("contactPoint") {
         let text = format!(
-            "the link has `contactPoint` besides `elementS` or `elementDir`; it must touch an end of the road \
-             or a place within it, {DEMAND}"
+            "the link has `contactPoint` in addition to `elementS` or `elementDir`; it must lead either to an \
+             end of the road or to a place within it; {DEMAND}"
         );
         found.issue(contact, text);
     }
@@ -99,7 +99,8 @@ fn beyond(map: &RoadMap<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
     };
     if s < -tolerance || s > length + tolerance {
         let text = format!(
-            "elementS is {s}, but road `{}` goes from s = 0 to s = {length}; the link must lead to a place on it",
+            "elementS is {s}, but road `{}` extends from s = 0 to s = {length}; the link must lead to a place on \
+             it",
             road.id()
         );
         // The position does not exist, so this is an error in every version.
@@ -126,7 +127,7 @@ fn at_an_end(map: &RoadMap<'_>, road: &Road<'_>, link: RoadLink<'_>, found: &mut
         }
     }
     let text = format!(
-        "road `{}` of a virtual junction is linked to its main road without saying where; {DEMAND}",
+        "road `{}` of a virtual junction is linked to its main road without a position; {DEMAND}",
         road.id()
     );
     found.issue(link.node(), text);

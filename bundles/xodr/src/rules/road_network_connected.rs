@@ -9,7 +9,7 @@ const SHARE: Param = Param::number(
     "share",
     0.25,
     "",
-    "a piece with at most this share of the length of the largest one is an island",
+    "a part of the network with at most this fraction of the length of the largest part is an island",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -44,11 +44,11 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         };
         let with = match piece.roads {
             1 => String::new(),
-            count => format!(" and {} roads with it", count - 1),
+            count => format!(" and {} roads linked to it", count - 1),
         };
         let text = format!(
-            "road `{}`{with} ({:.0} m in all) has no link to the rest of the map ({} roads, {:.0} m); no route leads \
-             there",
+            "no link leads from road `{}`{with} ({:.0} m in total) to the rest of the map ({} roads, {:.0} m); \
+             no route leads there",
             road.id(),
             piece.length,
             largest.roads,

@@ -22,8 +22,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     };
     // Separate rules cover roads without any lanes.
     if map.lanes().any(|lane| lane.side().is_some()) {
-        let text = "no lane of this map is one that vehicles get along on, such as `driving`; a simulator finds no place \
-                    for them";
+        let text = "no lane of this map has a type for vehicles, such as `driving`; a simulator has no place for \
+                    vehicles";
         found.issue(root, text.to_owned());
     }
 }

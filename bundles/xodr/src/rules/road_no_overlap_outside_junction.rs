@@ -17,13 +17,13 @@ const SHRINK: Param = Param::number(
     "shrink",
     0.05,
     "m",
-    "how far the edges of roads are moved inward first",
+    "distance by which the edges of roads are moved inward before the comparison",
 );
 const CLEARANCE: Param = Param::number(
     "clearance",
     3.0,
     "m",
-    "roads that are so far apart in height lie over each other",
+    "roads with at least this difference in height count as lying above each other",
 );
 
 const INSIDE: &str = "asam.net:xodr:1.4.0:road.overlap_inside_junction";
@@ -219,7 +219,7 @@ fn report(map: &RoadMap<'_>, overlap: &Overlap<'_>, found: &mut Sink<'_>) {
     let [x, y, z] = [overlap.point.x, overlap.point.y, overlap.z];
     if one.road == other.road {
         let text = format!(
-            "road `{}` runs over itself: its lanes around s = {:.1} and s = {:.1} cover the same ground ({:.1} m²)",
+            "road `{}` overlaps itself: its lanes around s = {:.1} and s = {:.1} cover the same area ({:.1} m²)",
             a.id(),
             one.from,
             other.from,
@@ -243,8 +243,8 @@ fn report(map: &RoadMap<'_>, overlap: &Overlap<'_>, found: &mut Sink<'_>) {
         "roads outside of junctions must not overlap"
     };
     let text = format!(
-        "the lanes of road `{}`{} around s = {:.1} and of road `{}`{} around s = {:.1} cover the same ground ({:.1} m²); \
-         {rule}",
+        "the lanes of road `{}`{} around s = {:.1} and of road `{}`{} around s = {:.1} cover the same area \
+         ({:.1} m²); {rule}",
         a.id(),
         belongs(a),
         one.from,

@@ -29,7 +29,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let text = format!(
-                "the outline id `{id}` occurs twice in this object; a border that names it cannot tell them apart"
+                "the outline id `{id}` occurs twice in this object; a border that refers to it is ambiguous"
             );
             found
                 .issue(Place::attribute_or_node(outline, "id"), text)
@@ -53,7 +53,8 @@ fn borders_need_ids<'a>(map: &RoadMap<'a>, list: Node<'a>, found: &mut Sink<'_>)
         .children_named("outline")
         .filter(|outline| outline.attr("id").is_none());
     for outline in nameless {
-        let text = "the outline has no `id`, but each of several outlines needs its own, so that borders can name it";
+        let text = "the outline has no `id`; if there are several outlines, each one needs its own, so that \
+                    borders can refer to it";
         found
             .issue(outline, text)
             .level(Level::Warning)

@@ -27,19 +27,19 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             Some("false" | "0") if references < 2 => (
                 PARTIAL,
                 format!(
-                    "the border does not use the complete outline and names {references} corners; \
-                     it must have at least 2 `cornerReference`"
+                    "the border does not use the complete outline and refers to only {references} corners; it \
+                     must have at least 2 `cornerReference`"
                 ),
             ),
             None | Some("true" | "1") if references > 0 => {
                 let missing = if said.is_none() {
-                    " (as it does when `useCompleteOutline` is missing)"
+                    " (the default if `useCompleteOutline` is missing)"
                 } else {
                     ""
                 };
                 let text = format!(
-                    "the border uses the complete outline{missing}, but names {references} corners; \
-                     it must have no `cornerReference`, or `useCompleteOutline` must be `false`"
+                    "the border uses the complete outline{missing}, but refers to {references} corners; it must \
+                     have no `cornerReference`, or `useCompleteOutline` must be `false`"
                 );
                 (COMPLETE, text)
             }

@@ -21,7 +21,7 @@ const AWAY: Param = Param::number(
     "away",
     5.0,
     "m",
-    "how far beside all lanes of its road a crosswalk may lie",
+    "largest distance between a crosswalk and the lanes of its road that is accepted",
 );
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let away = found.number(&AWAY);
@@ -45,8 +45,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         }
         let text = format!(
-            "{} lies between t = {low:.2} and {high:.2}, but the lanes of road `{}` between {right:.2} and {left:.2}; \
-             a crosswalk should cross lanes",
+            "{} lies between t = {low:.2} and {high:.2}, but the lanes of road `{}` lie between {right:.2} and \
+             {left:.2}; a crosswalk should cross lanes",
             named(object.node()),
             road.id()
         );

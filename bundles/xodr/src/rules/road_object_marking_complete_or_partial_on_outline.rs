@@ -31,8 +31,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             let foreign = outlines(marking.object).find_map(|outline| point(outline, id));
             if let Some(foreign) = foreign {
                 let text = format!(
-                    "the marking refers to the point `{id}`, which belongs to another outline of {}; \
-                     it must lie on the outline in which it is defined",
+                    "the marking refers to the point `{id}`, which belongs to another outline of {}; a marking \
+                     must lie on the outline in which it is defined",
                     named(marking.object)
                 );
                 found

@@ -26,8 +26,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         );
         for markings in outside {
             let text = format!(
-                "the markings stand in `{}`, but {} has an outline; since 1.9 they must stand in the outline on \
-                 which they lie (1.8 knew no other place than the object)",
+                "the markings are defined in `{}`, but {} has an outline; since 1.9 they must be defined in the \
+                 outline on which they lie (1.8 only allows them in the object)",
                 markings.parent().map_or("", |parent| parent.name()),
                 named(object)
             );

@@ -30,7 +30,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             None => continue,
         };
         let text = format!(
-            "the markings stand in `{}`; where there is no outline, they must stand in the `object`",
+            "the markings are defined in `{}`; without an outline, they must be defined in the `object`",
             parent.name()
         );
         found.issue(markings, text).stands(map, place);

@@ -23,7 +23,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 .flat_map(|list| list.children_named(part));
             for reference in parts.filter_map(|part| part.child("cornerReference")) {
                 let text = format!(
-                    "the {part} refers to a corner, but {} has no outline; without one there must be no `cornerReference`",
+                    "the {part} refers to a corner, but {} has no outline; without an outline, there must be no \
+                     `cornerReference`",
                     named(object)
                 );
                 found.issue(reference, text).stands(map, object);

@@ -24,8 +24,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         };
         let encloses = first == end;
         if encloses && path.is_closed() == Some(false) {
-            let text = "the marking ends at the point at which it begins, but its outline is not closed; \
-                        only a closed outline can be enclosed";
+            let text = "the marking ends at the point where it starts, but its outline is not closed; only a \
+                        closed outline can be enclosed";
             found
                 .issue(*last, text)
                 .stands(map, marking.object)
@@ -33,8 +33,9 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         }
         let names_all = path.points.len() > 2 && path.steps.len() == path.points.len();
         if !encloses && names_all && path.is_closed() == Some(true) && each_once(&path) {
-            let text = "the marking names each point of its closed outline once and leaves the last side open; \
-                        to enclose the outline, it must end with the `cornerReference` with which it begins";
+            let text = "the marking refers to each point of its closed outline once and leaves the last side \
+                        open; to enclose the outline, it must end with the `cornerReference` with which it \
+                        starts";
             found
                 .issue(marking.node, text)
                 .level(Level::Information)

@@ -36,8 +36,9 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 to.attr("id").unwrap_or_default(),
             );
             let text = format!(
-                "the marking leads from point `{a}` to point `{b}`, which are not neighbours on the outline; \
-                 it includes what lies between ({between} more of its points), although readers of 1.8 draw a straight line"
+                "the marking leads from point `{a}` to point `{b}`, which are not neighbours on the outline; it \
+                 includes the outline between them ({between} more points), although readers of 1.8 draw a \
+                 straight line"
             );
             found
                 .issue(*to, text)

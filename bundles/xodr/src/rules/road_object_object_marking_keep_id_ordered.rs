@@ -31,7 +31,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         };
         let id = |node: &Node<'_>| node.attr("id").unwrap_or_default().to_owned();
         let text = format!(
-            "the marking refers to point `{}` after point `{}`; references must have the order of the outline's points",
+            "the marking refers to point `{}` after point `{}`; references must follow the order of the \
+             outline's points",
             id(reference),
             id(before)
         );

@@ -18,7 +18,8 @@ pub static RULE: Rule<Roads> = Rule {
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for object in objects(map).filter(|object| is_blank(*object, "orientation")) {
         let text = format!(
-            "{} has no `orientation`, but must say whether it is valid along the road (`+`), against it (`-`) or both (`none`)",
+            "{} has no `orientation`; it must define whether the object is valid along the road (`+`), against \
+             it (`-`) or in both directions (`none`)",
             named(object)
         );
         let place = Place::attribute_or_node(object, "orientation");

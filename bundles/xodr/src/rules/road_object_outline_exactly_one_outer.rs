@@ -24,7 +24,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         }
         let text = format!(
-            "{} of {} outlines are outer ones (those without `outer` count); exactly one must be",
+            "{} of {} outlines are outer outlines (an outline without `outer` counts as one); exactly one must \
+             be an outer outline",
             outer.len(),
             all.len()
         );

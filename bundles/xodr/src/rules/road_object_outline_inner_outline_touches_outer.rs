@@ -11,7 +11,7 @@ const TOUCH: Param = Param::number(
     "touch",
     0.01,
     "m",
-    "how near a corner must be to touch the other outline",
+    "largest distance between a corner and the other outline at which they touch",
 );
 
 /// Maximum distance in metres of corners that count as the same point.
@@ -81,7 +81,8 @@ fn check<'a>(
     let touches = distance <= found.number(&TOUCH);
     let shared = shape.iter().any(|other| other.distance(point) <= SAME);
     let what = if touches && !shared {
-        "touches the outer outline between its corners; where they touch, both must have a corner at that point"
+        "touches the outer outline between its corners; both outlines must have a corner at the point where they \
+         touch"
     } else if !touches && !contains(shape, point) {
         "lies outside of the outer outline; inner outlines must lie inside"
     } else {

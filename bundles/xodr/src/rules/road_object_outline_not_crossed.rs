@@ -57,8 +57,8 @@ fn check(road: &Road<'_>, object: &Object<'_>, outline: &Outline<'_>, found: &mu
             };
             if cross([first.0.1, first.1.1], [second.0.1, second.1.1]) {
                 let text = format!(
-                    "the outline of {} crosses itself: its side from corner {} to the next meets the one from corner {}; \
-                     the corners should go around once",
+                    "the outline of {} crosses itself: its side from corner {} to the next one meets the side \
+                     from corner {}; the corners should go around the outline once",
                     named(object.node()),
                     one + 1,
                     other + 1
@@ -66,8 +66,8 @@ fn check(road: &Road<'_>, object: &Object<'_>, outline: &Outline<'_>, found: &mu
                 found
                     .issue(outline.node(), text)
                     .on(road, object.s().unwrap_or(0.0), object.t().unwrap_or(0.0))
-                    .at(first.0.0, "where the one side begins")
-                    .at(second.0.0, "where the other begins");
+                    .at(first.0.0, "the start of one side")
+                    .at(second.0.0, "the start of the other side");
                 return;
             }
         }

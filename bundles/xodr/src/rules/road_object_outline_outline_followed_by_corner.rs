@@ -33,8 +33,7 @@ fn check<'a>(map: &RoadMap<'a>, object: Node<'a>, outline: Node<'a>, found: &mut
     let [road, local, curves] = CORNERS.map(|sort| outline.children_named(sort).count());
     let is_closed = matches!(outline.attr("closed"), Some("true" | "1"));
     if is_closed && road.max(local) == 2 && curves == 0 {
-        let text =
-            "the outline is closed, but two corners enclose no area; that needs at least three";
+        let text = "the outline is closed, but two corners enclose no area; a closed outline needs at least three";
         let mild = if is_before(found, (1, 7)) {
             Level::Information
         } else {
@@ -61,15 +60,16 @@ fn check<'a>(map: &RoadMap<'a>, object: Node<'a>, outline: Node<'a>, found: &mut
         ),
         (0, 0, Some(shape)) => {
             let text = format!(
-                "the outline has no `curveLocal`, but a `{}` of its own; at least 1 `curveLocal` must hold the curve",
+                "the outline has no `curveLocal`, but contains a `{}` itself; at least 1 `curveLocal` must \
+                 contain the curve",
                 shape.name()
             );
             (CURVE, text)
         }
         _ => {
             let text = format!(
-                "the outline has {road} `cornerRoad`, {local} `cornerLocal` and no `curveLocal`; \
-                 it needs at least 2, 2 or 1 of them"
+                "the outline has {road} `cornerRoad`, {local} `cornerLocal` and no `curveLocal`; it needs at \
+                 least 2, 2 or 1 of them respectively"
             );
             (OUTLINE, text)
         }

@@ -110,7 +110,7 @@ fn flat<'a>(map: &RoadMap<'a>, object: Node<'a>, found: &mut Sink<'_>) {
         zero
     };
     let text = format!(
-        "`{zero}` of {} of type `{}` is 0 m, though its `{other}` is not; a body should have an extent in all \
+        "`{zero}` of {} of type `{}` is 0 m, but its `{other}` is not; a body should have an extent in all \
          directions",
         named(object),
         object.attr("type").unwrap_or_default()

@@ -40,7 +40,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 .collect();
             let Some(first) = given.first() else { continue };
             let text = format!(
-                "the repeat changes {}, but {} has a shape of its own, `{}`, whose size cannot change",
+                "the repeat changes {}, but {} has its own shape, `{}`; the size of a shape cannot change",
                 listed(&given),
                 named(object),
                 shape.name()

@@ -20,7 +20,7 @@ const MOST: Param = Param::number(
     "most",
     10_000.0,
     "",
-    "the most copies that a repetition may make",
+    "largest number of copies that is accepted for a repetition",
 );
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
@@ -38,8 +38,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 continue;
             }
             let text = format!(
-                "{} is repeated every {distance} m over {length} m, which makes {count:.0} copies; at most {most} are \
-                 accepted, and one long object is a `distance` of 0",
+                "{} is repeated every {distance} m over {length} m, which makes {count:.0} copies; at most \
+                 {most} are accepted; for one long object, use a `distance` of 0",
                 named(object.node())
             );
             found

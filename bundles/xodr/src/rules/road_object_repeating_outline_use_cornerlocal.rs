@@ -25,8 +25,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let text = format!(
-                "{} is repeated, but its outline has `cornerRoad`, which stay where they are on the road; \
-                 it must have `cornerLocal`",
+                "{} is repeated, but its outline has `cornerRoad`, which have a fixed position on the road; it \
+                 must have `cornerLocal`",
                 named(object)
             );
             found

@@ -25,7 +25,8 @@ const TOLERANCE: Param = Param::number(
     "s_tolerance",
     1e-3,
     "m",
-    "how far beyond the ends of the road a repetition may reach, and how far the cubic for t may miss `tEnd`",
+    "largest distance by which a repetition may extend beyond the ends of the road, or by which the cubic for t \
+     may miss `tEnd`",
 );
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
@@ -52,7 +53,7 @@ fn along<'a>(map: &RoadMap<'a>, repeat: Node<'a>, tolerance: f64, found: &mut Si
             found.issue(Place::attribute_or_node(repeat, "length"), text);
         }
     } else if length == 0.0 && number(repeat, "distance") == Some(0.0) {
-        let text = "the repetition is a continuous one of length 0 m, of which nothing remains";
+        let text = "the repetition is continuous and has a length of 0 m, so it produces no object";
         found
             .issue(Place::attribute_or_node(repeat, "length"), text)
             .level(if older {
@@ -84,7 +85,7 @@ fn along<'a>(map: &RoadMap<'a>, repeat: Node<'a>, tolerance: f64, found: &mut Si
         return;
     };
     let text = format!(
-        "{text}, but road `{}` reaches from 0 to {} m",
+        "{text}, but road `{}` extends from 0 to {} m",
         road.id(),
         shown::number(end)
     );
@@ -118,7 +119,7 @@ fn across(repeat: Node<'_>, tolerance: f64, found: &mut Sink<'_>) {
     let t = start + length * (b + length * (c + length * d));
     if (t - end).abs() > tolerance {
         let text = format!(
-            "the cubic for t arrives at {t} m at the end of the repetition, but `tEnd` is {end} m; they must be equal"
+            "the cubic for t gives {t} m at the end of the repetition, but `tEnd` is {end} m; they must be equal"
         );
         found
             .issue(Place::attribute_or_node(repeat, "tEnd"), text)

@@ -21,7 +21,7 @@ const TOLERANCE: Param = Param::number(
     "s_tolerance",
     1e-3,
     "m",
-    "how far beyond the ends of the road `s` may lie",
+    "largest distance of `s` beyond the ends of the road that is accepted",
 );
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
@@ -51,7 +51,7 @@ fn on_road<'a>(map: &RoadMap<'a>, object: Node<'a>, tolerance: f64, found: &mut 
     let Some(length) = road.length() else { return };
     if s < -tolerance || s > length + tolerance {
         let text = format!(
-            "{} stands at s = {s} m, but road `{}` reaches from 0 to {length} m",
+            "{} is at s = {s} m, but road `{}` extends from 0 to {length} m",
             named(object),
             road.id()
         );

@@ -9,19 +9,20 @@ const SLENDER: Param = Param::number(
     "slender",
     60.0,
     "m",
-    "greatest size that is believed of a pole, a lamp, a tree, a barrier's height and the like",
+    "largest plausible size of poles, lamps, trees and the like, and largest plausible height of barriers and \
+     the like",
 );
 const LARGE: Param = Param::number(
     "large",
     1000.0,
     "m",
-    "greatest size that is believed of a building, and height of anything",
+    "largest plausible size of a building, and largest plausible height of any object",
 );
 const SIGNAL: Param = Param::number(
     "signal",
     50.0,
     "m",
-    "greatest width and height that is believed of a signal",
+    "largest plausible width and height of a signal",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -103,7 +104,7 @@ fn check<'a>(
         _ => named(node),
     };
     let text = format!(
-        "`{name}` of {of} is {size} m; sizes are in metres, and more than {limit} m is hardly meant"
+        "`{name}` of {of} is {size} m; more than {limit} m is implausible; sizes are in metres"
     );
     found
         .issue(Place::attribute_or_node(node, name), text)

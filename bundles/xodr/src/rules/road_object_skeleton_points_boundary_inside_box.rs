@@ -28,7 +28,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             road,
             &object,
             &points,
-            "the skeleton, even without the width of its ends,",
+            "the skeleton (even without the width of its ends)",
             found,
         );
     }

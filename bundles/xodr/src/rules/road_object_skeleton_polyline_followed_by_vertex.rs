@@ -34,7 +34,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             ),
             (0 | 1, 0 | 1) => {
                 let text = format!(
-                    "the polyline has {road} `vertexRoad` and {local} `vertexLocal`; it needs at least 2 of one sort"
+                    "the polyline has {road} `vertexRoad` and {local} `vertexLocal`; it needs at least 2 of the \
+                     same kind"
                 );
                 (POLYLINE, text)
             }

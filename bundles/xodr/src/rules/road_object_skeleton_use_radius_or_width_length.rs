@@ -33,13 +33,13 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let first = |is: fn(Node<'_>) -> bool| all.iter().copied().find(|node| is(*node));
         let (uid, text, places) = match (first(is_round), first(is_box), first(is_bare)) {
             (Some(round), Some(boxy), _) => {
-                let text = "the polyline gives the size of its vertices both by `radius` and by `width` or `length`; \
-                            all must use the same";
+                let text = "the polyline defines the size of its vertices both by `radius` and by `width` or \
+                            `length`; all vertices must use the same attributes";
                 (sort, text, [round, boxy])
             }
             (Some(sized), None, Some(bare)) | (None, Some(sized), Some(bare)) => {
-                let text =
-                    "some vertices of the polyline give a size and others none; all or none must";
+                let text = "some vertices of the polyline have a size and others do not; either all or none must have \
+                     one";
                 (ONE_WAY, text, [sized, bare])
             }
             _ => continue,

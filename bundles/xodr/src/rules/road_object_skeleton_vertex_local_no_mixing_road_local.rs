@@ -30,7 +30,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "the polyline mixes {} `vertexRoad` with {} `vertexLocal`; all of its vertices must be of one sort",
+            "the polyline mixes {} `vertexRoad` with {} `vertexLocal`; all of its vertices must be of the same \
+             kind",
             vertices.road.len(),
             vertices.local.len()
         );

@@ -30,8 +30,9 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         let curvature = sharpest(road, s - 0.5 * length, s + 0.5 * length);
         if curvature > 0.0 && size * curvature >= 1.0 {
             let text = format!(
-                "object `{}` is {size:.2} m large, but the elevation below it has a radius of {:.2} m; `perpToRoad` should \
-                 only be used for objects that are smaller, or their surfaces are skewed",
+                "object `{}` has a size of {size:.2} m, but the elevation below it has a radius of {:.2} m; \
+                 `perpToRoad` should only be used for smaller objects, because it skews the surfaces of larger \
+                 ones",
                 object.id().unwrap_or_default(),
                 1.0 / curvature
             );

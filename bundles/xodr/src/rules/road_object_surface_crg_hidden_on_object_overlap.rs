@@ -47,8 +47,8 @@ fn check(road: &Road<'_>, object: &Object<'_>, crg: &Crg<'_>, found: &mut Sink<'
     });
     if let Some(below) = below {
         let text = format!(
-            "the surface of object `{}` hides the road's, but lies over a CRG with mode `{}`; with any mode but \
-             `attached`, `hideRoadSurfaceCRG` must be false",
+            "the surface of object `{}` hides the road surface, but lies over a CRG with mode `{}`; with any \
+             mode other than `attached`, `hideRoadSurfaceCRG` must be false",
             object.id().unwrap_or_default(),
             below.mode().unwrap_or_default()
         );

@@ -13,7 +13,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.01,
     "m",
-    "how far one box may reach into the other",
+    "largest distance by which one box may extend into the other",
 );
 
 /// Maximum number of compared pairs of boxes.
@@ -79,7 +79,8 @@ fn report(one: &SurfaceBox<'_, '_>, other: &SurfaceBox<'_, '_>, found: &mut Sink
         )
     } else {
         format!(
-            "objects `{}` and `{}` both have a surface, and their bounding volumes overlap; they must not",
+            "objects `{}` and `{}` both have a surface, and their bounding volumes overlap; bounding volumes of \
+             objects with a surface must not overlap",
             id(one),
             id(other)
         )

@@ -13,13 +13,13 @@ const AREA: Param = Param::number(
     "area",
     0.01,
     "m²",
-    "largest part of a road's lanes that an object may cover without being referenced",
+    "largest area of a road's lanes that an object may cover without a reference",
 );
 const CLEARANCE: Param = Param::number(
     "clearance",
     1.0,
     "m",
-    "roads that are farther above or below the object are not covered",
+    "roads that are farther than this above or below the object are not covered",
 );
 
 /// Length of the compared pieces of roads, and inward shift of their edges, in metres.
@@ -142,7 +142,7 @@ fn report(one: &SurfaceBox<'_, '_>, roads: &[&Road<'_>], found: &mut Sink<'_>) {
         .map(|road| format!("`{}`", road.id()))
         .collect();
     let text = format!(
-        "the surface of object `{}` reaches onto road{} {}, where no `objectReference` names it; each road that it \
+        "the surface of object `{}` extends onto road{} {} without an `objectReference` there; each road that it \
          covers must refer to it",
         one.object.id().unwrap_or_default(),
         if names.len() == 1 { "" } else { "s" },
@@ -155,6 +155,6 @@ fn report(one: &SurfaceBox<'_, '_>, roads: &[&Road<'_>], found: &mut Sink<'_>) {
         .iter()
         .take(MAX_PLACES)
         .fold(finding, |finding, road| {
-            finding.at(road.node(), "a road without reference")
+            finding.at(road.node(), "a road without a reference")
         });
 }

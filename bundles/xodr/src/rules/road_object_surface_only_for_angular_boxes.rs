@@ -33,7 +33,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "{} has a surface, but {why}; only objects with `length` and `width` and without outline may have one",
+            "{} has a surface, but {why}; only objects with `length` and `width` and without an outline may have \
+             one",
             named(object)
         );
         found.issue(surface, text).stands(map, object);

@@ -24,7 +24,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         };
         for (index, record) in records.enumerate() {
             let text = format!(
-                "this is CRG record {} of {}; an object may have one only",
+                "this is CRG record {} of {}; an object may have only one",
                 index + 2,
                 named(object)
             );

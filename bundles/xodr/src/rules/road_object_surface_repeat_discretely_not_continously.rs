@@ -25,8 +25,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         for repeat in object.children_named("repeat") {
             if number(repeat, "distance").is_some_and(|distance| distance.abs() <= SAME) {
                 let text = format!(
-                    "{} has a surface and is repeated continuously (`distance` is 0); \
-                     it may be repeated as single copies only",
+                    "{} has a surface and is repeated continuously (`distance` is 0); it may only be repeated as \
+                     separate copies",
                     named(object)
                 );
                 found

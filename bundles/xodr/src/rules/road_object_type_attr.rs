@@ -47,10 +47,11 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             .find(|(name, since, _)| *name == kind && version.is_some_and(|v| v >= *since));
         if let Some((_, since, instead)) = known {
             let advice = match *instead {
-                "" => "such things are no objects of a road".to_owned(),
-                instead => format!("`{instead}` is to be used instead"),
+                "" => "such things are not road objects".to_owned(),
+                instead => format!("use `{instead}` instead"),
             };
-            let text = format!("the object type `{kind}` is deprecated since {since}; {advice}");
+            let text =
+                format!("the object type `{kind}` has been deprecated since {since}; {advice}");
             found
                 .issue(place, text)
                 .level(Level::Information)

@@ -22,8 +22,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         let Some(first) = rails.next() else { continue };
         for lane in rails {
             let text = format!(
-                "lane `{}` of road `{}` is a `{}` lane beside lane `{}`, which is a `{}` lane already; \
-                 a road may have one tram or rail lane only",
+                "lane `{}` of road `{}` is a `{}` lane, but lane `{}` is already a `{}` lane; a road may have \
+                 only one tram or rail lane",
                 lane.id_text().unwrap_or_default(),
                 section.road.id(),
                 lane.kind().unwrap_or_default(),
@@ -32,7 +32,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             );
             found
                 .issue(Place::attribute_or_node(lane.node(), "type"), text)
-                .at(first.node(), "the first of them");
+                .at(first.node(), "the first of these lanes");
         }
     }
 }

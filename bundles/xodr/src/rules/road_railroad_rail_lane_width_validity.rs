@@ -5,8 +5,8 @@ use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::rails::rail_lanes;
 use crate::model::Roads;
 
-const TRAM: Param = Param::number("tram", 2.2, "m", "least width of a lane for trams");
-const RAIL: Param = Param::number("rail", 2.6, "m", "least width of a lane for trains");
+const TRAM: Param = Param::number("tram", 2.2, "m", "smallest width of a lane for trams");
+const RAIL: Param = Param::number("rail", 2.6, "m", "smallest width of a lane for trains");
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_railroad_rail_lane_width_validity",
@@ -40,8 +40,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "{} is for type `{kind}`, but only {width:.2} m wide at s = {:.2}; it must be as wide as the vehicles on \
-             it, taken to be {limit} m",
+            "{} has type `{kind}`, but is only {width:.2} m wide at s = {:.2}; it must be at least as wide as \
+             the vehicles on it (assumed: {limit} m)",
             lane_name(lane),
             lane.at.s().unwrap_or(0.0) + ds
         );

@@ -10,7 +10,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.05,
     "m",
-    "how far the middle of the lane may lie from the reference line",
+    "largest distance between the middle of the lane and the reference line that is accepted",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -42,8 +42,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "the middle of {} of type `{kind}` lies {:.2} m beside the reference line at s = {:.2}; the reference line \
-             must run in the middle between the rails",
+            "the middle of {} of type `{kind}` lies {:.2} m from the reference line at s = {:.2}; the reference \
+             line must run in the middle between the rails",
             lane_name(lane),
             worst.value.abs(),
             worst.at

@@ -63,8 +63,8 @@ fn connection(switch: Switch<'_>, partner: Switch<'_>, found: &mut Sink<'_>) {
     };
     if switch.node() != partner.node() && side.id().is_some() && side.id() == main.id() {
         let text = format!(
-            "the side track of {} leads to road `{}`, which is the main track of its partner {}; \
-             two switches must be joined by a side track of both",
+            "the side track of {} leads to road `{}`, which is the main track of its partner {}; two switches \
+             must be joined by a common side track",
             named(switch.node()),
             side.id().unwrap_or_default(),
             named(partner.node())

@@ -34,20 +34,21 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let (here, there) = (side(switch), side(*partner));
         let (this, other) = (named(switch.node()), named(partner.node()));
         let text = if switch.node() == partner.node() {
-            format!("{this} is its own partner; a switch that stands alone must have none")
+            format!("{this} is its own partner; a single switch must not have a partner")
         } else if let (Some(here), Some(there)) = (&here, &there)
             && here != there
         {
             format!(
-                "the side track of {this} is road `{here}`, that of its partner {other} is road `{there}`; \
-                 only switches that are joined by one side track may be partners"
+                "the side track of {this} is road `{here}`, but that of its partner {other} is road `{there}`; \
+                 only switches that are joined by the same side track may be partners"
             )
         } else if partner.partner_id() != switch.id() {
             let has = partner
                 .partner_id()
                 .map_or("none".to_owned(), |id| format!("switch `{id}`"));
             format!(
-                "the partner of {this} is {other}, but the partner of that is {has}; partners must name each other"
+                "the partner of {this} is {other}, but the partner of the latter is {has}; partners must refer \
+                 to each other"
             )
         } else {
             continue;

@@ -35,7 +35,7 @@ fn check<'a>(map: &RoadMap<'a>, node: Node<'a>, what: &str, found: &mut Sink<'_>
         return;
     };
     let text = format!(
-        "{what} begins at s = {start} and ends before that, at s = {end}; `sEnd` should be the larger one"
+        "{what} starts at s = {start}, but ends before that at s = {end}; `sEnd` should be the larger value"
     );
     let finding = found.issue(Place::attribute_or_node(node, "sEnd"), text);
     let road = node.attr("roadId").and_then(|id| map.road(id));

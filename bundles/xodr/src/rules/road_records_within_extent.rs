@@ -18,21 +18,25 @@ pub static RULE: Rule<Roads> = Rule {
     ..Rule::DEFAULTS
 };
 
-const TOLERANCE: Param =
-    Param::number("tolerance", 1e-3, "m", "how far beyond the end is accepted");
+const TOLERANCE: Param = Param::number(
+    "tolerance",
+    1e-3,
+    "m",
+    "largest distance beyond the end that is accepted",
+);
 
 const ROADSIDE: Param = Param::number(
     "roadside",
     0.05,
     "m",
-    "how far beyond the end signals, references, tunnels and bridges are accepted",
+    "largest distance beyond the end that is accepted for signals, references, tunnels and bridges",
 );
 
 const CLEAR: Param = Param::number(
     "clear",
     1.0,
     "m",
-    "how far beyond the end signals, references, tunnels and bridges may lie without being an error",
+    "distance beyond the end above which signals, references, tunnels and bridges are errors",
 );
 
 /// The records of a lane that start at `sOffset`.
@@ -143,7 +147,7 @@ impl Extent<'_> {
                 continue;
             };
             let text = format!(
-                "{} stands at s = {}, but {} is {} m long; it must stand on the road",
+                "{} is at s = {}, but {} is {} m long; it must lie on the road",
                 named(node),
                 shown::number(s),
                 self.what,
@@ -169,7 +173,7 @@ impl Extent<'_> {
             };
             if s + length > limit {
                 let text = format!(
-                    "{} reaches from s = {} to s = {}, but {} is {} m long; it must end on the road",
+                    "{} extends from s = {} to s = {}, but {} is {} m long; it must end on the road",
                     named(node),
                     shown::number(s),
                     shown::number(s + length),
@@ -202,7 +206,7 @@ impl Extent<'_> {
         };
         if !is_by_schema(found, (1, 5), (1, 8)) {
             let text = format!(
-                "{} has s = {s}, but {} begins at s = 0; no s is less than that",
+                "{} has s = {s}, but {} starts at s = 0; s must not be less than that",
                 named(node),
                 self.what
             );
@@ -231,8 +235,8 @@ impl Extent<'_> {
             return;
         };
         let text = format!(
-            "this `{name}` starts at {by} = {}, but {what} is {} m long; it should start before the end, as it never \
-             applies otherwise",
+            "this `{name}` starts at {by} = {}, but {what} is {} m long; it should start before the end, because \
+             otherwise it never applies",
             shown::number(start),
             shown::number(length)
         );

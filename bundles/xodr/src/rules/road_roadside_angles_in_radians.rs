@@ -24,7 +24,7 @@ const LARGE: Param = Param::number(
     "large",
     100.0,
     "rad",
-    "an angle beyond this is taken for degrees, even if it is no round number",
+    "an angle beyond this counts as degrees, even if it is not a round number",
 );
 
 const ANGLES: [&str; 4] = ["hOffset", "hdg", "pitch", "roll"];
@@ -38,7 +38,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 .filter_map(|name| in_degrees(thing, name, large))
             {
                 let text = format!(
-                    "`{name}` of {} is {angle}, which is {:.1} full turns; angles are in radians: {angle}° are {:.4}",
+                    "`{name}` of {} is {angle}, which is {:.1} full turns; angles are in radians ({angle}° = \
+                     {:.4})",
                     named(thing),
                     angle.abs() / TAU,
                     angle.to_radians()

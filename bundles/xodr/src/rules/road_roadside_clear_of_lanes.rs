@@ -22,13 +22,13 @@ const DEPTH: Param = Param::number(
     "depth",
     0.5,
     "m",
-    "how far within a lane something may stand before it is in the way",
+    "largest distance inside a lane at which an object does not block the lane",
 );
 const CLEARANCE: Param = Param::number(
     "clearance",
     2.0,
     "m",
-    "from which height above the road on vehicles pass below",
+    "height above the road from which vehicles can pass below an object",
 );
 
 /// Types of lanes with regular vehicle traffic.
@@ -99,8 +99,8 @@ fn copies(road: &Road<'_>, object: Node<'_>, repeat: Node<'_>, row: &Row, found:
         return;
     };
     let text = format!(
-        "a copy of {} of type `{}` stands in the middle of {} at s = {s:.1}, {:.2} m from its border; copies \
-         stand at `tStart` to `tEnd` of `repeat`, which should be beside it",
+        "a copy of {} of type `{}` stands inside {} at s = {s:.1}, {:.2} m from its border; copies are placed \
+         from `tStart` to `tEnd` of `repeat`, which should lie beside the lane",
         named(object),
         object.attr("type").unwrap_or_default(),
         lane_name(spot.lane),
@@ -133,8 +133,8 @@ fn crossing(road: &Road<'_>, object: Node<'_>, repeat: Node<'_>, row: &Row, foun
         return;
     }
     let text = format!(
-        "{} of type `{}` goes from t = {from} at s = {s:.1} to t = {to} at s = {end:.1}, across all driving lanes \
-         of road `{}`; what goes along a road should stay on one side of them",
+        "{} of type `{}` runs from t = {from} at s = {s:.1} to t = {to} at s = {end:.1}, across all driving \
+         lanes of road `{}`; an object along a road should stay on one side of its driving lanes",
         named(object),
         object.attr("type").unwrap_or_default(),
         road.id()
@@ -180,7 +180,7 @@ fn object(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
     {
         return;
     }
-    report(road, node, "should stand beside it", found);
+    report(road, node, "should stand beside the lane", found);
 }
 
 fn parking(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
@@ -188,7 +188,7 @@ fn parking(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
         report(
             road,
             node,
-            "should lie beside it or on a lane for parking",
+            "should lie beside the lane or on a lane for parking",
             found,
         );
     }
@@ -206,7 +206,7 @@ fn sign(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
     };
     let anywhere = || number(node, "t").is_some_and(|t| t.abs() < 1e-6);
     if in_the_way && !anywhere() {
-        report(road, node, "should stand beside it", found);
+        report(road, node, "should stand beside the lane", found);
     }
 }
 
@@ -226,9 +226,9 @@ fn report(road: &Road<'_>, node: Node<'_>, should: &str, found: &mut Sink<'_>) {
         return;
     };
     let part = if (s, t) == origin {
-        "stands in the middle of"
+        "stands inside"
     } else {
-        "reaches with a corner into"
+        "has a corner inside"
     };
     let text = format!(
         "{} of type `{}` {part} {}, {:.2} m from its border; it {should}",

@@ -22,37 +22,37 @@ const FAR_SIGNAL: Param = Param::number(
     "far_signal",
     100.0,
     "m",
-    "how far beside all roads a signal may stand",
+    "largest distance between a signal and the nearest road that is accepted",
 );
 const FAR_OBJECT: Param = Param::number(
     "far_object",
     500.0,
     "m",
-    "how far beside all roads an object may stand",
+    "largest distance between an object and the nearest road that is accepted",
 );
 const HIGH: Param = Param::number(
     "high",
     30.0,
     "m",
-    "how high above its road an object may begin, which is more beside the road",
+    "largest height above its road at which an object may begin; the limit is larger beside the road",
 );
 const HIGH_SIGNAL: Param = Param::number(
     "high_signal",
     20.0,
     "m",
-    "how high above its road a signal may hang",
+    "largest height above its road at which a signal may hang",
 );
 const DEEP: Param = Param::number(
     "deep",
     20.0,
     "m",
-    "how deep below its road an object may begin, which is more beside the road",
+    "largest depth below its road at which an object may begin; the limit is larger beside the road",
 );
 const DEEP_SIGNAL: Param = Param::number(
     "deep_signal",
     2.0,
     "m",
-    "how deep below its road a signal may begin",
+    "largest depth below its road at which a signal may begin",
 );
 
 /// Maximum change of the ground height per metre beside the road.
@@ -114,8 +114,8 @@ fn beside_all(
         (true, _) => "the repetition ends".to_owned(),
     };
     let text = format!(
-        "{what} {distance:.0} m beside the lanes of road `{}`, and no other road is near; {whose} should stand \
-         within {far} m of a road",
+        "{what} {distance:.0} m away from the lanes of road `{}`, and no other road is near; {whose} should \
+         stand within {far} m of a road",
         road.id()
     );
     found
@@ -158,8 +158,8 @@ fn above_or_below(road: &Road<'_>, thing: Node<'_>, [up, across]: [&str; 2], fou
         format!("{} begins", named(thing))
     };
     let text = format!(
-        "{name} {:.1} m {word} the reference line of road `{}`; `{up}` counts metres from there, at most {:.0} m \
-         are plausible here",
+        "{name} {:.1} m {word} the reference line of road `{}`; `{up}` is in metres relative to that line; at \
+         most {:.0} m are plausible here",
         z.abs(),
         road.id(),
         limit + ground

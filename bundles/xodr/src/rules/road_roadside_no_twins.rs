@@ -23,7 +23,7 @@ const NEAR: Param = Param::number(
     "near",
     0.01,
     "m",
-    "the grid in which places count as the same",
+    "grid size within which positions count as the same",
 );
 
 /// Attributes that distinguish two signals or objects at one place.
@@ -89,7 +89,7 @@ fn twins(road: &Road<'_>, group: &[Stand<'_>], grid: f64, found: &mut Sink<'_>) 
             continue;
         }
         let text = format!(
-            "{} stands where {} stands already, and is of the same kind; one of them should go",
+            "{} has the same position and kind as {}; one of them should be removed",
             named(thing),
             named(first)
         );

@@ -68,8 +68,8 @@ fn check(road: &Road<'_>, lateral: Node<'_>, found: &mut Sink<'_>) {
                 false => Level::Error,
             };
             let text = format!(
-                "this `shape` has s = {}, t = {} like the one listed before it, which therefore never \
-                 applies; each must have a place of its own",
+                "this `shape` has s = {}, t = {} like the one listed before it, which therefore never applies; \
+                 each must have its own position",
                 number(s),
                 number(t)
             );

@@ -7,7 +7,7 @@ const STEP: Param = Param::number(
     "step",
     0.3,
     "m",
-    "greatest step across a road that is believed, as of a high kerb",
+    "largest plausible step across a road, such as that of a high kerb",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -45,8 +45,8 @@ fn check(road: &str, row: &ShapeRow<'_>, found: &mut Sink<'_>) {
     if let Some(step) = highest {
         let (node, t, before, after) = step;
         let text = format!(
-            "the cross section of road `{road}` at s = {} steps from {before:.3} m to {after:.3} m at t = {t}; the \
-             shapes of one cross section should join, and more than {limit} m is no kerb",
+            "the cross section of road `{road}` at s = {} steps from {before:.3} m to {after:.3} m at t = {t}; \
+             the shapes of one cross section should join, and a step of more than {limit} m is not a kerb",
             row.s
         );
         found.issue(node, text).road(road, row.s, t);

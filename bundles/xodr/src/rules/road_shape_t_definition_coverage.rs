@@ -11,7 +11,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.001,
     "m",
-    "how much of the road's right edge a shape may leave out",
+    "largest width at the right edge of the road that the shapes may leave uncovered",
 );
 
 const STARTS_RIGHT: &str = "asam.net:xodr:1.9.0:road.use_cases.shape_elements_start_right";
@@ -68,7 +68,7 @@ fn check(road: &Road<'_>, edge: Minimum, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "the shapes at s = {} begin at t = {}, but the lanes of road `{}` reach to t = {:.3} on the right \
+            "the shapes at s = {} begin at t = {}, but the lanes of road `{}` extend to t = {:.3} on the right \
              (at s = {:.2}); shapes must cover the whole width of the road",
             number(row.s),
             number(begin),

@@ -32,8 +32,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             0 => (Level::Warning, "there is no `sign` on the static board"),
             1 => (
                 Level::Error,
-                "there is a single `sign` on the static board; it must be a `signal` of its own, \
-                 boards are for several",
+                "there is a single `sign` on the static board; it must be a separate `signal`, because boards \
+                 are for several signs",
             ),
             _ => continue,
         };

@@ -30,8 +30,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "no junction names {} among its controllers, though others of this map are named by one; a junction whose \
-             lights it switches should have a `controller` with the id `{id}`",
+            "no junction refers to {}, although junctions refer to other controllers of this map; a junction \
+             with lights that it switches should have a `controller` with the id `{id}`",
             named(controller.node())
         );
         found.issue(Place::attribute_or_node(controller.node(), "id"), text);

@@ -21,7 +21,8 @@ const SHARE: Param = Param::number(
     "share",
     0.4,
     "",
-    "share of a map's lights that are exceptions at most; more of them are the map's way",
+    "largest fraction of a map's lights that count as exceptions; a larger fraction counts as the style of the \
+     map",
 );
 
 /// A light with its control and controller.
@@ -65,10 +66,10 @@ fn by_several(switched: &HashMap<&str, Vec<Switched<'_>>>, share: f64, found: &m
         };
         for other in others {
             let text = format!(
-                "signal `{id}` is switched by {} and by {}; a light should have one controller",
+                "signal `{id}` is switched by {} and by {}; a light should have only one controller",
                 named(first.controller.node()),
                 if other.controller.node() == first.controller.node() {
-                    "the same once more".to_owned()
+                    "the same controller again".to_owned()
                 } else {
                     named(other.controller.node())
                 }
@@ -78,7 +79,7 @@ fn by_several(switched: &HashMap<&str, Vec<Switched<'_>>>, share: f64, found: &m
                     Place::attribute_or_node(other.control.node(), "signalId"),
                     text,
                 )
-                .at(first.control.node(), "the first to switch it");
+                .at(first.control.node(), "the first control of the signal");
         }
     }
 }
@@ -114,8 +115,8 @@ fn by_none(
     for signal in alone {
         let node: Node<'_> = signal.node();
         let text = format!(
-            "no controller switches {} of type `{}`, though other lights of this type have one; a `control` with \
-             its id should name it",
+            "no controller switches {} of type `{}`, although other lights of this type have one; a `control` \
+             should refer to its id",
             named(node),
             signal.kind().unwrap_or_default()
         );

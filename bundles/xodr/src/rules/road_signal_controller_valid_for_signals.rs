@@ -39,7 +39,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let names = |control: Control<'_>| control.signal_id().is_none_or(|id| known.contains(id));
         if !controller.controls().any(names) {
             let text = format!(
-                "none of the {} signals that {} controls exists; it must control at least one that does",
+                "none of the {} signals that {} controls exists; it must control at least one existing signal",
                 controller.controls().count(),
                 named(node)
             );

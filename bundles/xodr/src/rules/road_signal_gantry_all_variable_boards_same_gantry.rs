@@ -27,8 +27,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         };
         if let Some((odd, other)) = boards.iter().find(|(_, other)| other != gantry) {
             let text = format!(
-                "signal `{}` of message sign group `{}` belongs to gantry `{other}`, but signal `{}` to gantry \
-                 `{gantry}`; all boards of a group must be on the same gantry",
+                "signal `{}` of message sign group `{}` belongs to gantry `{other}`, but signal `{}` belongs to \
+                 gantry `{gantry}`; all boards of a group must be on the same gantry",
                 odd.signal_id().unwrap_or_default(),
                 group.id().unwrap_or_default(),
                 first.signal_id().unwrap_or_default()

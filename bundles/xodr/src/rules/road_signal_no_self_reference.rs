@@ -44,7 +44,7 @@ fn say<'a>(
     found: &mut Sink<'_>,
 ) {
     let text = format!(
-        "{} {does} itself; this says nothing, so another signal or object is meant",
+        "{} {does} itself; this has no meaning, so another signal or object is probably intended",
         named(signal)
     );
     found

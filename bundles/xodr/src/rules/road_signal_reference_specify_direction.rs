@@ -26,7 +26,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             other => format!("the unknown orientation `{other}`"),
         };
         let text = format!(
-            "{} has {has}; it must say whether the signal is valid along the road (`+`), against it (`-`) or both (`none`)",
+            "{} has {has}; it must define whether the signal is valid along the road (`+`), against it (`-`) or \
+             in both directions (`none`)",
             named(reference)
         );
         found

@@ -49,12 +49,13 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "the signal reference names `{id}`, which is no signal, but an element `{}`; it must name a signal",
+            "the signal reference refers to `{id}`, which is not a signal but an element `{}`; it must refer to \
+             a signal",
             target.name()
         );
         found
             .issue(Place::attribute_or_node(reference, "id"), text)
             .stands(map, reference)
-            .at(*target, "what it names");
+            .at(*target, "the referenced element");
     }
 }

@@ -26,7 +26,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         }
         let text = format!(
-            "{}: {} missing or empty; it must have a specific type and subtype (`-1` where there is none)",
+            "{}: {} missing or empty; it must have a specific type and subtype (or `-1` if there is none)",
             named(node),
             match missing.as_slice() {
                 [one] => format!("`{one}` is"),

@@ -21,12 +21,7 @@ pub static RULE: Rule<Roads> = Rule {
 
 const SPEED: &str = "qcbus.dev:xodr:1.2.0:road.signal.speed_value";
 const UNIT: &str = "qcbus.dev:xodr:1.5.0:road.signal.value_with_unit";
-const HIGHEST: Param = Param::number(
-    "highest",
-    70.0,
-    "m/s",
-    "the highest speed limit that is plausible",
-);
+const HIGHEST: Param = Param::number("highest", 70.0, "m/s", "highest plausible speed limit");
 
 /// Units of speed with their value in metres per second.
 const UNITS: [(&str, f64); 3] = [("km/h", 1.0 / 3.6), ("mph", 0.44704), ("m/s", 1.0)];
@@ -94,7 +89,7 @@ fn unit<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {
         return;
     };
     let text = format!(
-        "{} has the value {value}, but no `unit`; with a value the unit is mandatory",
+        "{} has the value {value}, but no `unit`; a value must have a unit",
         named(signal)
     );
     let finding = found
@@ -134,8 +129,8 @@ fn unit_like_others<'a>(
         return;
     };
     let text = format!(
-        "{} has the value {value}, but no `unit`; other signals of its kind in this file have one, and readers guess \
-         what is missing",
+        "{} has the value {value}, but no `unit`; other signals of its kind in this file have one, and readers \
+         guess a missing unit",
         named(signal)
     );
     found
@@ -156,8 +151,8 @@ fn value<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {
             subtype.bytes().any(|byte| byte.is_ascii_digit()) && subtype.trim() != "-1";
         if is_limit(signal) && !named_there && signal_speeds(signal).next().is_none() {
             let text = format!(
-                "{} limits the speed, but says neither by `value` nor by `subtype` to what; it should have a `value` \
-                 and a `unit`",
+                "{} limits the speed, but neither `value` nor `subtype` defines the limit; it should have a \
+                 `value` and a `unit`",
                 named(signal)
             );
             found
@@ -183,7 +178,7 @@ fn plausible<'a>(map: &RoadMap<'a>, signal: Node<'a>, node: Node<'a>, found: &mu
     let shown = shown.trim_end();
     let text = if speed < 0.0 || (speed == 0.0 && is_limit(signal) && guess.is_none()) {
         format!(
-            "{} limits the speed to {shown}; a speed limit must be more than 0",
+            "{} limits the speed to {shown}; a speed limit must be greater than 0",
             named(signal)
         )
     } else if speed > highest {
@@ -193,7 +188,8 @@ fn plausible<'a>(map: &RoadMap<'a>, signal: Node<'a>, node: Node<'a>, found: &mu
         )
     } else if let Some(meant) = meant(value, unit) {
         format!(
-            "{} limits the speed to {value:.3} {unit}, which is {meant} if it was meant in m/s; the value or the unit is wrong",
+            "{} limits the speed to {value:.3} {unit}, which would be {meant} if the value were in m/s; the \
+             value or the unit is wrong",
             named(signal)
         )
     } else {
@@ -240,7 +236,7 @@ fn semantics<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {
         return;
     };
     let text = format!(
-        "the semantics of {} say {} {}, but the signal itself shows {} {}; both should agree",
+        "the semantics of {} define {} {}, but the signal itself shows {} {}; both should agree",
         named(signal),
         node.attr("value").unwrap_or_default(),
         node.attr("unit").unwrap_or_default(),
@@ -252,6 +248,6 @@ fn semantics<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {
         .stands(map, signal)
         .at(
             Place::attribute_or_node(signal, "value"),
-            "what the signal shows",
+            "the value of the signal",
         );
 }

@@ -29,11 +29,14 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             && lacking.len() == signals.len()
         {
             let text = format!(
-                "none of the {} signals of road `{}` has a `country`, but each must say whose rules its type refers to",
+                "none of the {} signals of road `{}` has a `country`; each signal must define the country whose \
+                 rules its type follows",
                 signals.len(),
                 road.id()
             );
-            found.issue(list, text).at(lacking[0], "the first of them");
+            found
+                .issue(list, text)
+                .at(lacking[0], "the first of these signals");
             continue;
         }
         for node in lacking {
@@ -50,8 +53,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
 
 fn report<'a>(map: &RoadMap<'a>, node: Node<'a>, found: &mut Sink<'_>) {
     let text = format!(
-        "{} of type `{}` has no `country`, but must say whose rules the type refers to (`OpenDRIVE` for the \
-         types of the standard's own catalog)",
+        "{} of type `{}` has no `country`; it must define the country whose rules the type follows (`OpenDRIVE` \
+         for the types of the standard's own catalog)",
         named(node),
         node.attr("type").unwrap_or_default()
     );

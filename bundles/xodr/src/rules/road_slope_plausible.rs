@@ -9,31 +9,26 @@ const SLOPE: Param = Param::number(
     "slope",
     0.35,
     "",
-    "steepest slope of a road that is believed, as rise over run",
+    "steepest plausible slope of a road, as rise over run",
 );
-const BANKING: Param = Param::number(
-    "banking",
-    0.8,
-    "rad",
-    "greatest superelevation that is believed",
-);
+const BANKING: Param = Param::number("banking", 0.8, "rad", "largest plausible superelevation");
 const OVERTURNED: Param = Param::number(
     "overturned",
     1.6,
     "rad",
-    "from this superelevation on a road is upside down, which is an error",
+    "from this superelevation on, a road is upside down, which is an error",
 );
 const CROSSFALL: Param = Param::number(
     "crossfall",
     0.5,
     "",
-    "steepest crossfall of a strip of road surface that is believed, as rise over run",
+    "steepest plausible crossfall of a strip of road surface, as rise over run",
 );
 const LENGTH: Param = Param::number(
     "length",
     2.0,
     "m",
-    "over how many metres a road must be steep to be told",
+    "smallest length over which a steep road is reported",
 );
 
 pub static RULE: Rule<Roads> = Rule {
@@ -54,7 +49,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         if let Some((stretch, ds, slope)) = worst(road.elevation(), road, slope, most, found) {
             let text = format!(
                 "road `{}` {} by {} % over {:.1} m; slopes are written as rise over run (0.05 for 5 %), and more \
-                 than {:.0} % is hardly meant",
+                 than {:.0} % is implausible",
                 road.id(),
                 if slope > 0.0 { "climbs" } else { "falls" },
                 brief(100.0 * slope.abs(), 0),
@@ -69,8 +64,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         let value = |stretch: &Stretch<'_, '_>, ds: f64| stretch.cubic.value(ds);
         if let Some((stretch, ds, value)) = worst(roll, road, value, most, found) {
             let text = format!(
-                "road `{}` leans by {} rad, which is {}°; superelevation is in radians, and more than \
-                 {most} rad ({:.0}°) is hardly meant",
+                "road `{}` has a superelevation of {} rad, which is {}°; superelevation is in radians, and more \
+                 than {most} rad ({:.0}°) is implausible",
                 road.id(),
                 brief(value, 3),
                 brief(value.abs().to_degrees(), 0),
@@ -101,8 +96,8 @@ fn crossfall(road: &Road<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "strip `{}` of road `{}` has a crossfall of {} %; it is written as rise over run (0.025 for 2.5 %), and more \
-             than {:.0} % is hardly meant",
+            "strip `{}` of road `{}` has a crossfall of {} %; it is written as rise over run (0.025 for 2.5 %), \
+             and more than {:.0} % is implausible",
             strip.id.unwrap_or_default(),
             road.id(),
             brief(100.0 * value.abs(), 0),

@@ -10,26 +10,16 @@ const SLOW: Param = Param::number(
     "slow",
     20.0,
     "m/s",
-    "highest limit that is believed where people walk, play or cycle",
+    "highest plausible limit where people walk, play or cycle",
 );
-const TOWN: Param = Param::number(
-    "town",
-    40.0,
-    "m/s",
-    "highest limit that is believed in a town",
-);
+const TOWN: Param = Param::number("town", 40.0, "m/s", "highest plausible limit in a town");
 const RURAL: Param = Param::number(
     "rural",
     50.0,
     "m/s",
-    "highest limit that is believed on a rural road",
+    "highest plausible limit on a rural road",
 );
-const MOST: Param = Param::number(
-    "most",
-    90.0,
-    "m/s",
-    "highest limit that is believed anywhere",
-);
+const MOST: Param = Param::number("most", 90.0, "m/s", "highest plausible limit anywhere");
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_speed_plausible",
@@ -86,8 +76,8 @@ fn unit_lost(road: &Road<'_>, speed: Node<'_>, s: f64) -> Option<String> {
     })?;
     let unit = like.attr("unit")?;
     Some(format!(
-        "the speed limit is {max} without `unit`, which makes it m/s ({:.0} km/h); the road's own limit is \
-         {max} {unit}, so the unit was hardly meant to be left out",
+        "the speed limit is {max} without `unit`, so it is in m/s ({:.0} km/h); the road's own limit is {max} \
+         {unit}, so the unit was probably omitted by mistake",
         3.6 * max
     ))
 }
@@ -118,7 +108,7 @@ fn judge(speed: Node<'_>, kind: Option<&str>, found: &Sink<'_>) -> Option<String
     };
     if max == 0.0 {
         return Some(
-            "a speed limit of 0 lets nobody move; without a limit the element is left out, or says `no limit` or \
+            "a speed limit of 0 stops all traffic; if there is no limit, omit the element or use `no limit` or \
              `undefined`"
                 .to_owned(),
         );
@@ -139,7 +129,7 @@ fn judge(speed: Node<'_>, kind: Option<&str>, found: &Sink<'_>) -> Option<String
     }
     let place = place.map_or_else(String::new, |kind| format!(" on a road of type `{kind}`"));
     let doubt = match (speed.attr("unit"), unit) {
-        (None, _) => "; without `unit` it is m/s",
+        (None, _) => "; without `unit`, it is in m/s",
         (Some(_), "m/s") => "; its unit is m/s",
         _ => "",
     };
@@ -148,7 +138,7 @@ fn judge(speed: Node<'_>, kind: Option<&str>, found: &Sink<'_>) -> Option<String
         _ => format!(" ({:.0} km/h)", 3.6 * max * factor),
     };
     Some(format!(
-        "the speed limit is {max} {unit}{in_km}{doubt}; more than {:.0} km/h is hardly meant{place}",
+        "the speed limit is {max} {unit}{in_km}{doubt}; more than {:.0} km/h is implausible{place}",
         3.6 * most
     ))
 }

@@ -90,7 +90,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 2 if code.bytes().all(|byte| byte.is_ascii_uppercase()) => continue,
                 2 if is_alpha => "is not written in capital letters",
                 3 if is_alpha => "has three letters",
-                _ => "is no code",
+                _ => "is not a code",
             };
             let upper = code.to_ascii_uppercase();
             let known = ALPHA_2

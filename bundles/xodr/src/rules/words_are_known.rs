@@ -52,7 +52,7 @@ fn check(vocabulary: &Vocabulary, node: Node<'_>, schema: &OwnSchema<'_>, found:
         return;
     }
     let text = format!(
-        "`{}` of this `{}` is `{word}`, which no version of OpenDRIVE knows; the words are {}",
+        "`{}` of this `{}` is `{word}`, which no version of OpenDRIVE defines; the allowed values are {}",
         attribute.name(),
         node.name(),
         listed(vocabulary.words)

@@ -72,8 +72,8 @@ impl<'m, 'd, K: std::hash::Hash + Eq> Once<'m, 'd, K> {
 pub(crate) fn further(count: u32) -> String {
     match count {
         0 | 1 => String::new(),
-        2 => "; one further reference leads there, too".to_owned(),
-        count => format!("; {} further references lead there, too", count - 1),
+        2 => "; one further reference has the same fault".to_owned(),
+        count => format!("; {} further references have the same fault", count - 1),
     }
 }
 

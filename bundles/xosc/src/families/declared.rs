@@ -140,8 +140,8 @@ impl Declarable {
                 let parameter = scenario.root().parameter(&name);
                 if let Some(parameter) = parameter {
                     let text = format!(
-                        "`{}` refers to the {} `{name}`, but only a parameter has this name, which is \
-                         something else; some tools take it",
+                        "`{}` refers to the {} `{name}`, but only a parameter has this name, which is a \
+                         different kind of declaration; some tools accept it",
                         element.name(),
                         self.what
                     );

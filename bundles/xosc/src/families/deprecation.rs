@@ -48,12 +48,12 @@ deprecated! {
     1: {
         ActivateControllerAction Within("PrivateAction") "an `ActivateControllerAction` within a `ControllerAction`";
         CatalogReference Within("FollowTrajectoryAction") "a `TrajectoryRef` around it";
-        Clothoid Attribute("curvatureDot") "`curvaturePrime`, which goes by metres and not by seconds,";
+        Clothoid Attribute("curvatureDot") "`curvaturePrime` (per metre, not per second)";
         DistanceCondition Attribute("alongRoute") "`coordinateSystem`";
         DistanceCondition Word("relativeDistanceType", "cartesianDistance") "`euclidianDistance`";
         MiscObject Word("miscObjectCategory", "wind") "`Wind` in the `Weather`";
         Pedestrian Attribute("model") "`model3d`";
-        Precipitation Attribute("intensity") "`precipitationIntensity`, which is in mm/h,";
+        Precipitation Attribute("intensity") "`precipitationIntensity` (in mm/h)";
         RelativeDistanceCondition Word("relativeDistanceType", "cartesianDistance") "`euclidianDistance`";
         TimeHeadwayCondition Attribute("alongRoute") "`coordinateSystem`";
         TimeHeadwayCondition Word("relativeDistanceType", "cartesianDistance") "`euclidianDistance`";
@@ -66,8 +66,8 @@ deprecated! {
         Event Word("priority", "overwrite") "`override`";
         Gear (OverrideGearAction) Attribute("number") "a child `ManualGear` or `AutomaticGear`";
         GeoPosition Attribute("height") "`altitude`";
-        GeoPosition Attribute("latitude") "`latitudeDeg`, which is in degrees,";
-        GeoPosition Attribute("longitude") "`longitudeDeg`, which is in degrees,";
+        GeoPosition Attribute("latitude") "`latitudeDeg` (in degrees)";
+        GeoPosition Attribute("longitude") "`longitudeDeg` (in degrees)";
         ParameterAction Within("GlobalAction") "a `VariableAction` and a `VariableDeclaration`";
         ParkingBrake (OverrideParkingBrakeAction) Attribute("value") "a child `BrakePercent` or `BrakeForce`";
         ReachPositionCondition Within("EntityCondition") "a `DistanceCondition`";
@@ -128,15 +128,15 @@ pub(crate) fn report(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "{} is deprecated since version {}.{}: {} takes its place{}",
+            "{} is deprecated since version {}.{}; use {} instead{}",
             kind.what(first),
             kind.since.0,
             kind.since.1,
             kind.instead,
             match uses.count() {
                 0 => String::new(),
-                1 => " (once more in this file)".to_owned(),
-                more => format!(" ({more} times more in this file)"),
+                1 => " (one more use in this file)".to_owned(),
+                more => format!(" ({more} more uses in this file)"),
             }
         );
         found.issue(kind.place(first), text);

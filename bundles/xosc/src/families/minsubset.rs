@@ -26,7 +26,7 @@ pub(crate) fn only(around: Element<'_, '_>, allowed: &[&str], found: &mut Sink<'
     for child in around.children() {
         if !allowed.contains(&child.name()) {
             let text = format!(
-                "`{}` in `{}` is outside the minimum subset, which has only {} there",
+                "`{}` in `{}` is outside the minimum subset, which allows only {} there",
                 child.name(),
                 around.name(),
                 list(allowed)
@@ -47,8 +47,8 @@ pub(crate) fn without(
         for attribute in attributes {
             if element.has(attribute) {
                 let text = format!(
-                    "`{attribute}` of `{}` is outside the minimum subset, which has only the attributes that the \
-                     standard demands",
+                    "`{attribute}` of `{}` is outside the minimum subset, which allows only the attributes that \
+                     the standard requires",
                     element.name()
                 );
                 found.issue(Place::attribute_or_node(element.node(), attribute), text);

@@ -28,14 +28,14 @@ pub(crate) fn unique_among_siblings(document: &Document<'_>, found: &mut Sink<'_
             };
             if let Some(known) = first.get(name) {
                 let text = format!(
-                    "the name `{name}` is already taken by a child `{}` of this `{}`; names on one \
-                     level must differ",
+                    "the name `{name}` is already used by a child `{}` of this `{}`; names on one level must be \
+                     unique",
                     known.name(),
                     parent.name()
                 );
                 found
                     .issue(child, text)
-                    .at(Place::Node(*known), "the first element of this name");
+                    .at(Place::Node(*known), "the first element with this name");
             } else {
                 first.insert(name, child);
             }

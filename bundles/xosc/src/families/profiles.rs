@@ -88,12 +88,12 @@ pub(crate) fn report(scenario: &Scenario<'_>, simulator: &str, gaps: &[Gap], fou
             gap.what(),
             match gap.fate {
                 Fate::Stops => "stops with an error",
-                Fate::Ignores => "goes on as if it were not there",
+                Fate::Ignores => "ignores it",
             },
             match places.count() {
                 0 => String::new(),
-                1 => " (once more in this file)".to_owned(),
-                more => format!(" ({more} times more in this file)"),
+                1 => " (one more use in this file)".to_owned(),
+                more => format!(" ({more} more uses in this file)"),
             }
         );
         found.issue(gap.place(first), text);

@@ -62,7 +62,7 @@ pub(crate) fn unresolved<'n>(
         String::new()
     };
     let text = format!(
-        "`{}` refers to the {what} {}, but there is none of this name{hint}",
+        "`{}` refers to the {what} {}, which does not exist{hint}",
         reference.name(),
         quoted(reference, attribute, name)
     );
@@ -82,7 +82,7 @@ pub(crate) fn quoted(element: Element<'_, '_>, attribute: &str, value: &str) -> 
 pub(crate) fn hint<'n>(name: &str, names: impl Iterator<Item = &'n str>) -> String {
     match near(name, names) {
         Some(near) if plain(near) == plain(name) => {
-            format!("; `{near}` is there, names must be equal to the letter")
+            format!("; `{near}` exists; names must match exactly")
         }
         Some(near) => format!("; perhaps `{near}` is meant"),
         None => String::new(),
@@ -104,8 +104,8 @@ pub(crate) fn hint_or_all<'n>(name: &str, names: impl Iterator<Item = &'n str>) 
     let names = sorted(names.into_iter());
     match names.as_slice() {
         [] => String::new(),
-        [only] => format!("; there is only `{only}`"),
-        all => format!("; there are {}", listed(all.iter().copied())),
+        [only] => format!("; only `{only}` exists"),
+        all => format!("; existing names are {}", listed(all.iter().copied())),
     }
 }
 

@@ -36,7 +36,7 @@ fn missing_on(
         };
         if id.trim().is_empty() {
             let text = format!(
-                "`{attribute}` of `{element}` is empty; it is the id of a signal of the road network"
+                "`{attribute}` of `{element}` is empty; it must be the id of a signal of the road network"
             );
             found.about(reference, attribute, text);
             continue;
@@ -47,7 +47,7 @@ fn missing_on(
         }
         let known = known.get_or_insert_with(|| Known::of(map));
         let text = format!(
-            "`{element}` refers to the signal {}, but the road network has none of this id{}",
+            "`{element}` refers to the signal {}, but the road network has no signal with this id{}",
             quoted(reference, attribute, &id),
             known.instead_of(map, &id)
         );
@@ -82,15 +82,15 @@ impl<'r> Known<'r> {
 
     fn instead_of(&self, map: &RoadMap<'_>, id: &str) -> String {
         if let Some(own) = self.by_name.get(id) {
-            return format!("; a signal of this name is there, its id is `{own}`");
+            return format!("; a signal with this name exists; its id is `{own}`");
         }
         if map.controllers_with_id(id).next().is_some() {
-            return "; it is the id of a controller, which is no signal".to_owned();
+            return "; this is the id of a controller, not of a signal".to_owned();
         }
         if self.ids.is_empty() {
-            "; it has no signals at all".to_owned()
+            "; the road network has no signals".to_owned()
         } else {
-            format!("; there are {}", self.ids)
+            format!("; the road network has the signals {}", self.ids)
         }
     }
 }
@@ -185,7 +185,7 @@ pub(crate) fn missing_phases(scenario: &Scenario<'_>, element: &str, found: &mut
             continue;
         }
         let text = format!(
-            "`{element}` names the phase {}, but the controller `{name}` {}",
+            "`{element}` refers to the phase {}, but the controller `{name}` {}",
             quoted(reference, "phase", &phase),
             phases.listed
         );

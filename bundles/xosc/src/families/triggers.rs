@@ -25,8 +25,8 @@ pub(crate) fn empty_starts<'d>(
         };
         if trigger.children().next().is_none() && matters(element) {
             let text = format!(
-                "the `StartTrigger` of {} is empty: without a condition it is never true, so it does not start, \
-                 while some simulators start it at once; {remedy}",
+                "the `StartTrigger` of {} is empty; without a condition it is never true, so the element does \
+                 not start, but some simulators start it at once; {remedy}",
                 called(element)
             );
             found.about(trigger, "", text);

@@ -120,8 +120,8 @@ impl Misfit<'_, '_> {
     fn unshown(&self, said: usize) -> String {
         match self.uses.len().saturating_sub(said + MOST_USES) {
             0 => String::new(),
-            1 => "; the same holds for one more use".to_owned(),
-            more => format!("; the same holds for {more} more uses"),
+            1 => "; the same applies to one more use".to_owned(),
+            more => format!("; the same applies to {more} more uses"),
         }
     }
 }
@@ -200,12 +200,12 @@ pub(crate) fn typed<'d>(
     let wrong = || {
         let written = element.text(name).unwrap_or_default();
         let shown = if written.is_empty() {
-            "an empty text".to_owned()
+            "an empty string".to_owned()
         } else {
             super::references::quoted(element, name, &short(&written))
         };
         format!(
-            "{shown} is no value of type `{}`, which is {}",
+            "{shown} is not a valid value of type `{}`, which is {}",
             data_type.word(),
             data_type.allowed()
         )

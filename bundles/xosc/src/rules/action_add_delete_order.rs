@@ -37,13 +37,13 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "{} is added, but it is there from the start: `Init` places it, and nothing deletes it; leave one of \
-             the two away, or delete it first",
+            "{} is added, but it exists from the start: `Init` places it and nothing deletes it; remove one of \
+             the two actions, or delete the entity first",
             quoted(action, "entityRef", &name)
         );
         found
             .about(action, "entityRef", text)
-            .at(teleport.node(), "where it is placed");
+            .at(teleport.node(), "the action that places it");
     }
 }
 

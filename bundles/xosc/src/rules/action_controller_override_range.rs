@@ -36,7 +36,7 @@ fn whole_number(gear: Element<'_, '_>, found: &mut Sink<'_>) {
         // This is a warning only. Simulators round the number, and existing files contain such
         // numbers.
         let text = format!(
-            "`number` of `Gear` is {}, but should be a whole number: 0 is neutral, -1 reverse",
+            "`number` of `Gear` is {}, but should be a whole number: 0 is neutral, -1 is reverse",
             ranges::shown(gear, "number", number)
         );
         found.about(gear, "number", text).level(Level::Warning);

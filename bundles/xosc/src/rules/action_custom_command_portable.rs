@@ -36,8 +36,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             format!(" (used {count} times)")
         };
         let text = format!(
-            "what the custom command `{kind}`{often} does is known to the simulator that it was written for only; \
-             others skip it or stop"
+            "the effect of the custom command `{kind}`{often} is known only to the simulator that it was written \
+             for; others skip it or stop"
         );
         found.about(command, "type", text);
     }

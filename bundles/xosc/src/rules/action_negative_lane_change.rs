@@ -16,7 +16,7 @@ pub static RULE: Rule<Scene> = Rule {
     ..Rule::DEFAULTS
 };
 
-const MOST: Param = Param::number("most", 5.0, "m", "an offset up to this is that of a lane");
+const MOST: Param = Param::number("most", 5.0, "m", "largest lane offset that is accepted");
 
 /// Elements with an offset from the middle of a lane.
 const OFFSETS: &[(&str, &str)] = &[
@@ -34,8 +34,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let text = format!(
-                "the lane offset is {} m: that is more than {} m and leads out of most lanes; it is measured from \
-                 the middle of the lane, not of the road",
+                "the lane offset is {} m, which is more than {} m and leads out of most lanes; it is measured \
+                 from the center of the lane, not of the road",
                 stated(element, attribute, offset),
                 short(most)
             );

@@ -35,8 +35,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "the relative speed is kept continuously, which may not be used together with a {dimension} to reach \
-             it (here {}): such an action has no end; a `rate` is allowed, or `continuous=\"false\"`",
+            "the relative speed is kept continuously, which is not allowed together with a {dimension} to reach \
+             it (here {}), because such an action never ends; use a `rate` or `continuous=\"false\"`",
             stated(dynamics, "value", value)
         );
         found

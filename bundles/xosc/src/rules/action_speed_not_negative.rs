@@ -19,7 +19,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for target in scenario.elements_everywhere("AbsoluteTargetSpeed") {
         if let Some(speed) = target.number("value").filter(|speed| *speed < 0.0) {
             let text = format!(
-                "the target speed is {} m/s: below 0 an entity drives backwards, which not every simulator does",
+                "the target speed is {} m/s; below 0 an entity drives backwards, which some simulators do not \
+                 support",
                 stated(target, "value", speed)
             );
             found.about(target, "value", text);

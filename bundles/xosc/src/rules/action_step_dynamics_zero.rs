@@ -31,8 +31,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         };
         if shape == "step" && matches!(&*dimension, "time" | "distance") {
             let text = format!(
-                "a step happens at once, so its {dimension} must be 0, but is {}; a simulator takes no notice of \
-                 it, and a transition that takes that long is `linear`, `cubic` or `sinusoidal`",
+                "a step happens at once, so its {dimension} must be 0, but is {}; simulators ignore the value; \
+                 for a transition of this length use `linear`, `cubic` or `sinusoidal`",
                 stated(dynamics, "value", value)
             );
             found.about(dynamics, "value", text);

@@ -24,8 +24,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let acting = acting(action).unwrap_or_default();
         if acting.iter().any(|entity| entity.name() == master) {
             let text = format!(
-                "{} is the master and an actor of this action: an entity cannot arrive together with itself, the \
-                 master must be another one",
+                "{} is the master and an actor of this action; an entity cannot arrive together with itself, so \
+                 the master must be another entity",
                 quoted(action, "masterEntityRef", &master)
             );
             found.about(action, "masterEntityRef", text);

@@ -32,12 +32,12 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let value = stated(dynamics, "value", 0.0);
         let text = match &*dimension {
             "rate" => format!(
-                "the rate of a `{shape}` transition is {value}: nothing changes, and the action never ends; the \
-                 rate must be above 0"
+                "the rate of a `{shape}` transition is {value}; nothing changes, and the action never ends; the \
+                 rate must be greater than 0"
             ),
             "time" | "distance" => format!(
-                "the {dimension} of a `{shape}` transition is {value}: that is a jump, for which the shape is \
-                 `step`; other shapes divide by the {dimension}"
+                "the {dimension} of a `{shape}` transition is {value}, which is a jump; use the shape `step`, \
+                 because other shapes divide by the {dimension}"
             ),
             _ => continue,
         };

@@ -53,7 +53,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let all = entries.get(&(name, entry.node.name(), own));
         let all = all.map_or(&[][..], Vec::as_slice);
         let text = format!(
-            "the entry `{own}` of the catalog `{name}` is there {} times; which is meant is up to the \
+            "the entry `{own}` of the catalog `{name}` exists {} times; which one is used depends on the \
              simulator{}",
             all.len(),
             catalogs::further(count)

@@ -71,20 +71,20 @@ fn say(
 ) {
     let more = match more {
         0 => String::new(),
-        1 => "; there is one further fault in it".to_owned(),
-        more => format!("; there are {more} further faults in it"),
+        1 => "; the entry has one more fault".to_owned(),
+        more => format!("; the entry has {more} more faults"),
     };
     let what = match first.weight {
-        Weight::Unreadable => "is not what its schema allows, so it cannot be read",
-        Weight::Superfluous => "is not what its schema allows, which many simulators pass over",
-        Weight::Later => "needs a newer version than its file is said to be of",
+        Weight::Unreadable => "does not match its schema and cannot be read",
+        Weight::Superfluous => "does not match its schema, which many simulators ignore",
+        Weight::Later => "needs a newer version than its file declares",
     };
     let level = match first.weight {
         Weight::Unreadable => Level::Error,
         Weight::Superfluous | Weight::Later => Level::Information,
     };
     let text = format!(
-        "the catalog's entry `{}` {what}: {}{more}{}",
+        "the catalog entry `{}` {what}: {}{more}{}",
         reference.text("entryName").unwrap_or_default(),
         first.text,
         catalogs::further(count)

@@ -24,7 +24,7 @@ fn run(_: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let name = linked.path.rsplit('/').next().unwrap_or("");
-        let text = format!("the file `{name}` lies in a directory of catalogs, but {what}");
+        let text = format!("the file `{name}` is in a directory of catalogs, but {what}");
         found.issue((*document, 0), text).level(level);
     }
 }
@@ -43,7 +43,7 @@ fn fault(document: &Document<'_>) -> Option<(Level, String)> {
                     .is_none_or(|name| name.trim().is_empty())
             });
             nameless.then(|| {
-                let what = "its `Catalog` has no name, by which a scenario could refer to it";
+                let what = "its `Catalog` has no name, so no scenario can refer to it";
                 (Level::Warning, what.to_owned())
             })
         }

@@ -21,7 +21,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let parent = reference.node().parent();
         let kinds = catalogs::kinds(reference).iter();
         let text = format!(
-            "the entry `{}` is a `{}`, but `{}` takes {}",
+            "the entry `{}` is a `{}`, but `{}` requires {}",
             entry.node.attr("name").unwrap_or(""),
             entry.node.name(),
             parent.map_or("", |parent| parent.name()),

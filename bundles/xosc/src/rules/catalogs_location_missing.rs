@@ -28,7 +28,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for (reference, count) in without.each() {
         let kinds = catalogs::kinds(reference).iter();
         let text = format!(
-            "no catalog can be found here: `CatalogLocations` has no {}{}",
+            "no catalog can be found for this reference, because `CatalogLocations` has no {}{}",
             catalogs::listed(kinds.map(|kind| kind.location())).replace(", ", " or "),
             catalogs::further(count)
         );
@@ -45,15 +45,15 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let (name, location) = (entry.catalog.attr("name").unwrap_or(""), kind.location());
         let why = if scenario.catalog_directory(kind).is_some() {
             format!(
-                "the directory of `{location}`, where a `{}` is looked for",
+                "the directory of `{location}`, where a `{}` is expected",
                 kind.element()
             )
         } else {
-            format!("that of a `{location}`, which `CatalogLocations` do not have")
+            format!("the directory of a `{location}`, which `CatalogLocations` does not have")
         };
         let text = format!(
-            "the catalog `{name}` lies in a directory of other catalogs, and not in {why}; some simulators do \
-             not find it{}",
+            "the catalog `{name}` is in a directory of other catalogs and not in {why}; some simulators do not \
+             find it{}",
             catalogs::further(count)
         );
         found

@@ -37,12 +37,13 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     };
     for (node, other) in forms {
         let text = format!(
-            "`{}` makes the document {other}, but `{}` has made it {what} already; a document is one of them",
+            "`{}` makes the document {other}, but `{}` already makes it {what}; a document must be only one of \
+             them",
             node.name(),
             first.name()
         );
         found
             .issue(node, text)
-            .at(first, format!("what makes it {what}"));
+            .at(first, format!("the element that makes it {what}"));
     }
 }

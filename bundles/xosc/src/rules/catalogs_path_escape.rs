@@ -44,10 +44,10 @@ fn why(path: &str) -> Option<&'static str> {
         && start.next() == Some(':');
     if is_drive || path.starts_with(['/', '\\']) || path.starts_with("file://") {
         return Some(
-            "is absolute and leads to the directory on this machine only; one that is relative to the \
-             scenario works everywhere",
+            "is absolute and leads to the directory on this machine only; a path relative to the scenario works \
+             everywhere",
         );
     }
     path.contains('\\')
-        .then_some("has backslashes, which divide directories on Windows only; `/` does everywhere")
+        .then_some("has backslashes, which are separators on Windows only; `/` works everywhere")
 }

@@ -46,11 +46,11 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         return;
     };
     let text = format!(
-        "no reference leads to the catalogs of {}",
+        "no reference uses the catalogs of {}",
         catalogs::listed(unused.iter().map(|location| location.name()))
     );
     let mut finding = found.issue(*first, text);
     for other in others {
-        finding = finding.at(*other, "another that is not used");
+        finding = finding.at(*other, "another unused location");
     }
 }

@@ -48,10 +48,10 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let Some((header, version)) = header(entry.node) else {
             continue;
         };
-        let which = if version > own { "newer" } else { "far older" };
+        let which = if version > own { "newer" } else { "much older" };
         let text = format!(
-            "the catalog `{}` is written in OpenSCENARIO {}.{}, {which} than {}.{} of the scenario: a \
-             simulator that reads it by the scenario's version may not understand it{}",
+            "the catalog `{}` has OpenSCENARIO version {}.{}, {which} than {}.{} of the scenario; a simulator \
+             that reads it with the version of the scenario may not understand it{}",
             entry.catalog.attr("name").unwrap_or(""),
             version.0,
             version.1,

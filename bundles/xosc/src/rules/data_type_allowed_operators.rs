@@ -25,8 +25,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         for newer in evaluated.newer {
             let ((major, minor), (of_major, of_minor)) = (newer.since, scenario.version());
             let text = format!(
-                "{}: `{}` belongs to the expression language from version {major}.{minor} on and the file is \
-                 of {of_major}.{of_minor}; only some simulators know it there",
+                "{}: `{}` is part of the expression language from version {major}.{minor} on, but the file has \
+                 version {of_major}.{of_minor}; only some simulators support it there",
                 values::written(attribute),
                 newer.name
             );

@@ -33,7 +33,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             "added to"
         };
         let text = format!(
-            "the variable `{name}` is of type `{}` and cannot be {how}, only numbers can; `SetAction` sets it",
+            "the variable `{name}` is of type `{}` and cannot be {how}, because only numbers can; use \
+             `SetAction` to set it",
             data_type.word()
         );
         found.about(action, "variableRef", text);
@@ -45,8 +46,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "the variable `{name}` is of type `{}`, whose values have no order for `{}`; `equalTo` and \
-             `notEqualTo` are possible",
+            "the variable `{name}` is of type `{}`, whose values have no order for `{}`; use `equalTo` or \
+             `notEqualTo`",
             data_type.word(),
             comparison.word()
         );

@@ -150,19 +150,19 @@ fn compare(
         let both = convert.zip(element.number(old)).zip(element.number(new));
         let (level, remark) = match both {
             Some(((convert, old), new)) if !agree(convert(old), new) => {
-                (Level::Error, "and they say different things")
+                (Level::Error, "and their values differ")
             }
-            Some(_) => (Level::Warning, "though they say the same"),
-            None => (Level::Warning, "and simulators take one or the other"),
+            Some(_) => (Level::Warning, "although their values are equal"),
+            None => (Level::Warning, "and simulators use one or the other"),
         };
         let text = format!(
-            "`{}` has the deprecated `{old}` and also `{new}`, which has replaced it, {remark}; write only one",
+            "`{}` has the deprecated `{old}` and also its replacement `{new}`, {remark}; write only one",
             element.name()
         );
         found
             .issue(Place::attribute_or_node(element.node(), old), text)
             .level(level)
-            .at(place, "what has replaced it");
+            .at(place, "the replacement");
     }
 }
 

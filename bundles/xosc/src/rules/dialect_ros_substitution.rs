@@ -18,7 +18,7 @@ pub static RULE: Rule<Scene> = Rule {
 const ALLOWED: Param = Param::flag(
     "allowed",
     false,
-    "whether the simulator knows substitutions of ROS launch files",
+    "whether the simulator supports substitutions of ROS launch files",
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

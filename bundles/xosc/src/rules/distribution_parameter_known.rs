@@ -28,7 +28,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             if distributions::declaration(&target, name).is_some() {
                 if source.written(attribute) != Some(name) {
                     let text = format!(
-                        "the parameter `{name}` is named here, so there is no `$` before it"
+                        "the parameter `{name}` is named here and must not have a `$` before its name"
                     );
                     found.issue(place, text).level(Level::Warning);
                 }
@@ -40,13 +40,16 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                     .is_some_and(|own| own.strip_prefix('$').unwrap_or(own) == name)
             });
             let why = match further_in {
-                Some(_) => "; one further in is not set from outside".to_owned(),
+                Some(_) => {
+                    "; a parameter that is declared further inside cannot be set from outside"
+                        .to_owned()
+                }
                 None => hint(name, names),
             };
             let text = format!("the scenario itself declares no parameter `{name}`{why}");
             let finding = found.issue(place, text);
             match further_in {
-                Some(one) => finding.at(one.node(), "the declaration further in"),
+                Some(one) => finding.at(one.node(), "the declaration further inside"),
                 None => finding.at(target.root().node(), "the scenario"),
             };
         }

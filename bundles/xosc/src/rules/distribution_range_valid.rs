@@ -20,7 +20,7 @@ const MOST: Param = Param::number(
     "most",
     1e6,
     "",
-    "more scenarios than this from one distribution are taken for a mistake",
+    "largest plausible number of scenarios from one distribution; more are considered a mistake",
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -33,7 +33,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             && lower > upper
         {
             let text = format!(
-                "the range begins at {lower} and ends at {upper}; the lower limit must not be above the upper"
+                "the range starts at {lower} and ends at {upper}; the lower limit must not be greater than the \
+                 upper limit"
             );
             found.about(range, "lowerLimit", text);
         }
@@ -42,7 +43,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let step = distribution.number("stepWidth");
         if let Some(step) = step.filter(|step| *step <= 0.0) {
             let text = format!(
-                "the width of a step is {}, but must be above 0: with it the range never ends",
+                "the step width is {}, but must be greater than 0; otherwise the range never ends",
                 quoted(distribution, "stepWidth", &step.to_string())
             );
             found.about(distribution, "stepWidth", text);
@@ -72,7 +73,7 @@ fn overlap(histogram: Element<'_, '_>, found: &mut Sink<'_>) {
         };
         if start < end {
             let text = format!(
-                "the bin begins at {start}, where another goes on to {end}; bins should not share values"
+                "the bin starts at {start}, but another bin ends at {end}; bins should not overlap"
             );
             found
                 .issue(bin.node(), text)
@@ -101,7 +102,7 @@ fn count(all: Element<'_, '_>, found: &mut Sink<'_>) {
     let most = found.number(&MOST);
     if total > most {
         let text = format!(
-            "the values combine to {total:.0} scenarios, more than the {most:.0} that somebody would want to run"
+            "the values combine to {total:.0} scenarios; more than {most:.0} are considered a mistake"
         );
         found.issue(all.node(), text).level(Level::Warning);
     }

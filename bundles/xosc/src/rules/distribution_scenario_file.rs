@@ -33,7 +33,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let Some(linked) = linked.next() else {
         let own = subject.root();
         if name_of(own.path()) == name_of(&path) && own.path().contains('/') {
-            let text = "the distribution names itself as the scenario whose parameters it sets";
+            let text = "the distribution refers to itself as the scenario whose parameters it sets";
             found.issue(place, text);
         }
         return;
@@ -41,7 +41,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let what = match (linked.document.root(), Form::of(&linked.document)) {
         (None, _) | (_, Form::Scenario) => return,
         (_, Form::Catalog) => "a catalog".to_owned(),
-        (_, Form::Distribution) => "a distribution itself".to_owned(),
+        (_, Form::Distribution) => "itself a distribution".to_owned(),
         (Some(root), Form::Unclear) => format!("a `{}` without a storyboard", root.name()),
     };
     let text = format!("`{path}` is {what}, but a distribution sets the parameters of a scenario");

@@ -221,8 +221,8 @@ impl<'s, 't> Trial<'s, 't> {
         };
         let more = match new.count() {
             0 => String::new(),
-            1 => "; it breaks one further place".to_owned(),
-            more => format!("; it breaks {more} further places"),
+            1 => "; it breaks one more place".to_owned(),
+            more => format!("; it breaks {more} more places"),
         };
         let own: Vec<_> = draw
             .values
@@ -238,10 +238,12 @@ impl<'s, 't> Trial<'s, 't> {
             _ => draw.holder.node().into(),
         };
         let text = format!(
-            "with the value {} the scenario is faulty: {text}{more}",
+            "with the value {} the scenario is invalid: {text}{more}",
             shown.join(" and ")
         );
-        found.issue(place, text).at(attribute, "where it is used");
+        found
+            .issue(place, text)
+            .at(attribute, "the place where it is used");
     }
 
     /// Returns the drawn parameters that the value of an attribute depends on.
@@ -295,7 +297,7 @@ fn problems<'t>(scenario: &Scenario<'t>) -> Vec<(Attribute<'t>, String)> {
                 continue;
             };
             let text = format!(
-                "`{}` refers to the entity `{name}`, but there is none{}",
+                "`{}` refers to the entity `{name}`, which does not exist{}",
                 reference.name(),
                 hint(&name, entities.names())
             );

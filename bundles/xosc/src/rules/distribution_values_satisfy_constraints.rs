@@ -117,7 +117,7 @@ impl Draw<'_, '_> {
         };
         if !self.data_type.is_numeric() {
             let text = format!(
-                "`{}` is of type `{}`, but a `{}` gives numbers",
+                "`{}` is of type `{}`, but a `{}` produces numbers",
                 self.declaration.name,
                 self.data_type.word(),
                 distribution.name()

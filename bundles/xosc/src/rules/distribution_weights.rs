@@ -35,7 +35,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 found.about(one, attribute, text);
             } else if value == Some(0.0) {
                 let text = format!(
-                    "`{attribute}` of `{element}` is 0, so all values are the same; is a distribution meant?"
+                    "`{attribute}` of `{element}` is 0, so all values are equal; check whether a distribution is \
+                     intended"
                 );
                 found.about(one, attribute, text).level(Level::Warning);
             }
@@ -60,14 +61,15 @@ fn weights(set: Element<'_, '_>, part: &str, found: &mut Sink<'_>) {
         if let Some(weight) = weight.filter(|weight| *weight < 0.0) {
             negative = true;
             let text = format!(
-                "the weight is {}, but must not be negative: it is how often the value is drawn",
+                "the weight is {}, but must not be negative; it defines how often the value is drawn",
                 quoted(one, "weight", &weight.to_string())
             );
             found.about(one, "weight", text);
         }
     }
     if sum == Some(0.0) && !negative && set.child(part).is_some() {
-        let text = "all weights are 0, so nothing can be drawn; at least one must be above 0";
+        let text =
+            "all weights are 0, so no value can be drawn; at least one must be greater than 0";
         found.issue(set.node(), text);
     }
 }

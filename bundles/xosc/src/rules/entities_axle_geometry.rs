@@ -18,13 +18,13 @@ const WHEELBASE: Param = Param::number(
     "wheelbase",
     0.3,
     "m",
-    "the front axle of a car, van, truck or bus is at least this far before the rear axle",
+    "smallest plausible distance of the front axle of a car, van, truck or bus in front of the rear axle",
 );
 const WHEEL: Param = Param::number(
     "wheel",
     3.0,
     "m",
-    "a wheel of more than this diameter is taken for a mistake",
+    "largest plausible diameter of a wheel; a larger one is considered a mistake",
 );
 
 /// Vehicles with separate front and rear axles.
@@ -45,7 +45,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let text = format!(
-                "the wheels are {diameter} m high; no wheel of a vehicle on the road is more than {most} m"
+                "the wheels have a diameter of {diameter} m; no wheel of a road vehicle has more than {most} m"
             );
             found.about(axle, "wheelDiameter", text);
         }
@@ -64,10 +64,10 @@ fn wheelbase(axles: Element<'_, '_>, least: f64, found: &mut Sink<'_>) {
         return;
     }
     let text = if x <= rear_x {
-        format!("the front axle at x = {x} m is not before the rear axle at x = {rear_x} m")
+        format!("the front axle at x = {x} m is not in front of the rear axle at x = {rear_x} m")
     } else {
         format!(
-            "the front axle is only {:.2} m before the rear axle; a model of steering divides by that",
+            "the front axle is only {:.2} m in front of the rear axle; steering models divide by this distance",
             x - rear_x
         )
     };

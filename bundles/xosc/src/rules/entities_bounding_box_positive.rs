@@ -28,7 +28,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let text = format!(
-                "the bounding box of this `{kind}` is 0 in {}; distances and collisions are measured by it",
+                "the bounding box of this `{kind}` is 0 in {}; distances and collisions are computed from it",
                 catalogs::listed(flat.iter().copied())
             );
             found.about(dimensions, first, text);

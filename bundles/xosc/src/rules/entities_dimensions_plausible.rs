@@ -19,13 +19,13 @@ const LENGTH: Param = Param::number(
     "length",
     100.0,
     "m",
-    "a road vehicle or a pedestrian that is longer is taken for a mistake",
+    "largest plausible length of a road vehicle or a pedestrian; a larger one is considered a mistake",
 );
 const ACROSS: Param = Param::number(
     "across",
     15.0,
     "m",
-    "one that is wider or higher is taken for a mistake",
+    "largest plausible width or height of a road vehicle or a pedestrian; a larger one is considered a mistake",
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -25,8 +25,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         .is_some();
     if scenario.form() == Form::Scenario && block.child("ScenarioObject").is_none() && !has_traffic
     {
-        let text =
-            "the scenario has no `ScenarioObject` and no traffic, so nobody takes part in it";
+        let text = "the scenario has no `ScenarioObject` and no traffic, so it has no participants";
         found.issue(block.node(), text);
     }
 }

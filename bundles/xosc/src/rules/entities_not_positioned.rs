@@ -28,8 +28,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let must_be = matches!(entity.kind(), EntityKind::Vehicle | EntityKind::Pedestrian);
         if must_be && !placed.contains(entity.name()) && !dangling.may_mean(entity.name()) {
             let text = format!(
-                "nothing places the entity `{}`: no `TeleportAction`, no trajectory and no \
-                 `AddEntityAction` is for it, and where it begins is up to the simulator",
+                "nothing places the entity `{}`: it has no `TeleportAction`, no trajectory and no \
+                 `AddEntityAction`; its start position depends on the simulator",
                 entity.name()
             );
             found.about(entity.element(scenario), "name", text);

@@ -19,7 +19,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.1,
     "m",
-    "bounding boxes that reach less far into each other only touch",
+    "largest overlap of two bounding boxes that still counts as touching",
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -27,12 +27,12 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let bodies = spawn::bodies(scenario);
     for (one, other) in spawn::overlapping(&bodies, tolerance) {
         let text = format!(
-            "`{}` begins within `{}`: their bounding boxes overlap, so the run begins with a collision",
+            "`{}` starts within `{}`; their bounding boxes overlap, so the run starts with a collision",
             one.name, other.name
         );
         found.about(one.position, "", text).at(
             other.position.node(),
-            format!("where `{}` begins", other.name),
+            format!("the start position of `{}`", other.name),
         );
     }
 }

@@ -18,13 +18,13 @@ const SPEED: Param = Param::number(
     "speed",
     150.0,
     "m/s",
-    "a greater `maxSpeed` is taken for km/h or for a placeholder",
+    "largest plausible `maxSpeed`; a greater value is considered a value in km/h or a placeholder",
 );
 const ACCELERATION: Param = Param::number(
     "acceleration",
     20.0,
     "m/s²",
-    "a greater `maxAcceleration` or `maxDeceleration` is taken for a placeholder",
+    "largest plausible `maxAcceleration` or `maxDeceleration`; a greater value is considered a placeholder",
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -48,7 +48,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         };
         let texts: Vec<&str> = above.iter().map(|(_, text)| text.as_str()).collect();
         let text = format!(
-            "{}; no road vehicle does that, so it limits nothing",
+            "{}; no road vehicle reaches that, so the limit has no effect",
             texts.join(", and ")
         );
         found.about(performance, first, text);

@@ -49,7 +49,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             let kind = kind_of(&wanted);
             let mut objects = entities.objects().iter();
             if all_known && kind.is_some_and(|kind| !objects.any(|one| one.kind() == kind)) {
-                let text = format!("no entity of the scenario is of the type `{wanted}`");
+                let text = format!("no entity of the scenario has the type `{wanted}`");
                 found
                     .about(by_type, "objectType", text)
                     .level(Level::Warning);

@@ -56,7 +56,7 @@ fn look(reference: Element<'_, '_>, attribute: &str, found: &mut Sink<'_>) {
         name => name,
     };
     let text = format!(
-        "`{what}` refers to the selection {}, but needs one entity",
+        "`{what}` refers to the selection {}, but needs a single entity",
         quoted(reference, attribute, &name)
     );
     found

@@ -31,7 +31,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         told.coupling(towing, trailer, at, attribute, found);
         if let Some((other, first)) = drawn.get(trailer.name()) {
             let text = format!(
-                "`{}` draws the trailer `{}`, but `{other}` does already",
+                "`{}` tows the trailer `{}`, but `{other}` already tows it",
                 towing.name(),
                 trailer.name()
             );
@@ -68,8 +68,8 @@ fn disconnect(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             });
             if is_known && !towing.contains(&*name) {
                 let text = format!(
-                    "`{name}` is to let go of its trailer, but has none: neither its `Vehicle` names one nor does a \
-                     `ConnectTrailerAction` connect one"
+                    "`{name}` is to disconnect its trailer, but has none: its `Vehicle` has no trailer, and no \
+                     `ConnectTrailerAction` connects one"
                 );
                 found.about(action, "", text).level(Level::Warning);
             }
@@ -174,7 +174,7 @@ impl<'m> Told<'m> {
         }
         if !missing.is_empty() && self.0.insert((towing.name(), trailer.name())) {
             let text = format!(
-                "{}; where the two are joined is up to the simulator",
+                "{}; where the two are joined depends on the simulator",
                 missing.join(" and ")
             );
             found.about(at, attribute, text).level(Level::Warning);
@@ -205,7 +205,7 @@ fn circle(
     }
     if let Some((_, at)) = drawn.remove(towing.name()) {
         let text = format!(
-            "`{}` is a trailer of itself, directly or by way of others",
+            "`{}` is its own trailer, directly or through others",
             towing.name()
         );
         found.about(
@@ -232,7 +232,7 @@ fn connect<'m, 'd>(action: Element<'m, 'd>, told: &mut Told<'m>, found: &mut Sin
     let actors = Actors::of(action).and_then(|actors| actors.names());
     for actor in actors.into_iter().flatten() {
         if actor == name {
-            let text = format!("`{name}` is to be connected to itself as its trailer");
+            let text = format!("the action connects `{name}` to itself as its trailer");
             found.about(action, "trailerRef", text);
         } else if let Some(towing) = scenario.entities().object(&actor) {
             told.coupling(towing, trailer, action, "trailerRef", found);

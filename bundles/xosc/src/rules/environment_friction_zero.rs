@@ -16,8 +16,8 @@ pub static RULE: Rule<Scene> = Rule {
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for road in scenario.elements_everywhere("RoadCondition") {
         if road.number("frictionScaleFactor") == Some(0.0) {
-            let text = "`frictionScaleFactor` of `RoadCondition` is zero: without any friction no vehicle can \
-                        drive, steer or brake; 1 is the road as it is, ice is about 0.1";
+            let text = "`frictionScaleFactor` of `RoadCondition` is zero; without friction no vehicle can drive, \
+                        steer or brake; 1 is the road as it is, ice is about 0.1";
             found.about(road, "frictionScaleFactor", text);
         }
     }

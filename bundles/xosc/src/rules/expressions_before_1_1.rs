@@ -30,11 +30,11 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let others = expressions.count();
     let rest = match others {
         0 => String::new(),
-        1 => ", and there is one more".to_owned(),
-        _ => format!(", and there are {others} more"),
+        1 => "; there is one more expression".to_owned(),
+        _ => format!("; there are {others} more expressions"),
     };
     let text = format!(
-        "{}: the file is of version 1.0, which has no expressions; they came with 1.1{rest}",
+        "{}: the file has version 1.0, which has no expressions; they were added in 1.1{rest}",
         values::written(first)
     );
     let finding = found.issue(first, text);

@@ -19,7 +19,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for (attribute, evaluated) in scenario.expressions() {
         if let Some(lost) = evaluated.imprecise {
             let text = format!(
-                "{}: digits are lost, {}",
+                "{}: digits are lost; {}",
                 values::written(attribute),
                 lost.text
             );

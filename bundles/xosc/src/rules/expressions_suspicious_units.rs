@@ -24,7 +24,7 @@ const FASTEST: Param = Param::number(
     "fastest",
     70.0,
     "m/s",
-    "a speed beyond this may be meant in another unit",
+    "largest plausible speed; a higher one may be in another unit",
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -38,7 +38,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let text = format!(
-                "`{name}` asks for {} m/s, which are {:.0} km/h; speeds are in m/s, {} km/h would be {:.1} m/s",
+                "the value of `{name}` is {} m/s, which is {:.0} km/h; speeds are in m/s; {} km/h would be {:.1} \
+                 m/s",
                 short(speed),
                 speed * 3.6,
                 short(speed),

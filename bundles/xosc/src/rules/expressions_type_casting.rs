@@ -24,7 +24,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "{}: `${name}` is of type `string`, and its text is a number; expressions take numbers, and only \
+            "{}: `${name}` is of type `string`, and its text is a number; expressions need numbers, and only \
              some simulators convert it",
             values::written(fault.attribute)
         );

@@ -21,7 +21,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         if !evaluated.uses_parameters {
             let value: Value<'_> = evaluated.value.into();
             let text = format!(
-                "{}: no parameter is used, so that the value is always `{}` and could be written out",
+                "{}: no parameter is used, so the value is always `{}` and can be written directly",
                 values::written(attribute),
                 value.text()
             );

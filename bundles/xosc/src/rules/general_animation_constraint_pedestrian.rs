@@ -23,13 +23,13 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             .find(|entity| matches!(entity.kind(), EntityKind::Vehicle | EntityKind::MiscObject));
         let Some(entity) = other else { continue };
         let text = format!(
-            "`{}` is a `{}`, but only a pedestrian can carry out a `PedestrianAnimation`",
+            "`{}` is a `{}`, but only a pedestrian can perform a `PedestrianAnimation`",
             entity.name(),
             entity.kind().element()
         );
         found.about(animation, "", text).at(
             entity.element(scenario).node(),
-            "the entity that is to carry it out",
+            "the entity that must perform it",
         );
     }
 }

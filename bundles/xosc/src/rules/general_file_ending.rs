@@ -22,6 +22,6 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         return;
     }
     let text =
-        format!("the file is called `{name}`, but the name of such a file should end in `.xosc`");
+        format!("the file is named `{name}`, but the name of such a file should end with `.xosc`");
     found.issue((document, 0), text).here("the file");
 }

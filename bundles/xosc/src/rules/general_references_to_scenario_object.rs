@@ -154,8 +154,8 @@ fn say(action: Element<'_, '_>, verdict: &Verdict<'_, '_>, who: &str, found: &mu
         }
         Verdict::Mixed { actor, named } => {
             let text = format!(
-                "the selection `{named}` has vehicles and pedestrians, but for a `{what}` it may have one of \
-                 the two only"
+                "the selection `{named}` has vehicles and pedestrians, but for a `{what}` it may have only one \
+                 of the two"
             );
             found
                 .about(action, "", text)
@@ -181,7 +181,7 @@ fn master(action: Element<'_, '_>, found: &mut Sink<'_>) {
     };
     if master.kind() == EntityKind::MiscObject {
         let text = format!(
-            "the master {} is a `MiscObject`, but only vehicles and pedestrians move to a place",
+            "the master {} is a `MiscObject`, but only vehicles and pedestrians can move to a position",
             quoted(action, "masterEntityRef", &name)
         );
         let node = master.element(action.scenario()).node();

@@ -18,7 +18,7 @@ const EARLIEST: Param = Param::number(
     "earliest",
     2000.0,
     "year",
-    "files that are older than this year are not believed",
+    "earliest plausible year in the date of a file",
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -33,8 +33,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let earliest = found.number(&EARLIEST);
     if let Some(year) = year.filter(|year| (*year as f64) < earliest) {
         let text = format!(
-            "the header's `date` is in the year {year}, before {earliest}: a tool has probably written what it \
-             had instead of the date"
+            "the header's `date` is in the year {year}, before {earliest}; a tool has probably written another \
+             value instead of the date"
         );
         found.issue(Place::attribute_or_node(header.node(), "date"), text);
     }

@@ -21,7 +21,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     };
     let Some(license) = header.child("License") else {
         let text =
-            "the header has no `License`; it should say under which terms the file may be used";
+            "the header has no `License`; it should state under which terms the file may be used";
         found.issue(header.node(), text);
         return;
     };
@@ -29,7 +29,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         .text("spdxId")
         .is_none_or(|id| !id.trim().is_empty());
     if !license.has("spdxId") || !named {
-        let text = "the `License` names no `spdxId`, such as `MIT` or `CC-BY-4.0`, by which programs know it";
+        let text = "the `License` has no `spdxId`, such as `MIT` or `CC-BY-4.0`, by which programs identify it";
         found.issue(Place::attribute_or_node(license.node(), "spdxId"), text);
     }
 }

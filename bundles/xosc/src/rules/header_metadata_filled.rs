@@ -18,14 +18,14 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         return;
     };
     for (attribute, what) in [
-        ("description", "what the file is for"),
-        ("author", "whom to ask"),
+        ("description", "the purpose of the file"),
+        ("author", "the person to contact"),
     ] {
         if header
             .text(attribute)
             .is_some_and(|text| text.trim().is_empty())
         {
-            let text = format!("the header's `{attribute}` is empty; it should say {what}");
+            let text = format!("the header's `{attribute}` is empty; it should state {what}");
             found.issue(Place::attribute_or_node(header.node(), attribute), text);
         }
     }

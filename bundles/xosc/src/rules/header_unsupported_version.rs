@@ -21,18 +21,19 @@ fn run(document: &Document<'_>, found: &mut Sink<'_>) {
     let why = match (major, minor) {
         (1, 0..=4) => return,
         (0, _) => {
-            "that was a draft with other elements, which simulators of today do not read; it is not looked at \
-             any further"
+            "this version was a draft with other elements, which current simulators do not read; the file is not \
+             checked any further"
         }
         (1, _) => {
-            "it is looked at as if it were the newest of them, and what came later is not known"
+            "the file is checked as if it had the newest of them; later additions are not known"
         }
         (2.., _) => {
-            "that is another language, which is not written in XML; it is not looked at any further"
+            "this version is another language, which is not written in XML; the file is not checked any further"
         }
     };
-    let text =
-        format!("the file says that its version is {major}.{minor}; 1.0 to 1.4 are known: {why}");
+    let text = format!(
+        "the file declares version {major}.{minor}, but only 1.0 to 1.4 are supported; {why}"
+    );
     let attribute = if major == 1 { "revMinor" } else { "revMajor" };
     found.issue(Place::attribute_or_node(header, attribute), text);
 }

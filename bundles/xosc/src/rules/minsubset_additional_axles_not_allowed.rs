@@ -17,6 +17,6 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let instead = "a vehicle has a front and a rear axle only";
+    let instead = "a vehicle may have only a front and a rear axle";
     minsubset::none(scenario, &["AdditionalAxle"], instead, found);
 }

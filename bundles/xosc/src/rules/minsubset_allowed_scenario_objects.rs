@@ -22,7 +22,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for object in scenario.elements("ScenarioObject") {
         for kind in object.children() {
             if !passed.contains(&kind.name()) {
-                minsubset::outside(kind, "scenario objects are vehicles", found);
+                minsubset::outside(kind, "scenario objects must be vehicles", found);
             }
         }
     }

@@ -17,6 +17,6 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let instead = "write what the catalog has into the scenario";
+    let instead = "write the content of the catalog entry into the scenario";
     minsubset::none(scenario, &["CatalogReference"], instead, found);
 }

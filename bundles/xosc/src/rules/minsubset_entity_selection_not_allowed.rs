@@ -17,6 +17,6 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let instead = "name the scenario objects themselves";
+    let instead = "name the scenario objects directly";
     minsubset::none(scenario, &["EntitySelection"], instead, found);
 }

@@ -58,7 +58,7 @@ fn number(element: Element<'_, '_>, attribute: &str, allowed: f64, found: &mut S
 
 fn say(element: Element<'_, '_>, attribute: &str, is: &str, allowed: &str, found: &mut Sink<'_>) {
     let text = format!(
-        "`{attribute}` of `{}` is `{is}`, which is outside the minimum subset; it has only `{allowed}`",
+        "`{attribute}` of `{}` is `{is}`, which is outside the minimum subset; only `{allowed}` is allowed",
         element.name()
     );
     found.issue(Place::attribute_or_node(element.node(), attribute), text);

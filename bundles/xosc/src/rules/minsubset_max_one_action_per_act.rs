@@ -22,13 +22,13 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let more: Vec<_> = actions.collect();
         if let (Some(first), Some(second)) = (first, more.first()) {
             let text = format!(
-                "the act has {} actions, which is outside the minimum subset; it has one action per act",
+                "the act has {} actions, which is outside the minimum subset; only one action per act is allowed",
                 1 + more.len()
             );
             let finding = found.issue(act.node(), text);
             finding
                 .at(first.node(), "the first action")
-                .at(second.node(), "the second");
+                .at(second.node(), "the second action");
         }
     }
 }

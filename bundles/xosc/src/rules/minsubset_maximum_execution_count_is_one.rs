@@ -23,7 +23,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let count = element.integer("maximumExecutionCount");
         if let Some(count) = count.filter(|count| *count > 1) {
             let text = format!(
-                "the `maximumExecutionCount` is {count}, which is outside the minimum subset; it has only 1"
+                "the `maximumExecutionCount` is {count}, which is outside the minimum subset; only 1 is allowed"
             );
             let place = Place::attribute_or_node(element.node(), "maximumExecutionCount");
             found.issue(place, text);

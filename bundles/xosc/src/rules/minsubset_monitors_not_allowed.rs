@@ -17,6 +17,6 @@ pub static RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let instead = "leave it out and what refers to it";
+    let instead = "remove it and everything that refers to it";
     minsubset::none(scenario, &["MonitorDeclaration"], instead, found);
 }

@@ -21,7 +21,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         return;
     };
     for story in stories {
-        let text = "a further `Story` is outside the minimum subset: move its acts into the first";
+        let text =
+            "an additional `Story` is outside the minimum subset; move its acts into the first";
         found
             .issue(story.node(), text)
             .at(first.node(), "the first story");

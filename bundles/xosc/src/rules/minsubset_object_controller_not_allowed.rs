@@ -21,7 +21,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         for controller in object.children_named("ObjectController") {
             minsubset::outside(
                 controller,
-                "entities follow their trajectories without",
+                "entities follow their trajectories without a controller",
                 found,
             );
         }

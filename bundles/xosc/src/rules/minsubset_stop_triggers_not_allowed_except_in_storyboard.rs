@@ -19,7 +19,7 @@ pub static RULE: Rule<Scene> = Rule {
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for act in scenario.elements("Act") {
         for trigger in act.children_named("StopTrigger") {
-            minsubset::outside(trigger, "only the storyboard has one", found);
+            minsubset::outside(trigger, "only the storyboard may have one", found);
         }
     }
 }

@@ -18,7 +18,7 @@ pub static RULE: Rule<Scene> = Rule {
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for axles in scenario.elements("Axles") {
         if axles.child("FrontAxle").is_none() {
-            let text = "these `Axles` have no `FrontAxle`, which the minimum subset demands";
+            let text = "these `Axles` have no `FrontAxle`, which the minimum subset requires";
             found.issue(axles.node(), text);
         }
     }

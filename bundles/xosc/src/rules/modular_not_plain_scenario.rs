@@ -30,7 +30,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     if let Some(first) = references.first() {
         let text = format!(
             "`ScenarioReference` belongs to modular scenarios, which must be expanded before a simulator can run \
-             them: it knows no such element, and the {} without maneuvers",
+             them; simulators do not know this element, so the {} without maneuvers",
             match references.len() {
                 1 => "group is".to_owned(),
                 many => format!("{many} groups like this one are"),
@@ -51,8 +51,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     };
     if let Some(first) = offers().next() {
         let text = format!(
-            "`parameterAttributes` belongs to modular scenarios and is no attribute of the standard ({} in this \
-             file); simulators that do not check the schema run the file as it is",
+            "`parameterAttributes` belongs to modular scenarios and is not an attribute of the standard ({} in \
+             this file); simulators that do not check the schema run the file as it is",
             offers().count()
         );
         found.issue(first, text).level(Level::Information);
@@ -64,8 +64,8 @@ fn must_be_expanded(found: &mut Sink<'_>) {
     let written = found.subject().written();
     let mut references = written.elements("ScenarioReference");
     if let Some(first) = references.next() {
-        let text = "simulators know no `ScenarioReference` and leave out what it stands for without a word; what was \
-                    checked is the plain scenario that `qcbus expand` makes of this file, and that is to be run";
+        let text = "simulators do not know `ScenarioReference` and silently omit what it stands for; the checks \
+                    used the plain scenario that `qcbus expand` creates from this file; run that scenario";
         found.issue(first, text).level(Level::Warning);
     }
 }

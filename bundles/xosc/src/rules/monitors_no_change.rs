@@ -39,8 +39,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         if !changed.contains(&name) && !dangling.may_mean(&name) {
             let value = action.text("value").unwrap_or_default();
             let text = format!(
-                "the monitor `{name}` is set to `{value}`, which it is from the beginning, and no action sets it \
-                 to anything else"
+                "the monitor `{name}` is set to `{value}`, which is its initial value, and no action sets it to \
+                 another value"
             );
             found
                 .about(action, "value", text)

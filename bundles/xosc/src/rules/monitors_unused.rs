@@ -25,8 +25,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let name = declaration.written("name").unwrap_or("");
         if !set.contains(declared::bare(name)) && !dangling.may_mean(name) {
             let text = format!(
-                "no `SetMonitorAction` sets the monitor `{name}`, so that it reports its first value throughout \
-                 the run"
+                "no `SetMonitorAction` sets the monitor `{name}`, so it reports its initial value throughout the \
+                 run"
             );
             found.issue(declaration.node(), text);
         }

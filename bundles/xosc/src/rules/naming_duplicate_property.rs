@@ -30,11 +30,11 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             let (level, what) = if value(known) == value(property) {
                 (
                     Level::Information,
-                    "is there twice with one value".to_owned(),
+                    "is defined twice with the same value".to_owned(),
                 )
             } else {
                 let what = format!(
-                    "is `{}` here and `{}` before; which holds is up to the simulator",
+                    "is `{}` here and `{}` before; which one is used depends on the simulator",
                     value(property),
                     value(known)
                 );
@@ -46,7 +46,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                     format!("the property `{name}` {what}"),
                 )
                 .level(level)
-                .at(known, "the first property of this name");
+                .at(known, "the first property with this name");
         }
     }
 }

@@ -29,7 +29,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             found.about(element, "name", text).level(level);
         } else if name.trim() != name {
             let text = format!(
-                "the name {} has white space around it, which is part of the name: references must have it, too",
+                "the name {} has leading or trailing white space, which is part of the name; references must \
+                 contain it as well",
                 quoted(element, "name", &name)
             );
             found.about(element, "name", text).level(Level::Warning);

@@ -27,13 +27,13 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         }
         let text = format!(
-            "the name {} already belongs to a `{}`; all entities and selections share one set of names",
+            "the name {} is already used by a `{}`; names of entities and selections must be unique",
             quoted(element, "name", name),
             known.name()
         );
         found
             .about(element, "name", text)
-            .at(known.node(), "who has the name already");
+            .at(known.node(), "the element that already has the name");
     }
 }
 

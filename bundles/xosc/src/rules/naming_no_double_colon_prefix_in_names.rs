@@ -18,7 +18,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for (element, name) in names::keys(scenario) {
         if name.contains("::") {
             let text = format!(
-                "the name {} has a `::`, which joins names in references: `a::b` is the element `b` in `a`",
+                "the name {} contains `::`, which joins names in references: `a::b` is the element `b` in `a`",
                 quoted(element, "name", &name)
             );
             found.about(element, "name", text);

@@ -21,8 +21,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         };
         let shown: String = name.chars().filter(|sign| !is_invisible(*sign)).collect();
         let text = format!(
-            "the name `{shown}` has the invisible character U+{:04X} in it; whoever types the name does not \
-             meet it",
+            "the name `{shown}` contains the invisible character U+{:04X}; a name typed without it does not \
+             match",
             u32::from(sign)
         );
         found.about(element, "name", text);

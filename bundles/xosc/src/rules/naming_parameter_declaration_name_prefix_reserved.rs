@@ -19,7 +19,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let name = declared::bare(declaration.written("name").unwrap_or(""));
         if name.starts_with("OSC") {
             let text = format!(
-                "the parameter is called `{name}`, but names that begin with `OSC` are reserved for the standard"
+                "the parameter is named `{name}`, but names that begin with `OSC` are reserved for the standard"
             );
             found.about(declaration, "name", text);
         }

@@ -26,16 +26,16 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             // Many files have the `$`, and most simulators remove it.
             Some(rest) if is_identifier(rest) => (
                 Level::Warning,
-                format!("the `$` belongs where the parameter is used; it is declared as `{rest}`"),
+                format!("the `$` belongs where the parameter is used; declare it as `{rest}`"),
             ),
             _ => (
                 Level::Error,
-                "a name begins with a letter or `_` and goes on with letters, digits and `_`, else no `$` \
-                 can refer to it"
+                "a name must begin with a letter or `_` and continue with letters, digits and `_`; otherwise no \
+                 `$` can refer to it"
                     .to_owned(),
             ),
         };
-        let text = format!("`{name}` is no name of a parameter: {why}");
+        let text = format!("`{name}` is not a valid parameter name: {why}");
         found.about(declaration, "name", text).level(level);
     }
 }

@@ -38,6 +38,6 @@ const NUMBERS: &Numbers = &[
 ];
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let why = "no simulator can reach it or compare with it, it must be a finite number";
+    let why = "it must be a finite number, because no simulator can reach it or compare with it";
     families::finite::report(scenario, NUMBERS, why, found);
 }

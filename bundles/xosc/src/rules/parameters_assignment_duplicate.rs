@@ -76,7 +76,7 @@ fn across(block: Element<'_, '_>, found: &mut Sink<'_>) {
             }
             let text = format!(
                 "the parameter `{name}` already has its values from another distribution of this \
-                 `Deterministic`: which of them hold is up to the simulator"
+                 `Deterministic`; which of them are used depends on the simulator"
             );
             found
                 .issue(Place::attribute_or_node(source.node(), attribute), text)
@@ -103,15 +103,12 @@ fn within<'m, 'd: 'm>(
         };
         let same = child.has("value") && child.written("value") == known.written("value");
         let (level, which) = if same {
-            (Level::Warning, "the same value twice")
+            (Level::Warning, "both values are the same")
         } else {
-            (
-                Level::Error,
-                "which of the values holds is up to the simulator",
-            )
+            (Level::Error, "which one is used depends on the simulator")
         };
         let text = format!(
-            "the parameter `{name}` already has a value in this `{}`: {which}",
+            "the parameter `{name}` already has a value in this `{}`; {which}",
             block.name()
         );
         found

@@ -18,7 +18,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for (assignment, _, text) in scenario.assignment_faults() {
         let name = assignment.written("parameterRef").unwrap_or("");
         let name = name.strip_prefix('$').unwrap_or(name);
-        let text = format!("the value for `{name}` does not fit: {text}");
+        let text = format!("the value for `{name}` is invalid: {text}");
         // If the default does not fit either, the type is wrong. This is a fault of the catalog.
         match misdeclared(assignment, name) {
             Some(declaration) => found
@@ -26,7 +26,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 .level(Level::Warning)
                 .at(
                     declaration,
-                    "the declaration, whose own value is not of its type, either",
+                    "the declaration; its own value does not match its type either",
                 ),
             None => found.about(assignment, "value", text),
         };

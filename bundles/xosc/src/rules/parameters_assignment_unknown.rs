@@ -46,8 +46,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                     .at(entry.node(), "the entry");
             } else if written != name {
                 let text = format!(
-                    "`parameterRef` names the parameter `{name}`, it does not use its value: the name stands \
-                     there without `$`"
+                    "`parameterRef` names the parameter `{name}` and does not use its value; write the name \
+                     without `$`"
                 );
                 found
                     .about(assignment, "parameterRef", text)

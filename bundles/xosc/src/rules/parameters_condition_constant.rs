@@ -32,10 +32,9 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         }
         let outcome = outcome(element, declaration)
-            .map(|holds| format!(": with the declared value the condition is always {holds}"));
+            .map(|holds| format!("; with the declared value the condition is always {holds}"));
         let text = format!(
-            "no `ParameterAction` changes the parameter `{name}`, so that it keeps its value throughout the \
-             run{}",
+            "no `ParameterAction` changes the parameter `{name}`, so it keeps its value throughout the run{}",
             outcome.unwrap_or_default()
         );
         found.about(element, "parameterRef", text);

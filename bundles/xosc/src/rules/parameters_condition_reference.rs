@@ -28,7 +28,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         if let Some(inner) = element.parameter(&name) {
             let text = format!(
                 "`{}` refers to the parameter `{name}`, which is not declared at the top of the scenario but \
-                 further in; only parameters at the top are sure to be found",
+                 further inside; only parameters at the top are certain to be found",
                 element.name()
             );
             found
@@ -37,8 +37,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 .at(inner.node, "its declaration");
         } else if is_criterion(element) {
             let text = format!(
-                "the parameter `{name}` of this criterion is none of the scenario's: conditions whose name begins \
-                 with `criteria_` are read by CARLA's ScenarioRunner and by nobody else"
+                "the parameter `{name}` of this criterion is not a parameter of the scenario; conditions whose \
+                 name begins with `criteria_` are read only by CARLA's ScenarioRunner"
             );
             found
                 .about(element, "parameterRef", text)

@@ -29,7 +29,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         for group in groups {
             if let Some((first, second)) = group.contradiction(data_type) {
                 let text = format!(
-                    "{} and {} exclude each other: no value of type `{}` satisfies this group",
+                    "{} and {} exclude each other; no value of type `{}` satisfies this group",
                     first.shown(),
                     second.shown(),
                     data_type.word()

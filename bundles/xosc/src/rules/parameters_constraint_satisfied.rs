@@ -55,7 +55,7 @@ fn check(node: Element<'_, '_>, declaration: &Declaration<'_>, found: &mut Sink<
         format!("violates its constraint {}", first.1.shown())
     } else {
         format!(
-            "satisfies none of its constraint groups, of which one must hold: it violates {} and {}",
+            "satisfies none of its constraint groups, but must satisfy at least one; it violates {} and {}",
             first.1.shown(),
             others.join(" and ")
         )

@@ -30,8 +30,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 let ordering = constraint.comparison.filter(|one| one.is_order());
                 if let Some(comparison) = ordering.filter(|_| !data_type.is_ordered()) {
                     let text = format!(
-                        "`{}` compares by order, but values of type `{}` have none; `equalTo` and \
-                         `notEqualTo` are possible",
+                        "`{}` compares by order, but values of type `{}` have no order; use `equalTo` or \
+                         `notEqualTo`",
                         comparison.word(),
                         data_type.word()
                     );

@@ -39,8 +39,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         if declared::type_of(declaration, "parameterType") == Some(DataType::Double)
             && declaration.double("value").is_some_and(f64::is_nan)
         {
-            let text = "the value is `NaN`, which is not equal, less or greater than any number, so that \
-                        nothing can be computed with it or compared to it";
+            let text = "the value is `NaN`, which is not equal to, less than or greater than any number, so it \
+                        cannot be used in computations or comparisons";
             found
                 .about(declaration, "value", text)
                 .level(Level::Warning);

@@ -33,13 +33,13 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 continue;
             }
             let text = format!(
-                "the parameter `{}` hides another one of this name within `{}`",
+                "the parameter `{}` hides another parameter of this name within `{}`",
                 declaration.name,
                 holder.name()
             );
             found
                 .issue(declaration.node, text)
-                .at(outer.node, "the one that is hidden");
+                .at(outer.node, "the hidden parameter");
         }
     }
 }

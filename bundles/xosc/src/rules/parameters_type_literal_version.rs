@@ -22,7 +22,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         for declaration in scenario.elements(name) {
             if declaration.written(attribute) == Some("integer") {
                 let text = format!(
-                    "`{attribute}` is `integer`, which is deprecated since 1.2; the type is called `int` now"
+                    "`{attribute}` is `integer`, which is deprecated since 1.2; use `int` instead"
                 );
                 found.about(declaration, attribute, text);
             }

@@ -39,7 +39,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 || (at_top && referred.contains(declaration.name));
             if !known && !dangling.may_mean(declaration.name) {
                 let text = format!(
-                    "the parameter `{}` is declared and never used within `{}`",
+                    "the parameter `{}` is declared but never used within `{}`",
                     declaration.name,
                     holder.name()
                 );

@@ -35,13 +35,13 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         }
         let declaration = fault.attribute.node();
         let text = format!(
-            "the parameter `{}` has no default: `value` is empty, but must be a value of type `{}`",
+            "the parameter `{}` has no default; `value` is empty, but must be a value of type `{}`",
             declaration.attr("name").unwrap_or(""),
             declaration.attr("parameterType").unwrap_or("")
         );
         let finding = found.issue(fault.attribute, text);
         if let Some(used) = uses.get(&declaration.index()) {
-            finding.at(*used, "where it is used first");
+            finding.at(*used, "its first use");
         }
     }
 }
@@ -69,8 +69,8 @@ fn without_value(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let text = format!(
-                "the parameter `{}` of the catalog's entry `{}` has no default, and nothing is assigned to it, but \
-                 it is used: its value must be one of type `{}`",
+                "the parameter `{}` of the catalog entry `{}` is used, but has no default and no assigned value; \
+                 its value must be of type `{}`",
                 declaration.name,
                 reference.text("entryName").unwrap_or_default(),
                 declaration.node.attr("parameterType").unwrap_or("")
@@ -78,7 +78,7 @@ fn without_value(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             found
                 .about(reference, "", text)
                 .at(declaration.node, "the declaration")
-                .at(used, "where it is used first");
+                .at(used, "its first use");
         }
     }
 }

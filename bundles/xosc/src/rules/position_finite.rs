@@ -40,6 +40,6 @@ const NUMBERS: &Numbers = &[
 ];
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let why = "nothing can be there, coordinates and angles are finite numbers";
+    let why = "it must be a finite number, because nothing can be at such a position";
     families::finite::report(scenario, NUMBERS, why, found);
 }

@@ -34,7 +34,7 @@ fn both_given(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         for (degrees, radians) in [("latitudeDeg", "latitude"), ("longitudeDeg", "longitude")] {
             if !position.has(degrees) && !position.has(radians) {
                 let text = format!(
-                    "`GeoPosition` has no {radians}; `{degrees}` gives it in degrees, `{radians}` in radians"
+                    "`GeoPosition` has no {radians}; use `{degrees}` in degrees or `{radians}` in radians"
                 );
                 found.about(position, degrees, text);
             }

@@ -20,8 +20,8 @@ const TURNS: Param = Param::number(
     "turns",
     1.0,
     "",
-    "so many full turns an angle may be; twice as many are information, and within a trajectory, where headings \
-     may go on counting, five times as many are nothing",
+    "largest angle in full turns; up to twice as much is reported as information; in a trajectory, where \
+     headings may accumulate, up to five times as much is accepted",
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

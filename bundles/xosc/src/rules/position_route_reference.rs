@@ -45,12 +45,12 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let most = length.most;
         if at > most + 1e-3 + most * 1e-6 {
             let (long, why) = if length.is_exact {
-                ("", "its waypoints all lie on one road")
+                ("", "all its waypoints are on one road")
             } else {
-                ("at most ", "the roads allow no more")
+                ("at most ", "the roads do not allow more")
             };
             let text = format!(
-                "`pathS` is {}, but the route is {long}{} long: {why}",
+                "`pathS` is {}, but the route is {long}{} long; {why}",
                 shown(place, "pathS", &metres(at)),
                 metres(most)
             );
@@ -75,7 +75,7 @@ fn beside(place: Element<'_, '_>, road: &Road<'_>, s: f64, found: &mut Sink<'_>)
             && let LaneAt::None(section) = find_lane(road, s, id)
         {
             let text = format!(
-                "`laneId` is `{id}`, but the road `{}`, on which the route runs, has no such lane at s = {}",
+                "`laneId` is `{id}`, but the road `{}` of the route has no such lane at s = {}",
                 road.id(),
                 metres(s)
             );
@@ -94,7 +94,7 @@ fn beside(place: Element<'_, '_>, road: &Road<'_>, s: f64, found: &mut Sink<'_>)
         && t.abs() > left.max(-right) + 1e-3
     {
         let text = format!(
-            "`t` is {}, but the lanes of road `{}`, on which the route runs, reach from {} to {} at s = {}",
+            "`t` is {}, but the lanes of the road `{}` of the route extend from {} to {} at s = {}",
             shown(place, "t", &metres(t)),
             road.id(),
             metres(right),

@@ -37,8 +37,8 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
         count => format!(" and so are {count} more"),
     };
     let text = format!(
-        "a position is given by latitude and longitude{others}, but the road network has {}; without the \
-         map projection nobody can tell where that is in the map",
+        "a position is given by latitude and longitude{others}, but the road network has {}; without the map \
+         projection its place in the map is undefined",
         match reference {
             Some(_) => "an empty `geoReference`",
             None => "no `geoReference`",

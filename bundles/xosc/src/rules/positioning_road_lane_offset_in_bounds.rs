@@ -26,8 +26,8 @@ const SLACK: Param = Param::number(
     "slack",
     1e-3,
     "m",
-    "how far beyond a road's end or a lane's border a position may lie; along the road, a millionth of \
-     its length is added",
+    "largest distance of a position beyond a road's end or a lane's border that is accepted; along the road, a \
+     millionth of its length is added",
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -106,7 +106,7 @@ fn relative_to_others(
         };
         let direction = if *ds > 0.0 { "along" } else { "against" };
         let text = format!(
-            "`{}` leads {} {direction} the road `{}` from s = {}, where `{name}` begins, but the roads there end \
+            "`{}` leads {} {direction} the road `{}` from s = {}, where `{name}` starts, but the roads there end \
              after {}",
             position.name(),
             shown(position, "ds", &metres(ds.abs())),
@@ -136,7 +136,7 @@ fn beside_after_all(
             return;
         }
         let text = format!(
-            "`RelativeRoadPosition` leads to t = {}, but the lanes of road `{}` reach from t = {} to t = {} at \
+            "`RelativeRoadPosition` leads to t = {}, but the lanes of road `{}` extend from t = {} to t = {} at \
              s = {}",
             metres(place.t),
             road.id(),
@@ -168,7 +168,7 @@ fn reach_of_lanes(road: &Road<'_>, s: f64) -> Option<(f64, f64)> {
 
 fn before(position: Element<'_, '_>, s: f64, road: Option<&Road<'_>>, found: &mut Sink<'_>) {
     let text = format!(
-        "`{}` is at s = {}, but a road begins at s = 0",
+        "`{}` is at s = {}, but a road starts at s = 0",
         position.name(),
         shown(position, "s", &metres(s))
     );
@@ -216,8 +216,8 @@ fn wide_of(
         return;
     };
     let text = format!(
-        "the `offset` of `{}` is {}, but the lane `{}` of road `{}` is {} wide at s = {}: the \
-         position is {} outside of it",
+        "the `offset` of `{}` is {}, but the lane `{}` of road `{}` is {} wide at s = {}; the position is {} \
+         outside of it",
         position.name(),
         shown(position, "offset", &metres(offset)),
         lane.id_text().unwrap_or(""),
@@ -243,7 +243,7 @@ fn beside_lanes(position: Element<'_, '_>, road: &Road<'_>, slack: f64, found: &
         return;
     }
     let text = format!(
-        "`RoadPosition` is at t = {}, but the lanes of road `{}` reach from t = {} to t = {} at s = {}",
+        "`RoadPosition` is at t = {}, but the lanes of road `{}` extend from t = {} to t = {} at s = {}",
         shown(position, "t", &metres(t)),
         road.id(),
         metres(right),

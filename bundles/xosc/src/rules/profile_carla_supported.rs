@@ -46,7 +46,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let header = scenario.root().child("FileHeader");
     if let Some(header) = header.filter(|_| scenario.form() == Form::Scenario) {
         let text = format!(
-            "{NAME} reads scenarios of version 1.0 only, and this one says {major}.{minor}"
+            "{NAME} supports only scenarios of version 1.0, but this one declares {major}.{minor}"
         );
         let attribute = if major == 1 { "revMinor" } else { "revMajor" };
         found.issue(Place::attribute_or_node(header.node(), attribute), text);

@@ -61,18 +61,21 @@ fn catalog(reference: Element<'_, '_>, count: u32, open: bool, found: &mut Sink<
         catalogs::stem(document.path()) == name
     });
     let mut text = format!(
-        "there is no catalog {} in the catalog locations",
+        "the catalog {} is not found in the catalog locations",
         quoted(reference, "catalogName", &name)
     );
     if let Some((_, catalog)) = by_file {
         text.push_str(&format!(
-            "; the file of this name has the catalog `{}`, and the name in the file counts",
+            "; the file with this name contains the catalog `{}`, and the name in the file is the one that \
+             counts",
             catalog.attr("name").unwrap_or("")
         ));
     } else if open {
-        text.push_str("; the path of the location is empty, and which files are meant by that is up to the simulator");
+        text.push_str(
+            "; the path of the location is empty; which files it means depends on the simulator",
+        );
     } else if names.is_empty() {
-        text.push_str(", of which no file is a catalog");
+        text.push_str(", which contain no catalog files");
     } else {
         text.push_str(&hint_or_all(&name, names.iter().copied()));
     }
@@ -116,5 +119,5 @@ fn elsewhere(reference: Element<'_, '_>, name: &str) -> Option<String> {
     let mut all = reference.scenario().catalogs();
     let (_, catalog) = all.find(|(_, catalog)| catalog.children().any(fits))?;
     let catalog = catalog.attr("name").filter(|name| !name.is_empty())?;
-    Some(format!("; the catalog `{catalog}` has one"))
+    Some(format!("; the catalog `{catalog}` has this entry"))
 }

@@ -26,7 +26,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             Fault::File => {
                 let used = uses.any(|(reference, to)| catalogs::is_use(reference, to, kind));
                 let text = format!(
-                    "`{path}` is a file, but a location of catalogs is the directory that they are in"
+                    "`{path}` is a file, but a catalog location must be the directory that contains the catalogs"
                 );
                 let level = if used { Level::Error } else { Level::Warning };
                 found.issue(place, text).level(level);
@@ -39,7 +39,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 if let Some((user, _)) = user {
                     let name = user.text("catalogName").unwrap_or_default();
                     let text = format!(
-                        "there is no `.xosc` file in `{path}`, but the scenario refers to the catalog `{name}`"
+                        "`{path}` contains no `.xosc` file, but the scenario refers to the catalog `{name}`"
                     );
                     found
                         .issue(place, text)

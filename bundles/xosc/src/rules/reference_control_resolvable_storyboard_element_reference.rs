@@ -66,18 +66,18 @@ fn look_up<'d>(
         (None, _) if storyboard.is_complete() => {
             let is = matches.first().map_or("", |one| one.kind().word());
             let text = format!(
-                "{} is of type `{is}`, but `storyboardElementType` says `{}`",
+                "{} is of type `{is}`, but `storyboardElementType` is `{}`",
                 quoted(condition, "storyboardElementRef", name),
                 kind.word()
             );
             let finding = found.about(condition, "storyboardElementType", text);
             if let Some(one) = matches.first() {
-                finding.at(one.element(scenario).node(), "the element of this name");
+                finding.at(one.element(scenario).node(), "the element with this name");
             }
         }
         (Some(first), Some(second)) => {
             let text = format!(
-                "{} may be any of {} elements of type `{}`; the name must lead to one{}",
+                "{} may refer to any of {} elements of type `{}`, but must refer to exactly one{}",
                 quoted(condition, "storyboardElementRef", name),
                 of_kind.len(),
                 kind.word(),
@@ -108,7 +108,7 @@ fn look_up<'d>(
 fn paths(scenario: &Scenario<'_>, first: &StoryElement<'_>, second: &StoryElement<'_>) -> String {
     let paths = path(scenario, first).zip(path(scenario, second));
     paths.map_or_else(String::new, |(first, second)| {
-        format!(", with the names of the elements around it in front: `{first}` or `{second}`")
+        format!("; put the names of the enclosing elements in front: `{first}` or `{second}`")
     })
 }
 
@@ -144,14 +144,14 @@ fn nowhere<'d>(
     let leaf = name.rsplit("::").next().unwrap_or(name);
     if leaf != name && !storyboard.find(leaf).is_empty() {
         let text = format!(
-            "{reference} leads to no element: there is `{leaf}`, but the names in front of it must be those of \
-             the elements directly around it, none left out"
+            "{reference} refers to no element; `{leaf}` exists, but the names in front of it must be those of \
+             the directly enclosing elements, without gaps"
         );
         found.about(condition, "storyboardElementRef", text);
         return;
     }
     let text = format!(
-        "{reference} leads to no story, act, maneuver group, maneuver, event or action{}",
+        "{reference} refers to no story, act, maneuver group, maneuver, event or action{}",
         hint(leaf, storyboard.names())
     );
     found.about(condition, "storyboardElementRef", text);

@@ -87,10 +87,13 @@ fn on_any_road(
             let there = if ids.is_empty() {
                 "no road has lanes".to_owned()
             } else {
-                format!("roads have only {}", listed(ids.iter().map(String::as_str)))
+                format!(
+                    "the roads have only {}",
+                    listed(ids.iter().map(String::as_str))
+                )
             };
             let text = format!(
-                "`{name}` leads to the lane {}, but no road of the road network has such a lane: {there}",
+                "`{name}` refers to the lane {}, but no road of the road network has such a lane; {there}",
                 quoted(element, attribute, &text)
             );
             let finding = found.about(element, attribute, text);
@@ -161,7 +164,7 @@ fn beside<'m, 'd>(
         return;
     };
     let text = format!(
-        "`RelativeLanePosition` leads from the lane `{from}` of road `{}`, where `{name}` begins, to the lane \
+        "`RelativeLanePosition` leads from the lane `{from}` of road `{}`, where `{name}` starts, to the lane \
          `{id}` at s = {}, but the lane section there {}",
         on.road.id(),
         metres(s),
@@ -201,12 +204,12 @@ fn not_looked_for(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     };
     let more = match positions.count() {
         0 => String::new(),
-        1 => ", nor that of one further position".to_owned(),
-        count => format!(", nor those of {count} further positions"),
+        1 => ", nor the road of one more position".to_owned(),
+        count => format!(", nor the roads of {count} more positions"),
     };
     let road = first.text("roadId").unwrap_or_default();
     let text = format!(
-        "the road {} cannot be looked for{more}: the map could not be read",
+        "the road {} cannot be looked up{more}, because the map could not be read",
         quoted(first, "roadId", &road)
     );
     found.about(first, "roadId", text).level(Level::Warning);
@@ -220,7 +223,7 @@ fn no_road(
     found: &mut Sink<'_>,
 ) {
     let there = if roads.is_empty() {
-        "has no roads at all".to_owned()
+        "has no roads".to_owned()
     } else if map.roads().len() == 1 {
         format!("has only the road {roads}")
     } else {
@@ -248,12 +251,13 @@ fn lane(position: Element<'_, '_>, road: &Road<'_>, found: &mut Sink<'_>) {
             .flat_map(|section| section.lanes())
             .all(|lane| lane.id().is_some());
         let (level, why) = if is_written {
-            (Level::Error, "so there is none of this name")
+            (Level::Error, "so this lane does not exist")
         } else {
-            (Level::Information, "so this one was not looked for")
+            (Level::Information, "so this lane was not looked up")
         };
         let text = format!(
-            "`LanePosition` names the lane {}, which is no integer; lanes of roads have integer ids, {why}",
+            "`LanePosition` refers to the lane {}, which is not an integer; lanes of roads have integer ids, \
+             {why}",
             quoted(position, "laneId", &text)
         );
         found.about(position, "laneId", text).level(level);
@@ -264,7 +268,7 @@ fn lane(position: Element<'_, '_>, road: &Road<'_>, found: &mut Sink<'_>) {
     };
     if let LaneAt::None(section) = find_lane(road, s, id) {
         let text = format!(
-            "`LanePosition` names the lane {} of road `{}` at s = {}, but the lane section there {}",
+            "`LanePosition` refers to the lane {} of road `{}` at s = {}, but the lane section there {}",
             quoted(position, "laneId", &text),
             road.id(),
             metres(s),

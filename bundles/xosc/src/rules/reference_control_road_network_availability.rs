@@ -27,7 +27,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         };
         if let Some(why) = only_here(&path) {
             let text = format!(
-                "the path {} {why}; a path that starts at the directory of the scenario is found everywhere",
+                "the path {} {why}; a path relative to the directory of the scenario works everywhere",
                 quoted(file, "filepath", &path)
             );
             found
@@ -35,7 +35,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 .level(Level::Information);
         } else if path.contains('\\') {
             let text = format!(
-                "the path {} has backslashes, which divide directories on Windows only; `/` does everywhere",
+                "the path {} has backslashes, which are separators on Windows only; `/` works everywhere",
                 quoted(file, "filepath", &path)
             );
             found.about(file, "filepath", text);
@@ -52,16 +52,16 @@ fn only_here(path: &str) -> Option<&'static str> {
     let mut letters = path.chars();
     let drive = (letters.next(), letters.next());
     if matches!(drive, (Some(letter), Some(':')) if letter.is_ascii_alphabetic()) {
-        return Some("names a drive of one Windows machine");
+        return Some("refers to a drive of a single Windows machine");
     }
     if path.starts_with("\\\\") {
-        return Some("names a share of one network");
+        return Some("refers to a share of a single network");
     }
     let top = path
         .strip_prefix('/')
         .and_then(|path| path.split('/').next());
     let is_private = path.starts_with('~') || matches!(top, Some("home" | "Users" | "root"));
-    is_private.then_some("leads into one person's directory")
+    is_private.then_some("leads into the home directory of a single user")
 }
 
 /// Checks the path of a scene graph by its text only, because files of this kind are not opened.
@@ -69,7 +69,7 @@ fn scene(file: Element<'_, '_>, path: &str, found: &mut Sink<'_>) {
     let path = path.trim();
     if path.ends_with(['/', '\\']) || path == "." || path == ".." {
         let text = format!(
-            "the path {} is a directory; `SceneGraphFile` names a file, and is left out where there is none",
+            "the path {} is a directory; `SceneGraphFile` must name a file; leave it out if there is none",
             quoted(file, "filepath", path)
         );
         found.about(file, "filepath", text);

@@ -33,7 +33,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     if is_named || is_missed {
         return;
     }
-    let text = "the road network has no `LogicFile`; a scenario without roads is valid, but in most cases the \
-                map was forgotten";
+    let text = "the road network has no `LogicFile`; a scenario without roads is valid, but usually the map was \
+                forgotten";
     found.issue(network.node(), text);
 }

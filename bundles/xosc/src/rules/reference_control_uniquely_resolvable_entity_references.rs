@@ -27,13 +27,13 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             let known = *first.entry(name).or_insert(entry);
             if known != entry {
                 let text = format!(
-                    "the catalog already has an entry `{name}`, a `{}`; a reference by this name leads to \
-                     one of them, and which is up to the simulator",
+                    "the catalog already has an entry `{name}`, a `{}`; which one a reference with this name \
+                     uses depends on the simulator",
                     known.name()
                 );
                 found
                     .issue(entry, text)
-                    .at(known, "the first entry of this name");
+                    .at(known, "the first entry with this name");
             }
         }
     }

@@ -29,8 +29,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "{} has no actors, but private actions: they move nobody; `Actors` must have an `EntityRef` or \
-             `selectTriggeringEntities=\"true\"`",
+            "{} has private actions but no actors, so the actions affect no entity; `Actors` must have an \
+             `EntityRef` or `selectTriggeringEntities=\"true\"`",
             called(group)
         );
         found

@@ -39,13 +39,13 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         }
         let text = format!(
-            "`{}` is placed relative to `{reference}`, which is placed only further down; a simulator that \
-             goes from top to bottom does not know that place yet",
+            "`{}` is placed relative to `{reference}`, which is placed only later in the file; a simulator that \
+             reads from top to bottom does not know its position yet",
             start.name
         );
         found
             .about(start.position, "entityRef", text)
-            .at(later.position.node(), "where the other is placed");
+            .at(later.position.node(), "the position of the other entity");
     }
 }
 
@@ -102,7 +102,7 @@ fn say(members: &[&Start<'_, '_>], found: &mut Sink<'_>) {
         .map(|one| format!("`{}`", one.name))
         .collect();
     let text = format!(
-        "{} and again `{}` are each placed relative to the next, so none of them has a place",
+        "{} and again `{}` are each placed relative to the next, so none of them has a position",
         names.join(", "),
         first.name
     );
@@ -110,6 +110,6 @@ fn say(members: &[&Start<'_, '_>], found: &mut Sink<'_>) {
         .about(first.position, "entityRef", text)
         .level(Level::Error);
     for other in others {
-        finding = finding.at(other.position.node(), "another of them");
+        finding = finding.at(other.position.node(), "another of these positions");
     }
 }

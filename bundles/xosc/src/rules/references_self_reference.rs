@@ -57,7 +57,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             actor(
                 target,
                 "entityRef",
-                "keep its speed relative to itself for ever",
+                "keep its speed relative to itself forever",
                 &mut casts,
                 found,
             );
@@ -96,7 +96,7 @@ fn actor<'m, 'd>(
         && action.scenario().entities().contains(&name)
     {
         let text = format!(
-            "the actor {} is to {what}",
+            "the action makes the actor {} {what}",
             quoted(action, attribute, &name)
         );
         found
@@ -123,12 +123,12 @@ fn triggering(condition: Element<'_, '_>, always: &str, found: &mut Sink<'_>) {
         && condition.scenario().entities().contains(&name)
     {
         let text = format!(
-            "the condition compares {} with itself: {always}",
+            "the condition compares {} with itself; {always}",
             quoted(condition, "entityRef", &name)
         );
         found
             .about(condition, "entityRef", text)
-            .at(entities.node(), "whom the condition is about");
+            .at(entities.node(), "the triggering entities");
     }
 }
 
@@ -143,7 +143,7 @@ fn first_positions(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             .is_some_and(|name| name == *start.name);
         if is_first && own && start.position.name().starts_with("Relative") {
             let text = format!(
-                "`{}` is placed relative to itself, before it has any place",
+                "`{}` is placed relative to itself before it has a position",
                 start.name
             );
             found.about(start.position, "entityRef", text);

@@ -22,8 +22,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let text = format!(
-                "`{name}` names the lane {}, the center lane, which has no width: it is the line between \
-                 the two sides of a road; lanes to the right have ids below zero, to the left above",
+                "`{name}` refers to the lane {}, the center lane, which has no width; it is the line between the \
+                 two sides of a road; lanes on the right have ids below zero, lanes on the left above zero",
                 quoted(position, "laneId", &id)
             );
             found.about(position, "laneId", text);
@@ -34,8 +34,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "`AbsoluteTargetLane` leads to the lane {}, the center lane, which has no width: the vehicle would \
-             drive on the line between the two sides of the road; if that is meant, an offset says so",
+            "`AbsoluteTargetLane` refers to the lane {}, the center lane, which has no width; the vehicle would \
+             drive on the line between the two sides of the road; if this is intended, use an offset",
             quoted(target, "value", &id)
         );
         found.about(target, "value", text);

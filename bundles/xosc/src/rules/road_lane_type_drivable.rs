@@ -51,7 +51,7 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
         };
         let goes = match owner.name() {
             "TeleportAction" => "is placed",
-            "AcquirePositionAction" => "is sent to a place",
+            "AcquirePositionAction" => "is sent to a position",
             _ => continue,
         };
         let lane = road_of(position, map).and_then(|road| lane_of(position, road));
@@ -115,7 +115,7 @@ fn relative_to_others(
         if let Some((kind, level)) = level
             && said.insert(position.node().offset())
         {
-            let goes = "begins, relative to another,";
+            let goes = "starts, relative to another entity,";
             say(position, entity, goes, (lane, kind, s), level, found);
         }
     }

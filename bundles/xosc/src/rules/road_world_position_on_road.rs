@@ -21,7 +21,7 @@ const DISTANCE: Param = Param::number(
     "distance",
     20.0,
     "m",
-    "a vehicle may be so far away from the next lane",
+    "largest distance of a vehicle from the nearest lane that is accepted",
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -47,7 +47,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         }
         let text = format!(
-            "the place of the vehicle `{}`, x = {}, y = {}, is more than {} away from every lane of the road \
+            "the position of the vehicle `{}`, x = {}, y = {}, is more than {} away from every lane of the road \
              network",
             vehicle.name(),
             metres(x),
@@ -82,7 +82,7 @@ fn relative_to_others(
             continue;
         }
         let text = format!(
-            "the place of the vehicle `{}`, which is x = {}, y = {}, is more than {} away from every lane of \
+            "the position of the vehicle `{}`, which is x = {}, y = {}, is more than {} away from every lane of \
              the road network",
             start.name,
             metres(place.x),

@@ -52,8 +52,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         return;
     }
     let text = format!(
-        "the file of the road network is no OpenDRIVE map: its root element is `{}` instead of `OpenDRIVE`; \
-         nothing that needs roads was checked",
+        "the file of the road network is not an OpenDRIVE map: its root element is `{}` instead of `OpenDRIVE`; \
+         checks that need roads were skipped",
         root.name()
     );
     found

@@ -59,13 +59,13 @@ fn say(
     let (here, before) = (place(to), place(from));
     let text = if is_linked {
         format!(
-            "this waypoint ({here}) is reached from the one before it ({before}) only against the direction \
+            "this waypoint ({here}) can be reached from the one before it ({before}) only against the direction \
              of traffic"
         )
     } else {
         format!(
-            "this waypoint ({here}) cannot be reached from the one before it ({before}): no linked lanes lead \
-             there"
+            "this waypoint ({here}) cannot be reached from the one before it ({before}), because no linked lanes \
+             lead there"
         )
     };
     found

@@ -23,8 +23,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             if let (Some((previous, there)), Some((_, position))) = (before, here)
                 && is_same(there, position)
             {
-                let text = "the waypoint is at the same place as the one before it; it adds nothing to the \
-                            route, and another place may have been meant";
+                let text = "the waypoint is at the same position as the one before it; it adds nothing to the \
+                            route, and another position may be intended";
                 found
                     .about(waypoint, "", text)
                     .at(previous.node(), "the waypoint before it");

@@ -32,7 +32,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 "one waypoint"
             };
             let text = format!(
-                "the route has {there}; it leads from one waypoint to the next, so it needs two at least"
+                "the route has {there}; it leads from one waypoint to the next, so it needs at least two"
             );
             found.about(route, "", text);
         }

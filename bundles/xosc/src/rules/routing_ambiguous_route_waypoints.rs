@@ -32,14 +32,14 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             });
             let text = match count {
                 0 if is_for_vehicles(route) => {
-                    "the waypoint is a `WorldPosition` on no lane of the road network; a `LanePosition` says \
-                     which road the route takes"
+                    "the waypoint is a `WorldPosition` that is on no lane of the road network; use a \
+                     `LanePosition` to define which road the route takes"
                         .to_owned()
                 }
                 0 | 1 => continue,
                 count => format!(
-                    "the waypoint is a `WorldPosition` on the lanes of {count} roads, {roads}; a `LanePosition` \
-                     says which one the route takes"
+                    "the waypoint is a `WorldPosition` that is on the lanes of {count} roads, {roads}; use a \
+                     `LanePosition` to define which road the route takes"
                 ),
             };
             found

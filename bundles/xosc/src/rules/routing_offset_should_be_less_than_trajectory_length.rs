@@ -32,7 +32,7 @@ fn look_at(element: Element<'_, '_>, attribute: &str, found: &mut Sink<'_>) {
     let value = shown(element, attribute, &metres(offset));
     if offset < 0.0 {
         let text = format!(
-            "`{attribute}` of `{}` is {value}; a trajectory begins at 0, there is nothing before it",
+            "`{attribute}` of `{}` is {value}, but must not be negative; a trajectory starts at 0",
             element.name()
         );
         found.about(element, attribute, text);
@@ -48,11 +48,11 @@ fn look_at(element: Element<'_, '_>, attribute: &str, found: &mut Sink<'_>) {
     let (is_beyond, lost) = if element.is("TrajectoryPosition") {
         (offset > length + 1e-3, "it ends before that")
     } else {
-        (offset >= length, "nothing of it is left to follow")
+        (offset >= length, "no part of it is left to follow")
     };
     if is_beyond {
         let text = format!(
-            "`{attribute}` of `{}` is {value}, but the {} is no longer than {}: {lost}",
+            "`{attribute}` of `{}` is {value}, but the {} is at most {} long; {lost}",
             element.name(),
             named(trajectory),
             metres(length)

@@ -31,8 +31,8 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let text = format!(
-                "the waypoint is on the road `{}`, which lies in the junction `{junction}`; roads of a junction \
-                 overlap, so waypoints should be before and behind it",
+                "the waypoint is on the road `{}`, which is in the junction `{junction}`; roads of a junction \
+                 overlap, so waypoints should be before and after it",
                 road.id()
             );
             found

@@ -39,7 +39,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         };
         let (count, all) = (missing().count(), stamps.len());
         let text = format!(
-            "`Timing` asks for the times of the {}, but `{}` has no `{}`{}",
+            "`Timing` requires the times of the {}, but `{}` has no `{}`{}",
             named(trajectory),
             first.element.name(),
             first.attribute,
@@ -51,6 +51,6 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         );
         found
             .about(first.element, "", text)
-            .at(timing.node(), "asks for times");
+            .at(timing.node(), "the element that requires the times");
     }
 }

@@ -138,7 +138,7 @@ fn activate(
         }
         if own.is_empty() && !names_one {
             let text = format!(
-                "no controller is ever assigned to `{}`, so there is none to activate",
+                "no controller is ever assigned to `{}`, so none can be activated",
                 entity.name()
             );
             found.about(action, "", text).level(Level::Warning);
@@ -187,7 +187,7 @@ fn meant<'c, 'd>(
             let (level, whom) = if exists {
                 (Level::Warning, format!("`{entity}`"))
             } else {
-                (Level::Error, format!("`{entity}` or anybody else"))
+                (Level::Error, format!("`{entity}` or any other entity"))
             };
             let text = format!(
                 "no controller {} is ever assigned to {whom}{}",

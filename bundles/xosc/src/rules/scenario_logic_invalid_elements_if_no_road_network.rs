@@ -32,14 +32,14 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         for (name, first, count) in used(scenario, names) {
             let many = match count {
                 1 => format!("a `{name}` is used"),
-                count => format!("`{name}` is used {count} times, here first"),
+                count => format!("`{name}` is used {count} times, first here"),
             };
             let lost = match level {
-                Level::Error => "there are no roads that it could refer to",
-                _ => "only the simulator can know the signals that it is about",
+                Level::Error => "there are no roads that it can refer to",
+                _ => "only the simulator can know the signals that it refers to",
             };
             let text =
-                format!("{many}, but the scenario has no road network (`LogicFile`): {lost}");
+                format!("{many}, but the scenario has no road network (`LogicFile`); {lost}");
             let finding = found.about(first, "", text).level(level);
             if let Some(network) = network {
                 finding.at(network.node(), "the road network without `LogicFile`");

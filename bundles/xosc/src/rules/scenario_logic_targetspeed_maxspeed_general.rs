@@ -21,7 +21,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.1,
     "m/s",
-    "by how much a target speed may exceed the greatest speed",
+    "largest accepted excess of a target speed over the maximum speed",
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -46,16 +46,17 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let (level, effect) = if follows {
             (
                 Level::Warning,
-                "it is to follow within its limits, so it never gets there and the action does not end",
+                "the vehicle must follow within its limits, so it never reaches this speed and the action does \
+                 not end",
             )
         } else {
             (
                 Level::Information,
-                "a simulator drives it faster than it can, or stops at its greatest speed",
+                "a simulator either exceeds the limit of the vehicle or stops accelerating at its maximum speed",
             )
         };
         let text = format!(
-            "the target speed of {} m/s is beyond the `maxSpeed` of `{name}`, which is {} m/s: {effect}",
+            "the target speed of {} m/s exceeds the `maxSpeed` of `{name}`, which is {} m/s; {effect}",
             stated(target, "value", speed),
             short(most)
         );

@@ -20,7 +20,7 @@ const TOLERANCE: Param = Param::number(
     "tolerance",
     0.1,
     "m/s",
-    "by how much a speed may exceed the greatest speed",
+    "largest accepted excess of a speed over the maximum speed",
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -49,8 +49,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             further => format!(" (one of {} such entries)", further + 1),
         };
         let text = format!(
-            "the speed of {} m/s{further} is beyond the `maxSpeed` of `{name}`, which is {} m/s: in mode \
-             `follow` it never gets there",
+            "the speed of {} m/s{further} exceeds the `maxSpeed` of `{name}`, which is {} m/s; in mode `follow` \
+             it is never reached",
             stated(entry, "speed", speed),
             short(most)
         );

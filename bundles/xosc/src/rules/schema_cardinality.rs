@@ -22,7 +22,7 @@ const CONTAINERS: &[(&str, &[&str], &str)] = &[
         "ManeuverGroup",
         // The last one belongs to modular scenarios. Another rule reports it.
         &["Maneuver", "CatalogReference", "ScenarioReference"],
-        "has neither a `Maneuver` nor a `CatalogReference`: nothing happens in it, and it is over at once",
+        "has neither a `Maneuver` nor a `CatalogReference`; nothing happens in it, and it ends at once",
     ),
     (
         "OverrideControllerValueAction",
@@ -34,13 +34,13 @@ const CONTAINERS: &[(&str, &[&str], &str)] = &[
             "SteeringWheel",
             "Gear",
         ],
-        "overrides nothing: it may have a `Throttle`, a `Brake`, a `Clutch`, a `ParkingBrake`, a `SteeringWheel` \
+        "overrides nothing; it may have a `Throttle`, a `Brake`, a `Clutch`, a `ParkingBrake`, a `SteeringWheel` \
          and a `Gear`",
     ),
     (
         "Environment",
         &["TimeOfDay", "Weather", "RoadCondition"],
-        "has no `TimeOfDay`, `Weather` or `RoadCondition`: it leaves everything as it is",
+        "has no `TimeOfDay`, `Weather` or `RoadCondition`; it changes nothing",
     ),
 ];
 

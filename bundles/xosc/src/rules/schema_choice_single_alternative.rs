@@ -196,7 +196,7 @@ fn choose(element: Element<'_, '_>, one_of: &OneOf, found: &mut Sink<'_>) {
         }
         (Some(first), Some(second)) if one_of.several => {
             let text = format!(
-                "this `{}` has `{}` beside `{}`, but must have only one of {allowed}",
+                "this `{}` has `{}` in addition to `{}`, but must have only one of {allowed}",
                 element.name(),
                 second.name(),
                 first.name()

@@ -33,8 +33,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         }
         let text = format!(
-            "the condition waits for the state {} of the signal `{signal}`, but its phases set it only to {}: \
-             unless the simulator does something else, it is never true",
+            "the condition waits for the state {} of the signal `{signal}`, but its phases set it only to {}; \
+             unless the simulator does otherwise, the condition is never true",
             quoted(condition, "state", &state),
             listed(shown.iter().map(String::as_str))
         );

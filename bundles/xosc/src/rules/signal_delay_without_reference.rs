@@ -18,8 +18,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         match (controller.has("delay"), controller.has("reference")) {
             (true, false) => delay_alone(controller, found),
             (false, true) => {
-                let text = "the controller has a `reference` to another one and no `delay`; the two belong \
-                            together: without a delay nobody knows how far it is behind";
+                let text = "the controller has a `reference` to another controller but no `delay`; both are \
+                            required together, because the time shift between them is undefined without a delay";
                 found
                     .about(controller, "reference", text)
                     .level(Level::Warning);
@@ -35,8 +35,8 @@ fn delay_alone(controller: Element<'_, '_>, found: &mut Sink<'_>) {
         return;
     };
     let text = format!(
-        "the controller has a `delay` of {delay} s and no `reference`; the delay counts from the first \
-         phase of the controller that `reference` names, so it has no effect"
+        "the controller has a `delay` of {delay} s but no `reference`; the delay counts from the first phase of \
+         the controller that `reference` names, so it has no effect"
     );
     found.about(controller, "delay", text);
 }

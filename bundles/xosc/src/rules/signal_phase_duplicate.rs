@@ -32,12 +32,12 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             };
             let signal = quoted(state, "trafficSignalId", &signal);
             let (level, text) = if one == other {
-                let text = format!("the phase gives the signal {signal} its state twice");
+                let text = format!("the phase sets the signal {signal} to the same state twice");
                 (Level::Information, text)
             } else {
                 let text = format!(
-                    "the phase sets the signal {signal} to `{other}` and to `{one}` before: which of them it \
-                     shows, or whether both, is up to the simulator"
+                    "the phase sets the signal {signal} to `{other}` and to `{one}` before; which of them it \
+                     shows, or whether it shows both, depends on the simulator"
                 );
                 (Level::Warning, text)
             };

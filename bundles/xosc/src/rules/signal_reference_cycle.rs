@@ -64,10 +64,10 @@ fn report(
     };
     let name = first.text("name").unwrap_or_default();
     let text = if rest.is_empty() {
-        format!("the controller `{name}` refers to itself, so its phases never begin")
+        format!("the controller `{name}` refers to itself, so its phases never start")
     } else {
         format!(
-            "the references of {} controllers lead from `{name}` back to it, so none of them begins first",
+            "the references of {} controllers lead from `{name}` back to it, so none of them starts first",
             elements.len()
         )
     };

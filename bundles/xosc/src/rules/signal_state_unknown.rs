@@ -104,8 +104,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             )
         } else {
             format!(
-                "`{}` has the state `{state}`{often}; the standard leaves the words to the road network and \
-                 the simulator, and this one is neither a colour nor a list of lights that are `on` or `off`",
+                "`{}` has the state `{state}`{often}; the standard leaves the words to the road network and the \
+                 simulator; this one is neither a colour nor a list of lights that are `on` or `off`",
                 element.name()
             )
         };

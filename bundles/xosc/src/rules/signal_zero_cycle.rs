@@ -25,7 +25,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         };
         if durations.iter().all(|duration| *duration == 0.0) {
             let text = format!(
-                "{} 0 s in all; a cycle that takes no time cannot be repeated",
+                "{} 0 s in total; a cycle without duration cannot be repeated",
                 match durations.len() {
                     1 => "the only phase of the controller lasts".to_owned(),
                     count => format!("the {count} phases of the controller last"),

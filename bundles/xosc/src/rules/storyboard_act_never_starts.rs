@@ -25,7 +25,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let remedy = if scenario.version() >= (1, 3) {
         "an act without `StartTrigger` starts at once"
     } else {
-        "an act that is to start at once has a condition such as a simulation time greater than 0"
+        "to start an act at once, use a condition such as a simulation time greater than 0"
     };
     triggers::empty_starts(scenario, "Act", has_content, remedy, found);
 }

@@ -75,8 +75,8 @@ fn take<'m, 'd>(
                 continue;
             }
             let text = format!(
-                "{} and {} start by the same trigger and both take over the {} motion of `{}`: which of them \
-                 holds depends on the simulator",
+                "{} and {} are started by the same trigger and both control the {} motion of `{}`; which of them \
+                 takes effect depends on the simulator",
                 called(action),
                 called(other),
                 domain.word(),

@@ -23,7 +23,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         return;
     };
     if actions.children().next().is_none() && storyboard.child("Story").is_none() {
-        let text = "the storyboard has neither a story nor an action in `Init`: nothing happens in this scenario";
+        let text = "the storyboard has neither a story nor an action in `Init`; nothing happens in this scenario";
         found.about(storyboard, "", text);
     }
 }

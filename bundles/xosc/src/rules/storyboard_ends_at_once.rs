@@ -40,7 +40,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             ))
         });
         let text = format!(
-            "the storyboard stops when the simulation time is {}, which it is from the beginning: the run ends \
+            "the storyboard stops when the simulation time is {}, which is true from the beginning; the run ends \
              before anything happens",
             shown.unwrap_or_default()
         );

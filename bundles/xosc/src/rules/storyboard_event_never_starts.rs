@@ -19,7 +19,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let remedy = if scenario.version() >= (1, 1) {
         "an event without `StartTrigger` starts with its act"
     } else {
-        "an event that is to start with its act has a condition such as a simulation time greater than 0"
+        "to start an event with its act, use a condition such as a simulation time greater than 0"
     };
     triggers::empty_starts(scenario, "Event", |_| true, remedy, found);
 }

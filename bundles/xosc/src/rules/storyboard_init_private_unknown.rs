@@ -31,8 +31,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "`Init` has a further `Private` of {}: all of its actions happen at the start, and in which order \
-             the standard does not say; one `Private` with all of them is easier to read",
+            "`Init` has another `Private` of {}; all of its actions happen at the start, but the standard does \
+             not define their order; one `Private` with all of them is easier to read",
             quoted(private, "entityRef", &name)
         );
         found

@@ -47,12 +47,13 @@ fn compare(first: Element<'_, '_>, event: Element<'_, '_>, found: &mut Sink<'_>)
         return;
     }
     let text = format!(
-        "{} starts by the same trigger as {}, with priority `{other}` against `{one}`: which of them goes on \
-         depends on the order in which the simulator starts them",
+        "{} is started by the same trigger as {}, with priority `{other}` instead of `{one}`; which of them \
+         continues depends on the order in which the simulator starts them",
         called(event),
         called(first)
     );
-    found
-        .about(event, "priority", text)
-        .at(first.node(), "the event that starts by the same trigger");
+    found.about(event, "priority", text).at(
+        first.node(),
+        "the event that is started by the same trigger",
+    );
 }

@@ -32,8 +32,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             });
         if only_global {
             let text = format!(
-                "{} has actors, but global actions only, which no entity carries out: `Actors` may be empty, or \
-                 a private action was meant",
+                "{} has actors but only global actions, which no entity performs; `Actors` may be empty, or a \
+                 private action may be intended",
                 called(group)
             );
             found.about(actor, "", text);

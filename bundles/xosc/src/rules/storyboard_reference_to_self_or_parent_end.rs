@@ -57,18 +57,18 @@ fn say<'d>(
     let state = &condition.state;
     let text = if itself {
         format!(
-            "{} waits for its own `{state}` before it starts, which cannot come first: it never starts",
+            "{} waits for its own `{state}` before it starts, which cannot happen first; it never starts",
             called(element)
         )
     } else {
         format!(
-            "{} waits for the `{state}` of {}, which it lies in: when that is complete, nothing in it starts any \
-             more",
+            "{} waits for the `{state}` of {}, which contains it; when that is complete, nothing in it starts \
+             any more",
             called(element),
             called(condition.target)
         )
     };
     found
         .about(condition.element, "storyboardElementRef", text)
-        .at(condition.target.node(), "what it waits for");
+        .at(condition.target.node(), "the element that it waits for");
 }

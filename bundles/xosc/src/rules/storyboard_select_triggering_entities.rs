@@ -27,7 +27,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         }
         let text = format!(
             "the actors of {} are the entities that trigger it, but no start trigger of its act or of its events \
-             has a `ByEntityCondition`: nobody acts",
+             has a `ByEntityCondition`; no entity acts",
             called(group)
         );
         found.about(block, "selectTriggeringEntities", text);

@@ -20,14 +20,14 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     };
     match storyboard.child("StopTrigger") {
         Some(trigger) if trigger.children().next().is_none() => {
-            let text = "the `StopTrigger` of the storyboard is empty and never true: nothing ends the run; \
-                        a `SimulationTimeCondition` would";
+            let text = "the `StopTrigger` of the storyboard is empty and never true, so nothing ends the run; \
+                        use a `SimulationTimeCondition`";
             found.about(trigger, "", text);
         }
         // Before 1.3 the schema requires one.
         None if scenario.version() >= (1, 3) => {
-            let text = "the storyboard has no `StopTrigger`: nothing ends the run; a `SimulationTimeCondition` \
-                        would";
+            let text = "the storyboard has no `StopTrigger`, so nothing ends the run; use a \
+                        `SimulationTimeCondition`";
             found.about(storyboard, "", text);
         }
         _ => {}

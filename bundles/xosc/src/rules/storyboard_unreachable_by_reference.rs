@@ -33,22 +33,23 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let rest: Vec<String> = others.iter().map(|(place, _)| named(*place)).collect();
         let text = match rest.as_slice() {
             [] => format!(
-                "{} starts only after something within it has started, which cannot come first: it never starts",
+                "{} starts only after something within it has started, which cannot happen first; it never \
+                 starts",
                 named(*first)
             ),
             [other] => format!(
-                "{} and {other} wait for each other: neither ever starts",
+                "{} and {other} wait for each other; neither ever starts",
                 named(*first)
             ),
             rest => format!(
-                "{} waits for {}, and that for the first of them: none of them ever starts",
+                "{} waits for {}, which waits for the first of them; none of them ever starts",
                 named(*first),
                 chain(rest)
             ),
         };
         let mut finding = found.about(*condition, "storyboardElementRef", text);
         for (_, further) in others.iter().take(4) {
-            finding = finding.at(further.node(), "the next that waits");
+            finding = finding.at(further.node(), "the next element that waits");
         }
     }
 }
@@ -59,7 +60,7 @@ fn chain(names: &[String]) -> String {
     let join = |names: &[String]| names.join(", which waits for ");
     match (names.get(..MOST), names.last()) {
         (Some(shown), Some(last)) if names.len() > MOST + 1 => format!(
-            "{}, and so on over {} more to {last}",
+            "{}, and so on through {} more to {last}",
             join(shown),
             names.len() - MOST - 1
         ),

@@ -43,7 +43,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             count => format!("; the {} has {count} such pairs", named(trajectory)),
         };
         let text = format!(
-            "the vertex is at the same place as the one before it, so the line between them has no \
+            "the vertex is at the same position as the one before it, so the line between them has no \
              direction{more}"
         );
         found

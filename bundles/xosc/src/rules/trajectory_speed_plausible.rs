@@ -20,19 +20,20 @@ const SPEED: Param = Param::number(
     "speed",
     1.05,
     "",
-    "so many times the vehicle's `maxSpeed` may be needed",
+    "largest accepted ratio of the required speed to the vehicle's `maxSpeed`",
 );
 const ACCELERATION: Param = Param::number(
     "acceleration",
     1.5,
     "",
-    "so many times the vehicle's `maxAcceleration` or `maxDeceleration` may be needed",
+    "largest accepted ratio of the required acceleration or deceleration to the vehicle's `maxAcceleration` or \
+     `maxDeceleration`",
 );
 const SPAN: Param = Param::number(
     "span",
     1.0,
     "s",
-    "speeds are taken over at least this time, so that rounded digits do not look like accelerations",
+    "speeds are averaged over at least this time, so that rounded digits do not appear as accelerations",
 );
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
@@ -136,7 +137,7 @@ fn speed(
         return false;
     };
     let text = format!(
-        "to be at this vertex in time, `{}` would have to drive at {speed:.1} m/s, but its `maxSpeed` is {} m/s",
+        "to reach this vertex in time, `{}` would have to drive at {speed:.1} m/s, but its `maxSpeed` is {} m/s",
         limits.name, limits.speed
     );
     say(action, vertex, limits, text, found);
@@ -174,7 +175,7 @@ fn acceleration(
         ("brake", "maxDeceleration", limits.deceleration)
     };
     let text = format!(
-        "around this vertex `{}` would have to {what} with {:.1} m/s², but its `{limit}` is {most} m/s²",
+        "around this vertex `{}` would have to {what} at {:.1} m/s², but its `{limit}` is {most} m/s²",
         limits.name,
         change.abs()
     );
@@ -212,9 +213,9 @@ fn say(
 ) {
     let finding = found
         .about(vertex, "time", text)
-        .at(limits.performance.node(), "what the vehicle can do");
+        .at(limits.performance.node(), "the limits of the vehicle");
     // A trajectory of a catalog is already reported at its reference.
     if vertex.reference().is_none() {
-        finding.at(action.node(), "who follows the trajectory");
+        finding.at(action.node(), "the action that follows the trajectory");
     }
 }

@@ -81,7 +81,7 @@ fn look_at(
         && stamp.element.is("Vertex")
     {
         let text = format!(
-            "the {} begins at {time} s; times begin at 0",
+            "the {} starts at {time} s, but times start at 0",
             named(trajectory)
         );
         found.about(stamp.element, stamp.attribute, text);
@@ -113,7 +113,10 @@ fn say(
     let ((from, before), (to, after)) = (step.from, step.to);
     let more = match count {
         1 => String::new(),
-        count => format!("; so it is at {count} places of the {}", named(trajectory)),
+        count => format!(
+            "; this occurs at {count} places of the {}",
+            named(trajectory)
+        ),
     };
     let text = format!(
         "`{}` of `{}` is {} s, but the time before it is {before} s; the times of a trajectory must increase{more}",

@@ -35,8 +35,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                     if let (Some(against), Some(element)) = (other.against(&claim), claim.element())
                     {
                         let text = format!(
-                            "this `{}` demands {}, another condition of the same group {}: all conditions of a group \
-                             must be true at once, so this group never is",
+                            "this `{}` requires {}, another condition of the same group {}; all conditions of a \
+                             group must be true at once, so this group is never true",
                             element.name(),
                             claim.wanted(),
                             against.wanted

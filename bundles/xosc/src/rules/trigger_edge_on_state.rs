@@ -42,22 +42,22 @@ fn of_time(time: Element<'_, '_>, edge: &str) -> Option<(Level, String)> {
         ("falling", "greaterThan" | "greaterOrEqual") => Some((
             Level::Warning,
             format!(
-                "the time becomes greater than {wanted} s and stays so: a `falling` edge never comes, only a \
+                "the time becomes greater than {wanted} s and stays so; a `falling` edge never occurs, only a \
                  `rising` one does"
             ),
         )),
         ("rising", "lessThan" | "lessOrEqual") => Some((
             Level::Warning,
             format!(
-                "the time is less than {wanted} s from the beginning or never: a `rising` edge never comes, only a \
-                 `falling` one does"
+                "the time is less than {wanted} s from the beginning or never; a `rising` edge never occurs, \
+                 only a `falling` one does"
             ),
         )),
         ("rising", "equalTo" | "greaterOrEqual") if value == 0.0 => Some((
             Level::Information,
             format!(
-                "at {wanted} s the condition is true in the very first step, before which there is none to rise \
-                 from: strictly the edge never comes; `conditionEdge=\"none\"` is what such a condition needs"
+                "at {wanted} s the condition is true in the very first step, and there is no earlier step to \
+                 rise from; strictly, the edge never occurs; use `conditionEdge=\"none\"`"
             ),
         )),
         _ => None,
@@ -70,11 +70,12 @@ fn of_state(state: Element<'_, '_>, edge: &str) -> Option<(Level, String)> {
     let transition = name.ends_with("Transition");
     let text = match edge {
         "falling" if transition => format!(
-            "`{name}` lasts for one step: its `falling` edge only comes one step later; `none` or `rising` is meant"
+            "`{name}` lasts for one step, so its `falling` edge occurs only one step later; use `none` or \
+             `rising`"
         ),
         "risingOrFalling" if transition => format!(
-            "`{name}` lasts for one step: it rises and falls, so the condition is true in two steps in a row; \
-             `none` or `rising` is meant"
+            "`{name}` lasts for one step; it rises and falls, so the condition is true in two successive steps; \
+             use `none` or `rising`"
         ),
         _ => return None,
     };

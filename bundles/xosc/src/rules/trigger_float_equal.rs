@@ -26,8 +26,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let text = format!(
-                "`{}` demands exactly {}: a measured quantity goes past a value without ever being equal to it, \
-                 and then the condition is never true; `greaterThan` or `lessThan` is sure",
+                "`{}` requires exactly {}; a measured quantity may pass a value without ever being equal to it, \
+                 and then the condition is never true; use `greaterThan` or `lessThan`",
                 condition.name(),
                 stated(condition, "value", value)
             );

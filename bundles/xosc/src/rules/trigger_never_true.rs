@@ -41,7 +41,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 continue;
             }
             let text = format!(
-                "the condition demands `{rule}` {}, but {what} is never below 0: it is never true",
+                "the condition requires `{rule}` {}, but {what} is never below 0; it is never true",
                 stated(condition, "value", value)
             );
             found.about(condition, "value", text);

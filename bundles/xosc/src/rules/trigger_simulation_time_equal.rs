@@ -30,8 +30,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         };
         let text = format!(
-            "the simulation time is to be equal to {} s, but it goes on in steps that may miss that moment, and \
-             then the condition is never true; {instead} holds from then on",
+            "the simulation time must be equal to {} s, but it advances in steps that may miss that moment, and \
+             then the condition is never true; use {instead}, which is true from then on",
             stated(time, "value", value)
         );
         found.about(time, "rule", text);

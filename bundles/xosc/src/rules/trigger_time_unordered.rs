@@ -79,7 +79,7 @@ fn too_late(
         "ends"
     };
     let text = format!(
-        "{} starts at {} s at the earliest, but {what} {ends} at {} s: it never starts",
+        "{} starts at {} s at the earliest, but {what} {ends} at {} s; it never starts",
         called(element),
         short(start),
         short(end)
@@ -94,7 +94,7 @@ fn too_late(
     found
         .about(condition, "value", text)
         .level(level)
-        .at(by.node(), "what ends it");
+        .at(by.node(), "the condition that ends it");
     true
 }
 

@@ -44,8 +44,8 @@ fn run<'d>(scenario: &Scenario<'d>, found: &mut Sink<'_>) {
             continue;
         }
         let text = format!(
-            "`{}` is to travel a distance, but nothing in this scenario moves it: it has no controller, and no \
-             action gives it a speed or a way; unless the simulator drives it, the condition is never true",
+            "`{}` must travel a distance, but nothing in this scenario moves it; it has no controller, and no \
+             action gives it a speed or a path; unless the simulator drives it, the condition is never true",
             entity.name()
         );
         found.about(condition, "", text);

@@ -23,13 +23,13 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         };
         if !is_identifier(name) {
             let text = format!(
-                "`{name}` is no name as variables should have it: a letter or `_`, followed by letters, digits \
-                 and `_`"
+                "`{name}` is not a valid variable name; it should be a letter or `_`, followed by letters, \
+                 digits and `_`"
             );
             found.about(declaration, "name", text);
         } else if let Some(parameter) = parameters.get(name) {
             let text = format!(
-                "a parameter is called `{name}`, too; `${name}` means the parameter, `variableRef` the variable, \
+                "a parameter is also named `{name}`; `${name}` means the parameter, `variableRef` the variable, \
                  and readers confuse the two"
             );
             found

@@ -30,8 +30,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             continue;
         }
         let text = format!(
-            "no action sets the variable `{name}`: unless the outside does, it stays as it is declared and so \
-             does this condition"
+            "no action sets the variable `{name}`; unless it is set from outside, it keeps its declared value \
+             and the condition never changes"
         );
         found
             .about(condition, "variableRef", text)

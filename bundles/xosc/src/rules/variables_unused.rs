@@ -28,7 +28,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let name = declared::bare(declaration.written("name").unwrap_or(""));
         if !used.contains(name) && !dangling.may_mean(name) {
             let text = format!(
-                "no action sets the variable `{name}` and no condition looks at it; only the outside can use it"
+                "no action sets the variable `{name}`, and no condition reads it; it can be used only from \
+                 outside"
             );
             found.issue(declaration.node(), text);
         }

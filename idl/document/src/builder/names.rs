@@ -83,7 +83,7 @@ impl Names {
             .ok()
             .filter(|len| len & NAME_IN_HEAP == 0);
         let len = len.ok_or(BuildError::TooLarge {
-            what: "the letters of a name",
+            what: "the characters of a name",
         })?;
         let record = NameRecord {
             offset: U32::new(offset),

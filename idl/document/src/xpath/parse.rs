@@ -4,7 +4,7 @@ use thiserror::Error;
 
 /// Reason why an XPath cannot be evaluated.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("follow the XPath '{xpath}': expected {expected} at character {at}")]
+#[error("evaluate the XPath '{xpath}': expected {expected} at character {at}")]
 pub struct XPathError {
     /// The expression.
     pub xpath: String,

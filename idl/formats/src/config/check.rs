@@ -165,8 +165,7 @@ fn check_bundle(bundle: &BundleConfig, known: &Known, oddities: &mut Vec<Oddity>
 
 fn unknown_catalogue(bundle: &BundleConfig) -> Oddity {
     let text = format!(
-        "what `{}` offers is known only when it has joined: its checkers and parameters were not \
-         looked at",
+        "the checkers and parameters of `{}` were not validated, because they are only known once it has joined",
         bundle.application
     );
     Oddity::information(bundle.position, text)
@@ -182,8 +181,8 @@ fn named_before(bundle: &BundleConfig, before: &[BundleConfig], known: &Known) -
         .iter()
         .find(|b| same_bundle(&b.application, &found.name, &found.alias))?;
     let text = format!(
-        "`{}` in row {} is the same bundle as `{}`; put everything into the first one, only that \
-         counts",
+        "`{}` in row {} is the same bundle as `{}`; move everything to the first one, because only that one is \
+         used",
         first.application, first.position.row, bundle.application
     );
     Some(Oddity::warning(bundle.position, text))
@@ -200,9 +199,9 @@ fn unknown_bundle(application: &str, position: TextPosition, known: &Known) -> O
     let there = if !hint.is_empty() {
         hint
     } else if there.is_empty() {
-        String::from("; there is no bundle at all")
+        String::from("; no bundle is known")
     } else {
-        format!("; there are: {}", there.join(", "))
+        format!("; known bundles: {}", there.join(", "))
     };
     let meant = match canonical_bundle(application) {
         Some((name, _)) if name != application => format!(" (ASAM's `{name}`)"),
@@ -210,7 +209,7 @@ fn unknown_bundle(application: &str, position: TextPosition, known: &Known) -> O
     };
     Oddity::warning(
         position,
-        format!("no bundle is called `{application}`{meant}{there}"),
+        format!("no bundle has the name `{application}`{meant}{there}"),
     )
 }
 
@@ -292,12 +291,12 @@ fn check_report(report: &ReportConfig, known: &Known) -> Option<Oddity> {
     let names: Vec<&str> = known.reporters.iter().map(String::as_str).collect();
     let hint = match did_you_mean(name, names.iter().copied()) {
         hint if hint.is_empty() && !names.is_empty() => {
-            format!("; there are {}", names.join(", "))
+            format!("; known reporters: {}", names.join(", "))
         }
         hint => hint,
     };
     Some(Oddity::warning(
         report.position,
-        format!("no reporter is called `{name}`{hint}"),
+        format!("no reporter has the name `{name}`{hint}"),
     ))
 }

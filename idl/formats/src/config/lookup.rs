@@ -222,9 +222,9 @@ impl CheckerConfig {
         Oddity::information(
             self.position,
             format!(
-                "checker `{}`: minLevel=\"{worst}\" maxLevel=\"{mildest}\" is the order of 2023; \
-                 read as the levels {worst} to {mildest} (today: minLevel=\"{mildest}\" \
-                 maxLevel=\"{worst}\", because 1 is an error and 3 an information)",
+                "checker `{}`: minLevel=\"{worst}\" maxLevel=\"{mildest}\" is the order of 2023 and is read as \
+                 the levels {worst} to {mildest} (current order: minLevel=\"{mildest}\" maxLevel=\"{worst}\", \
+                 because 1 is an error and 3 is information)",
                 self.id
             ),
         )

@@ -41,7 +41,7 @@ struct Parser<'d> {
 impl Parser<'_> {
     fn config(&mut self, root: &Element) -> Result<Config, ConfigError> {
         if root.local_name() != "Config" {
-            let text = format!("the root element is `{}`, not `Config`", root.name);
+            let text = format!("the root element must be `Config`, found `{}`", root.name);
             return Err(self.error(root.offset, text, "is this a configuration file?"));
         }
         self.attributes(root, &[]);
@@ -149,7 +149,8 @@ impl Parser<'_> {
         }
         let name = self.required(element, "name")?;
         if params.iter().any(|earlier| earlier.name == name) {
-            let text = format!("the parameter `{name}` is given twice here; the first one counts");
+            let text =
+                format!("the parameter `{name}` is defined twice here; the first one is used");
             self.warn(element.offset, text);
             return Ok(());
         }
@@ -171,7 +172,7 @@ impl Parser<'_> {
         if level.is_none() {
             let value = if name == "minLevel" { 3 } else { 1 };
             let text = format!(
-                "{name}=\"{text}\" is no level (1 error, 2 warning, 3 information); {value} is used"
+                "{name}=\"{text}\" is not a level (1 error, 2 warning, 3 information); {value} is used"
             );
             self.warn(attribute.offset, text);
         }
@@ -185,8 +186,8 @@ impl Parser<'_> {
             let value = &param.value;
             let hint = did_you_mean(value, ["error", "warning", "information"]);
             let text = format!(
-                "`{LEVEL_PARAM}` is `{value}`, which is no level (error, warning, information) \
-                 and has no effect{hint}"
+                "`{LEVEL_PARAM}` is `{value}`, which is not a level (error, warning, information) and has no \
+                 effect{hint}"
             );
             self.oddities.push(Oddity::warning(param.position, text));
         }
@@ -205,7 +206,7 @@ impl Parser<'_> {
     fn add_checker(&mut self, bundle: &mut BundleConfig, checker: CheckerConfig) {
         if let Some(first) = bundle.checker(&checker.id) {
             let text = format!(
-                "checker `{}` is configured twice in this bundle; the first one, in row {}, counts",
+                "checker `{}` is configured twice in this bundle; the first one, in row {}, is used",
                 checker.id, first.position.row
             );
             self.oddities.push(Oddity::warning(checker.position, text));
@@ -227,7 +228,7 @@ impl Parser<'_> {
             return;
         };
         let text = format!(
-            "bundle `{}` is configured twice; what is new here is added to the first one, in row {}",
+            "bundle `{}` is configured twice; new entries here are added to the first one, in row {}",
             bundle.application, first.position.row
         );
         self.oddities.push(Oddity::warning(bundle.position, text));
@@ -240,7 +241,7 @@ impl Parser<'_> {
             let namespace = name == "xmlns" || name.contains(':');
             if !namespace && !known.contains(&name) {
                 let hint = did_you_mean(name, known.iter().copied());
-                let text = format!("`{}` has no attribute `{name}`{hint}", element.name);
+                let text = format!("unknown attribute of `{}`: `{name}`{hint}", element.name);
                 self.warn(attribute.offset, text);
             }
         }
@@ -248,7 +249,10 @@ impl Parser<'_> {
 
     fn unknown(&mut self, element: &Element, parent: &Element, known: &[&str]) {
         let hint = did_you_mean(element.local_name(), known.iter().copied());
-        let text = format!("`{}` is not known in `{}`{hint}", element.name, parent.name);
+        let text = format!(
+            "unknown element `{}` in `{}`{hint}",
+            element.name, parent.name
+        );
         self.warn(element.offset, text);
     }
 

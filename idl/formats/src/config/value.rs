@@ -44,7 +44,7 @@ impl ParamType {
     /// Returns the description of a valid value, to be appended to "must be".
     pub fn expected(self) -> &'static str {
         match self {
-            ParamType::Number => "a finite number, written such as 0.05",
+            ParamType::Number => "a finite number, such as 0.05",
             ParamType::Flag => "`true` or `false`",
             ParamType::Text => "a text",
         }

@@ -25,7 +25,7 @@ pub(super) fn bundle(config: &BundleConfig, why: Option<String>) -> BundleOutcom
         name: published_name(application)
             .unwrap_or(application)
             .to_owned(),
-        description: String::from("Configured, and not there."),
+        description: String::from("Configured, but not available."),
         checkers,
         ..BundleOutcome::default()
     }
@@ -34,7 +34,7 @@ pub(super) fn bundle(config: &BundleConfig, why: Option<String>) -> BundleOutcom
 /// Returns the outcome of a missing bundle that is required but not configured.
 pub(super) fn demanded(why: String) -> BundleOutcome {
     BundleOutcome {
-        description: String::from("Demanded, and not there."),
+        description: String::from("Required, but not available."),
         checkers: vec![whole(why)],
         ..BundleOutcome::default()
     }
@@ -42,7 +42,7 @@ pub(super) fn demanded(why: String) -> BundleOutcome {
 
 fn whole(reason: String) -> CheckerOutcome {
     CheckerOutcome {
-        description: "The bundle that must take part does.".into(),
+        description: "The required bundle takes part.".into(),
         ..failed(WHOLE_BUNDLE, reason)
     }
 }
@@ -59,7 +59,7 @@ pub(super) fn checker(id: &str, bundle: &str, there: &[Text]) -> CheckerOutcome 
 fn failed(id: &str, reason: String) -> CheckerOutcome {
     CheckerOutcome {
         id: id.into(),
-        description: "Configured, and not there.".into(),
+        description: "Configured, but not available.".into(),
         ending: Some(Ending::Failed { reason }),
         ..CheckerOutcome::default()
     }

@@ -39,7 +39,7 @@ pub(super) fn pool(input: PoolInput<'_>, resolver: &mut dyn Resolver) -> Pooled 
         name: OWN_BUNDLE.to_owned(),
         version: version.to_owned(),
         build_date: build_date.to_owned(),
-        description: String::from("What qcbus itself has to say about this check."),
+        description: String::from("Remarks of qcbus itself about this check."),
         ..BundleOutcome::default()
     };
     let nobody = pool.nobody_looked().filter(|_| scope == Scope::Whole);

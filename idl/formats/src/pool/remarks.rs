@@ -70,12 +70,12 @@ pub fn chosen(choice: &Choice) -> Option<Remark> {
         return None;
     }
     let text = format!(
-        "not every checker was asked: the check was run with `{choice}`, and the verdict says nothing about \
-         what was left out; what others rest on was asked all the same"
+        "not every checker was requested: the check was run with `{choice}`, and the verdict does not cover the \
+         checkers left out; checkers that requested ones depend on were run as well"
     );
     Some(Remark {
         checker: String::from(super::CHOICE_CHECKER),
-        description: String::from("What was left out on the command line is told."),
+        description: String::from("Reports the checkers that the command line leaves out."),
         issue: Some(information(CHOSEN, text)),
         open: None,
     })
@@ -87,13 +87,13 @@ pub(super) fn level_order(config: &Config) -> Option<Remark> {
     let first = oddities.first()?;
     let more = match oddities.len() - 1 {
         0 => String::new(),
-        1 => String::from("; the same holds for one more checker"),
-        n => format!("; the same holds for {n} more checkers"),
+        1 => String::from("; this also applies to one more checker"),
+        n => format!("; this also applies to {n} more checkers"),
     };
     let text = format!("configuration, row {}, {}{more}", first.row, first.text);
     Some(Remark {
         checker: String::from("qcbus_config"),
-        description: String::from("Older ways to write a configuration are understood and told."),
+        description: String::from("Older notations of a configuration are accepted and reported."),
         issue: Some(information(LEVEL_ORDER, text)),
         open: None,
     })
@@ -102,19 +102,19 @@ pub(super) fn level_order(config: &Config) -> Option<Remark> {
 /// Returns the remark that none of the requested checkers examined the file.
 pub(super) fn nobody_looked(pooled: &Pooled) -> Remark {
     let open = match pooled.unfinished.as_slice() {
-        [] => String::from("no checker is demanded of this file"),
+        [] => String::from("no checker is required for this file"),
         [only] => format!(
-            "the only demanded checker, `{}`, does not apply to this file",
+            "the only required checker, `{}`, does not apply to this file",
             only.checker
         ),
         all => format!(
-            "none of the {} demanded checkers applies to this file",
+            "none of the {} required checkers applies to this file",
             all.len()
         ),
     };
     Remark {
         checker: String::from("qcbus_checkers"),
-        description: String::from("At least one demanded checker looks at the file."),
+        description: String::from("At least one required checker checks the file."),
         issue: None,
         open: Some(open),
     }

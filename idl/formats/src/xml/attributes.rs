@@ -13,10 +13,11 @@ pub(super) struct RawAttribute<'t> {
     pub offset: usize,
 }
 
-const QUOTE_HINT: &str = "a quotation mark inside a value ends it: remove the stray one, or write \
-                          it as &quot;";
+const QUOTE_HINT: &str =
+    "a quotation mark inside a value ends it: remove it, or write it as &quot;";
 const VALUE_HINT: &str = "write name=\"value\"";
-const OPEN_HINT: &str = "a quotation mark is missing, or there is one too many before this place";
+const OPEN_HINT: &str =
+    "a quotation mark is missing, or there is an extra one before this position";
 
 /// Parses the attributes of a tag. `text` is everything after the element's name up to `>` or `/>`.
 /// If the tag is not closed, it ends with the file. It starts at byte `base`.
@@ -34,7 +35,7 @@ pub(super) fn scan(text: &str, base: usize) -> Result<Vec<RawAttribute<'_>>, Fau
         at += gap;
         let (attribute, next) = one(text, at, base)?;
         if found.iter().any(|earlier| earlier.name == attribute.name) {
-            let what = format!("the attribute `{}` is given twice", attribute.name);
+            let what = format!("the attribute `{}` is defined twice", attribute.name);
             return Err(Fault::new(attribute.offset, what));
         }
         found.push(attribute);
@@ -52,11 +53,11 @@ fn no_space(rest: &str, offset: usize, before: Option<&RawAttribute<'_>>) -> Fau
     let what = match before {
         Some(attribute) => {
             format!(
-                "`{stray}` follows the value of attribute `{}` directly",
+                "`{stray}` directly follows the value of attribute `{}`",
                 attribute.name
             )
         }
-        None => format!("`{stray}` follows the name of the element directly"),
+        None => format!("`{stray}` directly follows the name of the element"),
     };
     Fault::new(offset, what).with_hint(QUOTE_HINT)
 }
@@ -75,7 +76,7 @@ fn one(text: &str, at: usize, base: usize) -> Result<(RawAttribute<'_>, usize), 
     let length = text[at..].find(stops).unwrap_or(text.len() - at);
     let name = &text[at..at + length];
     if !is_name(name) {
-        let what = format!("`{}` is not the name of an attribute", excerpt(&text[at..]));
+        let what = format!("`{}` is not a valid attribute name", excerpt(&text[at..]));
         return Err(Fault::new(base + at, what).with_hint(OPEN_HINT));
     }
     let mut next = at + length;
@@ -111,7 +112,7 @@ fn quoted<'t>(text: &'t str, name: &str, offset: usize) -> Result<&'t str, Fault
         // The value contains markup of a later line, so its closing quotation mark is missing.
         Some(open) if raw[..open].contains('\n') => Err(unclosed(name, offset)),
         Some(open) => {
-            let what = format!("`<` in the value of attribute `{name}`");
+            let what = format!("`<` is not allowed in the value of attribute `{name}`");
             let hint = "the closing quotation mark is missing, or `<` should be &lt;";
             Err(Fault::new(offset + 1 + open, what).with_hint(hint))
         }
@@ -169,7 +170,10 @@ pub(super) fn reference(name: &str, offset: usize) -> Result<char, Fault> {
     };
     found.ok_or_else(|| {
         let shown: String = name.chars().take(20).collect();
-        Fault::new(offset, format!("`&{shown};` stands for no character"))
-            .with_hint("a plain & is written as &amp;")
+        Fault::new(
+            offset,
+            format!("`&{shown};` is not a valid character reference"),
+        )
+        .with_hint("write a plain & as &amp;")
     })
 }

@@ -37,7 +37,7 @@ fn declared(bytes: &[u8]) -> Result<&'static encoding_rs::Encoding, XmlError> {
         Some(label) => encoding_rs::Encoding::for_label(label.as_bytes()).ok_or_else(|| XmlError {
             row: 1,
             column: 1,
-            text: format!("the encoding `{label}` is not known"),
+            text: format!("the encoding `{label}` is unknown"),
             hint: "save the file as UTF-8",
         }),
     }
@@ -59,8 +59,8 @@ fn invalid(bytes: &[u8], encoding: &str) -> XmlError {
         }
         _ => (1, 1, format!("the file is not valid {encoding}")),
     };
-    let hint = "name the encoding in the first line, such as \
-                <?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>, or save the file as UTF-8";
+    let hint = "declare the encoding in the first line, such as <?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>, \
+                or save the file as UTF-8";
     XmlError {
         row,
         column,

@@ -185,7 +185,7 @@ impl<'t> Builder<'t> {
             }
             Event::DocType(_) => {
                 let hint = "remove the DOCTYPE: these formats do not use one";
-                Err(Fault::new(at, "a DOCTYPE is refused").with_hint(hint))
+                Err(Fault::new(at, "a DOCTYPE is not allowed").with_hint(hint))
             }
             Event::Decl(_) if at > 0 && self.text[..at] != *"\u{FEFF}" => Err(Fault::new(
                 at,
@@ -209,7 +209,7 @@ impl<'t> Builder<'t> {
         if !is_name(name) {
             return Err(
                 Fault::new(at, format!("`<{name}` does not start an element"))
-                    .with_hint("a plain < is written as &lt;"),
+                    .with_hint("write a plain < as &lt;"),
             );
         }
         let raw = scan(tag.attributes_raw(), at + 1 + name.len())?;
@@ -232,12 +232,12 @@ impl<'t> Builder<'t> {
     fn end(&mut self, name: &str, at: usize) -> Result<(), Fault> {
         let name = name.trim_end();
         match self.open.last() {
-            None => Err(Fault::new(at, format!("`</{name}>` closes nothing"))),
+            None => Err(Fault::new(at, format!("`</{name}>` closes no element"))),
             Some(open) if open.name == name => self.close(at),
             Some(open) => {
                 let (row, _) = row_column(self.text, open.offset);
                 let what = format!(
-                    "`</{name}>` where `</{}>` is due, opened in row {row}",
+                    "found `</{name}>`, expected `</{}>`, which was opened in row {row}",
                     open.name
                 );
                 Err(Fault::new(at, what))
@@ -247,7 +247,7 @@ impl<'t> Builder<'t> {
 
     fn close(&mut self, at: usize) -> Result<(), Fault> {
         let Some(element) = self.open.pop() else {
-            return Err(Fault::new(at, "an end tag closes nothing"));
+            return Err(Fault::new(at, "an end tag closes no element"));
         };
         match self.open.last_mut() {
             Some(parent) => parent.content.push(Node::Element(element)),
@@ -291,7 +291,7 @@ impl<'t> Builder<'t> {
                 format!("`<{}>` is never closed", open.name),
             )),
             (None, Some(root)) => Ok(root),
-            (None, None) => Err(Fault::new(0, "the file holds no element")),
+            (None, None) => Err(Fault::new(0, "the file contains no element")),
         }
     }
 
@@ -318,8 +318,5 @@ impl<'t> Builder<'t> {
 fn outside(text: &str, at: usize) -> Fault {
     let shown: String = text.trim_start().chars().take(20).collect();
     let offset = at + (text.len() - text.trim_start().len());
-    Fault::new(
-        offset,
-        format!("text outside of the root element: `{shown}`"),
-    )
+    Fault::new(offset, format!("text outside the root element: `{shown}`"))
 }

@@ -50,7 +50,10 @@ struct Reader<'d> {
 impl Reader<'_> {
     fn results(&mut self, root: &Element) -> Result<Results, ReadError> {
         if root.local_name() != "CheckerResults" {
-            let text = format!("the root element is `{}`, not `CheckerResults`", root.name);
+            let text = format!(
+                "the root element must be `CheckerResults`, found `{}`",
+                root.name
+            );
             return Err(self.error(root.offset, text));
         }
         let bundles = named(root, "CheckerBundle").map(|element| self.bundle(element));
@@ -98,7 +101,7 @@ impl Reader<'_> {
             "" => Ok(None),
             word => match known.into_iter().find(|status| status.as_str() == word) {
                 Some(status) => Ok(Some(status)),
-                None => Err(self.error(attribute.offset, format!("`{word}` is no status"))),
+                None => Err(self.error(attribute.offset, format!("`{word}` is not a status"))),
             },
         }
     }
@@ -143,7 +146,7 @@ impl Reader<'_> {
         number.and_then(Level::from_number).ok_or_else(|| {
             self.error(
                 attribute.offset,
-                format!("`{}` is no level from 1 to 3", attribute.value),
+                format!("`{}` is not a level from 1 to 3", attribute.value),
             )
         })
     }
@@ -238,7 +241,7 @@ impl Reader<'_> {
         let value = self.required(element, name)?;
         numbers::read(value).ok_or_else(|| {
             let offset = element.attribute(name).map_or(element.offset, |a| a.offset);
-            self.error(offset, format!("`{value}` is no number"))
+            self.error(offset, format!("`{value}` is not a number"))
         })
     }
 
@@ -250,7 +253,7 @@ impl Reader<'_> {
             // The tools of 2023 leave attributes empty when the value is unknown.
             "" => Ok(None),
             value => value.parse().map(Some).map_err(|_| {
-                let text = format!("`{value}` is no whole number from 0 on");
+                let text = format!("`{value}` is not an integer of at least 0");
                 self.error(attribute.offset, text)
             }),
         }

@@ -23,7 +23,8 @@ pub enum AskError {
     },
     /// The instance belongs to another user.
     #[error(
-        "this user may not ask the broker of this instance ({path}): it belongs to {owner}; ask as that user"
+        "this user may not access the broker of this instance ({path}): it belongs to {owner}; run this as that \
+         user"
     )]
     Forbidden {
         /// Path of the socket.
@@ -32,7 +33,7 @@ pub enum AskError {
         owner: String,
     },
     /// The socket cannot be reached, whether or not a broker listens.
-    #[error("cannot ask the broker of this instance ({path}): {why}")]
+    #[error("cannot reach the broker of this instance ({path}): {why}")]
     Unreachable {
         /// Path of the socket.
         path: PathBuf,
@@ -40,7 +41,9 @@ pub enum AskError {
         why: String,
     },
     /// The broker closed the connection before it answered.
-    #[error("the broker left before it answered ({0}); see its log, and ask again when it runs")]
+    #[error(
+        "the broker disconnected before it answered ({0}); see its log, and try again when it runs"
+    )]
     Left(String),
     /// The reply of the broker is no valid answer.
     #[error("the broker did not answer: {0}")]
@@ -90,11 +93,13 @@ fn nobody(path: &Path, others: &[String]) -> String {
     let path = path.display();
     if others.is_empty() {
         return format!(
-            "runs as this instance ({path}); start one with `qcbus serve`, or name another with --instance"
+            "serves this instance ({path}); start one with `qcbus serve`, or name another instance with \
+             --instance"
         );
     }
     format!(
-        "of this user runs as this instance ({path}), but {}; ask as that user, with its XDG_RUNTIME_DIR or with --instance-dir",
+        "of this user serves this instance ({path}); it is served by {}; run this as that user, with its \
+         XDG_RUNTIME_DIR or with --instance-dir",
         others.join(" and ")
     )
 }
@@ -141,8 +146,9 @@ impl Line {
             && !process.ends_within(END_WITHIN)
         {
             let (id, seconds) = (process.id(), END_WITHIN.as_secs());
-            let why =
-                format!("it has stopped, but its process {id} is still there after {seconds} s");
+            let why = format!(
+                "the broker has stopped, but its process {id} still exists after {seconds} s"
+            );
             return Err(AskError::NoAnswer(why));
         }
         Ok(answer)
@@ -174,12 +180,12 @@ fn answer(
         let waits_in_vain = stopped >= STOPPED_FOR && !has_own_limit(request);
         if let Some(process) = process.filter(|_| waits_in_vain) {
             let id = process.id();
-            let why = format!("its process {id} is stopped; `kill -CONT {id}` lets it go on");
+            let why = format!("the broker process {id} is stopped; `kill -CONT {id}` resumes it");
             return Err(AskError::NoAnswer(why));
         }
         if is_over {
             let seconds = limit.unwrap_or_default().as_secs();
-            let why = format!("nothing came within {seconds} s");
+            let why = format!("no answer within {seconds} s");
             return Err(AskError::NoAnswer(why));
         }
     }

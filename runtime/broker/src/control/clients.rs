@@ -130,7 +130,7 @@ impl Clients {
                 let clients = self.bounds.clients;
                 refuse(
                     &stream,
-                    format!("the broker serves {clients} clients already"),
+                    format!("the broker already serves {clients} clients"),
                 );
             }
         }
@@ -228,7 +228,7 @@ async fn serve(connection: Connection, stream: UnixStream, go: Arc<Notify>) {
             Ok(Err(reason)) => return refuse(stream.get_ref(), reason),
             Err(_) => {
                 let seconds = bounds.request_within.as_secs();
-                let reason = format!("no request came within {seconds} s");
+                let reason = format!("no request was received within {seconds} s");
                 return refuse(stream.get_ref(), reason);
             }
         };
@@ -254,7 +254,8 @@ async fn serve(connection: Connection, stream: UnixStream, go: Arc<Notify>) {
 fn made_room(bounds: &Bounds) -> String {
     let clients = bounds.clients;
     format!(
-        "the broker serves {clients} clients at once, and whoever says nothing makes room; ask again"
+        "the broker serves at most {clients} clients at once, and disconnects silent ones to make room; try \
+         again"
     )
 }
 
@@ -266,7 +267,7 @@ async fn read_line(stream: &mut BufReader<UnixStream>) -> Result<Option<Vec<u8>>
     match read {
         Ok(0) | Err(_) => Ok(None),
         Ok(_) if line.len() > MAX_REQUEST => {
-            Err(format!("a request has at most {MAX_REQUEST} bytes"))
+            Err(format!("a request may have at most {MAX_REQUEST} bytes"))
         }
         Ok(_) => Ok(Some(line)),
     }
@@ -277,7 +278,7 @@ async fn answer(connection: &Connection, line: &[u8], stream: &UnixStream) -> Op
     let request = match serde_json::from_slice(line) {
         Ok(request) => request,
         Err(error) => {
-            let reason = format!("not a request: {error}");
+            let reason = format!("invalid request: {error}");
             return Some(Response::Failed { reason });
         }
     };
@@ -288,8 +289,8 @@ async fn answer(connection: &Connection, line: &[u8], stream: &UnixStream) -> Op
     if takes_long && !connection.may_wait() {
         let waiting = connection.clients.bounds.waiting;
         let reason = format!(
-            "{waiting} clients wait for verdicts already, as many as this broker may have; ask again when \
-             some have theirs, or start the broker with a higher limit of open files (`ulimit -n`)"
+            "{waiting} clients already wait for verdicts, the maximum of this broker; try again when some have \
+             received theirs, or start the broker with a higher limit of open files (`ulimit -n`)"
         );
         match request {
             Request::Wait { .. } | Request::WaitReported { .. } => {

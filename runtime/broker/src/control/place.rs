@@ -78,12 +78,12 @@ pub(super) async fn keep(
         }
         match listen(&directory) {
             Ok(listener) => {
-                tracing::warn!("the control socket was removed; it was made again");
+                tracing::warn!("the control socket was removed; it was created again");
                 // No client can find the old socket any more.
                 serving.abort();
                 serving = serve(listener);
             }
-            Err(error) => tracing::debug!(%error, "cannot make the control socket again"),
+            Err(error) => tracing::debug!(%error, "cannot create the control socket again"),
         }
     }
 }

@@ -178,24 +178,24 @@ impl State {
         };
         if hello.protocol != ours {
             Some(format!(
-                "{} {} speaks protocol {}, this broker speaks protocol {ours}: use a build of the \
-                 bundle that was made for this version of qcbus",
+                "{} {} uses protocol {}, this broker uses protocol {ours}: use a build of the bundle that was \
+                 made for this version of qcbus",
                 hello.name, hello.version, hello.protocol
             ))
         } else if hello.name.is_empty() || hello.name.len() > 64 || !hello.name.chars().all(good) {
             Some(format!(
-                "`{}` is no name for a peer: 1 to 64 of A-Z a-z 0-9 . _ -",
+                "`{}` is not a valid peer name: use 1 to 64 of A-Z a-z 0-9 . _ -",
                 hello.name
             ))
         } else if hello.version.len() > MOST_OF_A_VERSION || hello.version.chars().any(moves) {
             Some(format!(
-                "the version of `{}` has control characters or more than {MOST_OF_A_VERSION} bytes",
+                "the version of `{}` contains control characters or has more than {MOST_OF_A_VERSION} bytes",
                 hello.name
             ))
         } else if let (false, MOST_NAMES..) = known() {
             Some(format!(
-                "there is no room for `{}`: {MOST_NAMES} names are known already; `qcbus bundle \
-                 remove` takes off those that need not judge any more",
+                "there is no room for `{}`: {MOST_NAMES} names are already known; remove bundles that are no \
+                 longer required with `qcbus bundle remove`",
                 hello.name
             ))
         } else {
@@ -209,9 +209,9 @@ impl State {
     fn taken(&self, hello: &Hello) -> Option<String> {
         if hello.launch.is_none() && self.children.contains_key(&hello.name) {
             return Some(format!(
-                "the broker itself starts `{}`, from a manifest or because it comes with qcbus, and no other \
-                 process may take its place: give this one another name (to run bundles that come with qcbus \
-                 by hand, start the broker with --no-standard-bundles)",
+                "the broker itself starts `{}`, from a manifest or because it comes with qcbus, so no other \
+                 process may use this name; give this process another name (to run bundles that come with qcbus \
+                 manually, start the broker with --no-standard-bundles)",
                 hello.name
             ));
         }
@@ -233,7 +233,7 @@ impl State {
         // The process id is 0 if the process cannot be seen from here.
         let same = incarnation == hello.incarnation || (pid == hello.pid && pid != 0);
         (!same && !replaces)
-            .then(|| format!("`{}` has already joined, as process {pid}", hello.name))
+            .then(|| format!("`{}` has already joined as process {pid}", hello.name))
     }
 
     fn bundle_joins(&mut self, session: SessionId, hello: &Hello, actions: &mut Actions) {
@@ -363,7 +363,7 @@ impl State {
         };
         bundle.offences += 1;
         if bundle.offences > LIES_FORGIVEN {
-            let why = "it speaks of jobs or checkers that it was never given";
+            let why = "it refers to jobs or checkers that it was never given";
             self.bundle_fails(name, why, actions);
         }
     }
@@ -451,14 +451,14 @@ impl State {
         let (deadline, silence) = (self.settings.job_deadline, self.settings.silence_limit);
         let still = since(bundle.moved);
         if bundle.draining && bundle.active.is_empty() && still > LEAVE_LIMIT {
-            return Some("it was told to go and did not".to_owned());
+            return Some("it was asked to leave but did not".to_owned());
         }
         if bundle.registered.is_some() {
             return None;
         }
         if !bundle.ready {
             let late = since(bundle.joined) > silence;
-            return late.then(|| "it joined and never said what it checks".to_owned());
+            return late.then(|| "it joined but did not register its checkers".to_owned());
         }
         if bundle.active.is_empty() {
             return None;
@@ -467,15 +467,15 @@ impl State {
         if given.any(|it| it.overtaken.is_some_and(|then| since(then) > deadline)) {
             let limit = deadline.as_secs_f64();
             return Some(format!(
-                "it forgot a job: {limit} s ago it ended a later one"
+                "it forgot a job: it finished a later one {limit} s ago"
             ));
         }
         if still > deadline {
             let limit = deadline.as_secs_f64();
-            return Some(format!("it did not end a job within {limit} s"));
+            return Some(format!("it did not finish a job within {limit} s"));
         }
         let silent = since(bundle.heard).min(still) > silence;
-        silent.then(|| format!("it said nothing for {} s", silence.as_secs_f64()))
+        silent.then(|| format!("it sent nothing for {} s", silence.as_secs_f64()))
     }
 }
 

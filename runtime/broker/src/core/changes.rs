@@ -357,12 +357,12 @@ fn told_of(lost: &[LostOutput]) -> Option<String> {
     let (output, others) = (to_text(&first.output), others.len());
     Some(match others {
         0 => format!(
-            "{output} was removed or changed by another process; {} is judged again, which writes it again",
+            "{output} was removed or changed by another process; {} is judged again to restore it",
             to_text(&first.file)
         ),
         _ => format!(
-            "{output} and {others} more files of this broker were removed or changed by another process; what they are \
-             about is judged again, which writes them again"
+            "{output} and {others} more files of this broker were removed or changed by another process; the \
+             affected files are judged again to restore them"
         ),
     })
 }

@@ -217,7 +217,7 @@ impl State {
             return;
         };
         if child.upgrade.take().is_none() {
-            child.failure = Some("it took its leave".to_owned());
+            child.failure = Some("it has left".to_owned());
         }
         child.state = if child.spec.restart == Restart::Always && !draining {
             ChildState::Due(self.now + self.settings.backoff)
@@ -265,7 +265,7 @@ impl State {
         let (times, seconds) = (child.starts.len(), window.as_secs());
         let name = name.to_owned();
         let why = format!(
-            "failed {times} times within {seconds} s and is tried again in {seconds} s: {why}"
+            "failed {times} times within {seconds} s and is restarted in {seconds} s: {why}"
         );
         self.notice(Notice::GaveUp { name, why }, actions);
         self.fail_missing();
@@ -379,7 +379,7 @@ impl State {
     }
 
     fn does_not_join(&mut self, name: &str, launch: Launch, actions: &mut Actions) {
-        let why = "it was started and did not join";
+        let why = "it was started but did not join";
         actions.push(Action::kill_unjoined(launch));
         if self.is_successor(name, launch) {
             return self.upgrade_failed(name, why, actions);

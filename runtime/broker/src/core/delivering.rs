@@ -204,7 +204,7 @@ impl State {
         let is_new = reporter.retries.failed(file, now, pause);
         if is_new || reporter.note != why {
             reporter.note.clone_from(&why);
-            let why = format!("could not report, and tries again: {why}");
+            let why = format!("could not report and will retry: {why}");
             let notice = Notice::not_reported(&reporter.name, why);
             self.notice(notice, actions);
         }
@@ -247,7 +247,7 @@ impl State {
             clip_text(&mut why, max_text);
             reporter.not_withdrawn += 1;
             reporter.note.clone_from(&why);
-            let why = format!("could not withdraw: {why}");
+            let why = format!("could not withdraw a report: {why}");
             self.notice(Notice::not_reported(&name, why), actions);
         }
         if !again {

@@ -257,7 +257,7 @@ impl State {
             }
             Err(PrepareFailure::Busy) => {
                 self.trials_give_way(id, actions);
-                let why = "as many documents as the bus carries at once are in use";
+                let why = "the maximum number of documents on the bus is in use";
                 let pause = self.settings.busy_pause * self.stand_in_line(id);
                 self.wait_for_room(id, why, pause, actions);
             }
@@ -280,7 +280,7 @@ impl State {
         entry.hindered += 1;
         if self.now >= self.mute_hindered_until {
             self.mute_hindered_until = self.now + NOTICE_PAUSE;
-            let what = format!("{reason}; it is tried again");
+            let what = format!("{reason}; it is retried");
             self.notice(Notice::NotRead(what), actions);
         }
         self.requeue_later(id, pause, actions);
@@ -300,7 +300,7 @@ impl State {
         if self.now.saturating_sub(since) < limit || self.has_verdict_on_these_bytes(id) {
             return self.requeue_later(id, pause, actions);
         }
-        let reason = format!("{why}; nothing became free for {} seconds", limit.as_secs());
+        let reason = format!("{why}; no room became free for {} seconds", limit.as_secs());
         self.not_read(id, reason, actions);
     }
 

@@ -30,7 +30,7 @@ impl State {
     /// Returns the reason why waiting for this bundle is useless, or `None` if it is not.
     pub(super) fn hopeless(&self, name: &str) -> Option<String> {
         let Some(bundle) = self.bundles.get(name) else {
-            let text = format!("the configuration demands {name}, which has not joined");
+            let text = format!("the configuration requires {name}, which has not joined");
             return (!self.child_is_coming(name)).then_some(text);
         };
         if let Some(why) = self.is_flapping(name, bundle) {
@@ -42,17 +42,16 @@ impl State {
             Some(format!("{name} cannot be started: {why}"))
         } else if self.child_gave_up(name) {
             Some(format!(
-                "{name} keeps failing and is not started for the time being: {note}"
+                "{name} keeps failing and is temporarily not started: {note}"
             ))
         } else if away < self.patience_with(name) {
             None
         } else if bundle.origin == Some(Origin::Joined) {
             Some(format!(
-                "{name} is not there: {note}; if it need not judge any more: `qcbus bundle remove \
-                 {name}`"
+                "{name} is not available: {note}; if it is no longer required, run `qcbus bundle remove {name}`"
             ))
         } else {
-            Some(format!("{name} is not there: {note}"))
+            Some(format!("{name} is not available: {note}"))
         }
     }
 

@@ -252,7 +252,7 @@ impl State {
                 }
             }
             Event::Garbage { session, what } => self.garbage(session, &what, &mut actions),
-            Event::Gone { session } => self.gone(session, "its process has died", &mut actions),
+            Event::Gone { session } => self.gone(session, "its process has ended", &mut actions),
             Event::Undeliverable { session, job, why } => {
                 self.undeliverable(session, job, why, &mut actions);
             }
@@ -312,18 +312,10 @@ impl State {
     fn garbage(&mut self, session: SessionId, what: &str, actions: &mut Actions) {
         match self.sessions.get(&session).cloned() {
             Some((Role::Bundle, name)) => {
-                self.bundle_fails(
-                    &name,
-                    &format!("it sends what is no message: {what}"),
-                    actions,
-                );
+                self.bundle_fails(&name, &format!("it sent invalid data: {what}"), actions);
             }
             Some((Role::Reporter, name)) => {
-                self.reporter_died(
-                    &name,
-                    &format!("it sends what is no message: {what}"),
-                    actions,
-                );
+                self.reporter_died(&name, &format!("it sent invalid data: {what}"), actions);
             }
             None => actions.push(Action::Disconnect { session }),
         }

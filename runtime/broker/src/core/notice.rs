@@ -155,13 +155,13 @@ impl fmt::Display for Notice {
 impl Notice {
     fn text(&self) -> String {
         match self {
-            Notice::TurnedAway(reason) => format!("turned away: {reason}"),
+            Notice::TurnedAway(reason) => format!("refused: {reason}"),
             Notice::Ended { name, why }
             | Notice::Killed { name, why }
             | Notice::Flapping { name, why } => format!("{name}: {why}"),
             Notice::GaveUp { name, why } => format!("{name} {why}"),
             Notice::NotUpgraded { name, why } => {
-                format!("{name} is not upgraded, the process before goes on: {why}")
+                format!("{name} is not upgraded, the previous process continues: {why}")
             }
             Notice::NotReported { name, why } => format!("{name} {why}"),
             Notice::NoRoom(text)

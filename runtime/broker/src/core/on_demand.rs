@@ -76,9 +76,9 @@ impl State {
         }
         let fails = |name: &&String| !self.is_as_started(name) || self.hopeless(name).is_some();
         if let Some(name) = on_demand.bundles.iter().find(fails) {
-            return Err(format!("{name} is not there"));
+            return Err(format!("{name} is not available"));
         }
-        FileKind::of_path(path).ok_or_else(|| "it is no file that qcbus checks".to_owned())
+        FileKind::of_path(path).ok_or_else(|| "it is not a file that qcbus checks".to_owned())
     }
 
     /// Checks whether a bundle has joined as exactly the program that its name starts now.
@@ -129,7 +129,7 @@ impl State {
         let refused = |it: &MissingDocument| matches!(it.why, Absence::Unreadable { .. });
         let prepared = job.prepared.as_deref();
         if prepared.is_some_and(|it| it.missing.iter().any(refused)) {
-            let reason = "something that the file refers to cannot be read".to_owned();
+            let reason = "a document that the file refers to cannot be read".to_owned();
             return self.send_elsewhere(id, reason, actions);
         }
         let same = on_demand
@@ -140,7 +140,7 @@ impl State {
             let finished = self.finished(id);
             actions.extend(finished.map(|it| Action::Pool(Box::new(it))));
         } else {
-            let reason = "a bundle that is to look at it has failed or is not there".to_owned();
+            let reason = "a bundle that must check it has failed or is not available".to_owned();
             self.send_elsewhere(id, reason, actions);
         }
     }
@@ -219,7 +219,7 @@ impl State {
         } else {
             self.on_demand_checks.remove(&request_id);
             self.files.remove(file);
-            elsewhere(request_id, "it is not there any more".to_owned(), actions);
+            elsewhere(request_id, "it does not exist any more".to_owned(), actions);
         }
     }
 
@@ -267,7 +267,7 @@ impl State {
             if self.try_again(id, actions) {
                 continue;
             }
-            let reason = "a bundle has failed while it looked at it".to_owned();
+            let reason = "a bundle failed while it checked the file".to_owned();
             self.send_elsewhere(id, reason, actions);
         }
     }

@@ -92,7 +92,7 @@ impl TaskOutcome {
         if self.catalogue.is_none() {
             let name = &self.name;
             let why = self.failure.clone();
-            said.absent = Some(why.unwrap_or_else(|| format!("{name} has never been seen")));
+            said.absent = Some(why.unwrap_or_else(|| format!("{name} has never joined")));
         }
         said
     }
@@ -192,7 +192,7 @@ fn in_question(catalogue: &Catalogue, demanded: &[u32]) -> usize {
 fn said(offered: &CheckerInfo, pending: Option<&Pending>, failure: Option<&str>) -> CheckerOutcome {
     let done = pending.and_then(|pending| pending.done.clone());
     let (mut ending, params, metadata) = done.unwrap_or_else(|| {
-        let silent = "the bundle said that it was done without a word on this checker";
+        let silent = "the bundle reported that it was done but sent no result for this checker";
         let reason = failure.unwrap_or(silent).to_owned();
         (Ending::Failed { reason }, Vec::new(), Vec::new())
     });
@@ -200,7 +200,7 @@ fn said(offered: &CheckerInfo, pending: Option<&Pending>, failure: Option<&str>)
     if withheld > 0 {
         ending = Ending::Failed {
             reason: format!(
-                "more findings than one checker may report: {kept} are kept, {withheld} were cut off"
+                "more findings than one checker may report: {kept} are kept, {withheld} were dropped"
             ),
         };
     }

@@ -150,9 +150,8 @@ fn ending_weight(ending: &Ending) -> usize {
 /// checker that exceeds the limit has not answered.
 fn said_too_much(facts: usize, max_facts: usize, max_bytes: usize) -> String {
     format!(
-        "more than is kept of what it says beside its findings: its parameters and metadata take \
-         {facts} bytes; {max_facts} of a checker, and {max_bytes} of all that a bundle says about a \
-         file, are kept"
+        "too many parameters and metadata: they take {facts} bytes; at most {max_facts} bytes are kept for a \
+         checker, and {max_bytes} bytes for everything that a bundle reports about a file"
     )
 }
 

@@ -51,7 +51,7 @@ impl State {
                 && task.strikes >= STRIKES
             {
                 task.state = TaskState::Failed(format!(
-                    "{name} failed {STRIKES} times on this file alone in a fresh process: {why}"
+                    "{name} failed {STRIKES} times in a new process with only this file: {why}"
                 ));
                 over.push(id);
             }

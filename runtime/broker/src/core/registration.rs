@@ -125,12 +125,12 @@ impl State {
         let pause = said.at.saturating_sub(self.now).as_secs_f64();
         let why = if changes >= self.settings.changes_forgiven {
             format!(
-                "it has changed what it is or checks {changes} times: everything was judged again \
-                 each time, and it is believed again in {pause:.1} s"
+                "its registration has changed {changes} times, and everything was judged again each time; it is \
+                 accepted again in {pause:.1} s"
             )
         } else {
             format!(
-                "too many bundles that nobody supervises come and change: it is heard in {pause:.1} s"
+                "too many unsupervised bundles join and change; its registration is accepted in {pause:.1} s"
             )
         };
         self.take_back(name, false);
@@ -205,7 +205,7 @@ impl State {
     pub(super) fn is_flapping(&self, name: &str, bundle: &Bundle) -> Option<String> {
         bundle.registered.as_ref()?;
         let in_the_registry = bundle.session.is_some() && bundle.origin.is_some();
-        in_the_registry.then(|| format!("{name} is not asked for the time being: {}", bundle.note))
+        in_the_registry.then(|| format!("{name} gets no tasks for now: {}", bundle.note))
     }
 }
 
@@ -215,23 +215,23 @@ fn unsound(catalogue: &Catalogue) -> Option<String> {
     if catalogue.checkers.len() > MOST_CHECKERS {
         let checkers = catalogue.checkers.len();
         return Some(format!(
-            "its catalogue names {checkers} checkers; at most {MOST_CHECKERS} are taken"
+            "its catalogue contains {checkers} checkers; at most {MOST_CHECKERS} are allowed"
         ));
     }
     if ids.len() < catalogue.checkers.len() || ids.contains("") {
-        return Some("its catalogue names a checker twice or not at all".to_owned());
+        return Some("its catalogue contains a duplicate or empty checker id".to_owned());
     }
     let bytes = catalogue_weight(catalogue);
     if bytes > MOST_OF_A_CATALOGUE {
         return Some(format!(
-            "its catalogue takes {bytes} bytes; at most {MOST_OF_A_CATALOGUE} are taken"
+            "its catalogue has {bytes} bytes; at most {MOST_OF_A_CATALOGUE} are allowed"
         ));
     }
     let mut names = names(catalogue);
     let odd = names.find(|name| name.len() > MOST_OF_A_NAME || name.chars().any(moves))?;
     let start: String = odd.chars().take(40).collect();
     Some(format!(
-        "its catalogue has the name {start:?}: names have no control characters and at most \
+        "its catalogue contains the name {start:?}: names must have no control characters and at most \
          {MOST_OF_A_NAME} bytes"
     ))
 }

@@ -167,16 +167,14 @@ impl State {
             ));
         }
         let Some(bundle) = self.bundles.get(name) else {
-            return Err(format!(
-                "no bundle {name} is known here; see `qcbus bundle list`"
-            ));
+            return Err(format!("bundle {name} not found; see `qcbus bundle list`"));
         };
         if bundle.session.is_some() {
             self.drain_peer(name, actions);
-            return Ok(format!("{name} was told to finish and go"));
+            return Ok(format!("{name} was asked to finish and leave"));
         }
         self.drop_bundle(name, actions);
-        Ok(format!("{name} need not judge any more"))
+        Ok(format!("{name} is no longer required"))
     }
 
     /// Begins a new epoch, because the required bundles or the demand on them has changed.

@@ -488,7 +488,7 @@ fn what_a_reporter_did_and_could_not_do_is_in_its_status() {
     let status = requests.state.status();
     let peer = status.peers.iter().find(|it| it.name == TEXT).unwrap();
     assert_eq!(peer.done, 3);
-    assert_eq!(peer.note, "2 not reported: no rights; tried again in 1 s");
+    assert_eq!(peer.note, "2 not reported: no rights; retried in 1 s");
 }
 
 #[test]
@@ -651,7 +651,7 @@ fn failed_report_is_tried_again_after_a_pause_and_then_the_rest() {
     let remark = |requests: &Requests| requests.state.status().peers[0].note.clone();
     assert_eq!(
         remark(&requests),
-        "20 not reported: no room; tried again in 1 s"
+        "20 not reported: no room; retried in 1 s"
     );
     let after = Duration::from_secs(1) + requests.state.settings.retry_after;
     let early = requests
@@ -734,7 +734,7 @@ fn client_is_told_at_its_timeout_which_report_is_missing_and_why() {
     let Some(Response::Unreported { reporters, .. }) = answer(&actions) else {
         panic!("{actions:?}");
     };
-    let why = "text: 1 not reported: no room; tried again in 1 s";
+    let why = "text: 1 not reported: no room; retried in 1 s";
     assert_eq!(reporters, &[why]);
 }
 

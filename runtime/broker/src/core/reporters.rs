@@ -81,7 +81,7 @@ impl Reporter {
         }
         let again = self.retries.due().map_or(String::new(), |due| {
             let seconds = due.saturating_sub(now).as_secs_f64().ceil();
-            format!("; tried again in {seconds} s")
+            format!("; retried in {seconds} s")
         });
         format!("{missing} not reported: {}{again}", self.note)
     }

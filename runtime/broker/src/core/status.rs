@@ -84,7 +84,8 @@ impl State {
             self.requirements(*kind).is_empty() && there.any(|(_, it)| it.kind == *kind)
         };
         let unseated = FileKind::ALL.into_iter().filter(is_unseated);
-        let unseated = unseated.map(|kind| format!("nobody must check .{} files", kind.as_str()));
+        let unseated =
+            unseated.map(|kind| format!("no bundle is required for .{} files", kind.as_str()));
         missing.chain(unseated).collect()
     }
 
@@ -218,7 +219,7 @@ impl State {
             "busy"
         };
         let note = if bundle.note.is_empty() && self.is_slowest(name, waiting) {
-            format!("slow: {waiting} jobs wait for it and for nobody else")
+            format!("slow: {waiting} jobs wait only for this bundle")
         } else {
             bundle.note.clone()
         };

@@ -177,7 +177,7 @@ impl State {
     }
 
     pub(super) fn answer_gone(&mut self, path: &Path, actions: &mut Actions) {
-        let reason = || format!("{} is not there", to_text(path));
+        let reason = || format!("{} does not exist", to_text(path));
         let told = |waiter: &Waiter| *waiter.path == *path;
         self.answer(actions, told, || Response::Unwatched { reason: reason() });
     }

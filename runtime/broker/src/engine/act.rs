@@ -167,7 +167,7 @@ impl Broker {
             }
             Action::Accept { session } => self.accept(session),
             Action::Refuse { session, reason } => {
-                tracing::debug!("a peer was turned away: {reason}");
+                tracing::debug!("a peer was refused: {reason}");
                 if let Some(peer) = self.sessions.remove(session) {
                     self.host.refuse(peer, &reason);
                 }

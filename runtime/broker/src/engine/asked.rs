@@ -102,7 +102,9 @@ impl Broker {
                 notices: self.loaded.notices.clone(),
             },
             Err(error) => Response::Failed {
-                reason: format!("nothing was changed, what was in force stays in force: {error}"),
+                reason: format!(
+                    "nothing was changed, the previous settings stay in force: {error}"
+                ),
             },
         }
     }
@@ -324,8 +326,8 @@ impl Broker {
         let directory = &self.state_directory;
         let lock = directory.lock.as_ref().filter(|_| directory.is_gone)?;
         Some(format!(
-            "the state directory {} was removed or replaced: verdicts from now on are forgotten when this broker ends, \
-             and their files are judged anew; start it again",
+            "the state directory {} was removed or replaced: new verdicts are lost when this broker ends, and \
+             their files are judged again; restart the broker",
             to_text(lock.directory())
         ))
     }
@@ -344,7 +346,7 @@ impl Broker {
     /// need them.
     pub(super) fn reload_on_signal(&mut self) {
         if !self.state.draining() {
-            tracing::info!("SIGHUP: configuration and manifests are read again");
+            tracing::info!("SIGHUP: reloading configuration and manifests");
             self.reload_and_say();
         }
     }
@@ -360,7 +362,7 @@ impl Broker {
             Err(error) => {
                 self.forget_older_attempts();
                 self.say(Notice::Loading(format!(
-                    "not reloaded, what was in force stays in force: {error}"
+                    "not reloaded, the previous settings stay in force: {error}"
                 )));
             }
         }

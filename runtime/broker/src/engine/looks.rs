@@ -206,7 +206,7 @@ impl Broker {
                 self.looks.pending.insert(probe, look);
             }
             Err(error) => {
-                let reason = format!("cannot look at {}: {error}", to_text(&look.file));
+                let reason = format!("cannot access {}: {error}", to_text(&look.file));
                 // The error is ignored, because a client that has disconnected needs no answer.
                 let _ = look.answer.send(Response::Failed { reason });
             }
@@ -264,9 +264,8 @@ impl Broker {
         }
         for path in now.difference(&before).cloned() {
             let seconds = PATIENCE.as_secs();
-            let why = format!(
-                "the system has not answered for {seconds} s; is its disk or server there?"
-            );
+            let why =
+                format!("the system has not responded for {seconds} s; check its disk or server");
             self.unseen(Unseen { path, why });
         }
     }
@@ -279,7 +278,7 @@ impl Broker {
             return;
         }
         let (path, seconds) = (to_text(&overdue.path), overdue.waited.as_secs());
-        let reason = format!("read {path}: the system has not answered for {seconds} s");
+        let reason = format!("read {path}: the system has not responded for {seconds} s");
         if let Some(look) = self.looks.pending.remove(&owner) {
             // The answer is the same as after a timeout: there is no verdict, but the request is
             // valid.
@@ -343,7 +342,7 @@ fn is_there_to_stay(error: &io::Error) -> bool {
 }
 
 fn hides(file: &Path, error: &io::Error) -> String {
-    format!("cannot look at {}: {error}", to_text(file))
+    format!("cannot access {}: {error}", to_text(file))
 }
 
 /// Returns a description of the entry that occupies the path of a missing file.
@@ -370,16 +369,16 @@ fn why_unwatched(
     let shown = to_text(file);
     if qcbus_document::FileKind::of_path(file).is_none() {
         Some(format!(
-            "{shown} is no file that qcbus checks ({})",
+            "{shown} is not a file that qcbus checks ({})",
             qcbus_document::Suffix::list()
         ))
     } else if !places.contains(file) {
-        Some(format!("{shown} lies outside the watched directories"))
+        Some(format!("{shown} is outside the watched directories"))
     } else if let Some(hidden) = file.parent().and_then(|it| hidden_above(roots, it)) {
         let name = hidden.file_name().map(Path::new).map(to_text);
         Some(format!(
-            "{shown} lies in the hidden directory {}, and such are passed over; name it as a directory to watch, or \
-             put `!{}/` into a .qcignore",
+            "{shown} is in the hidden directory {}, and hidden directories are skipped; name it as a directory \
+             to watch, or put `!{}/` into a .qcignore",
             to_text(&hidden),
             name.unwrap_or_default()
         ))
@@ -387,8 +386,8 @@ fn why_unwatched(
         Some(format!("{shown} is ignored (by its name or a .qcignore)"))
     } else if stamp.is_some() && !is_looked_at(roots, file) {
         Some(format!(
-            "{shown} lies behind a symbolic link to a directory that is not watched, and such links are not \
-             followed; name that directory, too, to have it watched"
+            "{shown} is behind a symbolic link to a directory that is not watched, and such links are not \
+             followed; name that directory as well to watch it"
         ))
     } else {
         None

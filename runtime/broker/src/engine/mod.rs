@@ -310,7 +310,7 @@ impl Broker {
             // A disk that does not respond must not block the shutdown.
             for writer in self.writers.finish(self.options.settings.drain_limit) {
                 let what =
-                    format!("{writer} hangs; what it did not write is made good at the next start");
+                    format!("{writer} hangs; its missing writes are completed at the next start");
                 (self.tell)(Told::Notice(Notice::Storing(what)));
             }
         }
@@ -384,7 +384,7 @@ impl Broker {
         spawn_blocking(move || {
             for (pid, name) in stale_children.kill_but(&joined) {
                 let why = format!(
-                    "process {pid}, which an earlier broker had started, did not join this one"
+                    "process {pid}, which an earlier broker started, did not join this one"
                 );
                 // The error is ignored: after the end of the loop the notice is not needed.
                 let _ = notices.send(Notice::Killed { name, why });

@@ -29,7 +29,7 @@ pub fn simulate(options: &Options, tell: impl FnMut(Told) + Clone + Send + 'stat
             // Another test of this process may be starting a program, which briefly inherits the
             // open descriptors.
             Err(error) if is_held(&error) => std::thread::yield_now(),
-            Err(error) => panic!("a simulated broker does not start: {error}"),
+            Err(error) => panic!("cannot start a simulated broker: {error}"),
         }
     }
 }
@@ -111,7 +111,7 @@ impl Broker {
             }
             Source::Looked => {
                 if let Ok(looked) = self.inbox.looked.try_recv() {
-                    turns.say(|| "loop: a scout comes back".to_owned());
+                    turns.say(|| "loop: a probe returns".to_owned());
                     self.looked(looked);
                 }
             }
@@ -137,7 +137,7 @@ fn said(event: &Event) -> String {
     match event {
         Event::Prepared { job, result } => {
             let how = result.as_ref().map(|it| it.racy);
-            format!("job {} is read, racy: {how:?}", job.0)
+            format!("job {} was read, racy: {how:?}", job.0)
         }
         Event::Stored { job, outcome } => format!("job {}: {outcome:.40?}", job.0),
         other => format!("{other:?}"),

@@ -298,8 +298,8 @@ fn look_once(roots: &[PathBuf], files: &[PathBuf], seen: &mpsc::UnboundedSender<
                 tell(Seen::Settled(path.into(), stamp));
                 continue;
             }
-            Ok(None) => "it is not there any more, or no regular file".to_owned(),
-            Err(error) => format!("cannot look at it: {error}"),
+            Ok(None) => "it does not exist any more, or is not a regular file".to_owned(),
+            Err(error) => format!("cannot access it: {error}"),
         };
         tell(Seen::Unseen(Unseen { path, why }));
     }

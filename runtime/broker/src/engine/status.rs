@@ -42,7 +42,7 @@ impl Broker {
     fn troubles(&self) -> Vec<String> {
         let mut troubles: Vec<String> = self.writers.troubles().into_iter().collect();
         if self.is_nobody_watching() {
-            troubles.push("nobody watches for changes".to_owned());
+            troubles.push("changes are not watched".to_owned());
         }
         if let Some(text) = self.said_of_state() {
             troubles.push(text);
@@ -50,7 +50,7 @@ impl Broker {
         troubles.extend(self.state.hindrances());
         if let Some(why) = &self.not_in_force {
             troubles.push(format!(
-                "the configuration in force is not the one on disk, with which no broker would start: {why}"
+                "the configuration on disk is not in force, because no broker would start with it: {why}"
             ));
         }
         troubles

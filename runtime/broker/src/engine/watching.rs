@@ -114,7 +114,7 @@ impl Broker {
             Err(error) => {
                 watching.is_alone = true;
                 self.say(Notice::Watching(format!(
-                    "nobody watches for changes at the moment: {error}; that is tried again"
+                    "changes are not watched at the moment: {error}; this is retried"
                 )));
             }
         }

@@ -21,7 +21,8 @@ pub enum GateError {
     Lock(#[from] LockError),
     /// The directory contains files of another program.
     #[error(
-        "the gate {} holds files and is no gate of qcbus, which removes whatever it has not published: choose an empty directory with --gate, or `touch {}` to let it have this one with all that is in it",
+        "the gate {} contains files but is not a gate of qcbus, which removes everything it has not published: \
+         choose an empty directory with --gate, or run `touch {}` to give qcbus this directory with its contents",
         to_text(directory), to_text(&directory.join(GATE_FILE))
     )]
     Foreign {
@@ -30,7 +31,7 @@ pub enum GateError {
     },
     /// The directory cannot be searched, or something in it cannot be removed.
     #[error(
-        "cannot clear the gate {}: {source}; choose another with --gate",
+        "cannot clear the gate {}: {source}; choose another directory with --gate",
         to_text(directory)
     )]
     Contents {

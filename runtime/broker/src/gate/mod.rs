@@ -305,7 +305,7 @@ impl Gate {
             failed.get_or_insert((path.clone(), error));
             return;
         }
-        let why = format!("it cannot be written there: {error}");
+        let why = format!("it cannot be written to the gate: {error}");
         if let Some(publication) = self.publications().get_mut(path) {
             publication.refused = Some(why.clone());
             publication.told = true;
@@ -457,16 +457,15 @@ impl Gate {
         if let Some(upwards) = files.find(|it| leads_upwards(&it.path)) {
             let shown = to_text(&upwards.path);
             return Some(format!(
-                "it depends on {shown}; a published copy has no symbolic links, so `..` would lead \
-                 elsewhere there: refer to the file by a path without the link"
+                "it depends on {shown}; published copies have no symbolic links, so `..` would lead to another \
+                 place: refer to the file by a path without the link"
             ));
         }
         let outside = self.outside(&judged.inputs);
         let first = outside.first().map(|path| to_text(path));
         let first = first.filter(|_| self.options.outside == Outside::Refuse)?;
         Some(format!(
-            "it depends on {first}, which lies outside of the watched directories \
-             (--gate-outside refuse)"
+            "it depends on {first}, which is outside the watched directories (--gate-outside refuse)"
         ))
     }
 
@@ -497,7 +496,7 @@ fn is_file(input: &Input) -> bool {
 }
 
 fn held(path: &Path, why: &str) -> String {
-    format!("{} is accepted and not published: {why}", to_text(path))
+    format!("{} is accepted but not published: {why}", to_text(path))
 }
 
 /// Returns one line for all files that a verdict holds back.

@@ -220,7 +220,7 @@ impl Publications {
                     Some((_, other)) if *other != digest => {
                         let file = to_text(&file);
                         let why = format!(
-                            "it was accepted with other bytes of {file} than what it rests on"
+                            "it and the files that it depends on were accepted with different contents of {file}"
                         );
                         let lasting = false;
                         return PublicationState::HeldBack { why, lasting };
@@ -254,7 +254,7 @@ impl Publications {
     fn held_by(&self, path: &Path) -> PublicationState {
         let (shown, lasting) = (to_text(path), self.refused.contains(path));
         let why = if lasting {
-            format!("it rests on {shown}, which is not accepted")
+            format!("it depends on {shown}, which is not accepted")
         } else {
             format!("it waits for {shown} to be accepted")
         };

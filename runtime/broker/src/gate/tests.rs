@@ -228,7 +228,7 @@ fn what_lies_outside_is_named_or_refused() {
         assert_eq!(
             bench.gate.outside(&judged.inputs).len(),
             0,
-            "it is not there"
+            "it is not available"
         );
         let map = bench.dir.path().join("map.xodr");
         std::fs::write(&map, "map").unwrap();

@@ -29,7 +29,7 @@ impl Failure {
     pub fn of_linked(self, path: &Path) -> Result<Absence, PrepareFailure> {
         match self {
             Failure::Loan(LoanError::TooLarge(_)) => Ok(Absence::TooLarge {
-                why: "it does not fit on the bus".to_owned(),
+                why: "it is too large for the bus".to_owned(),
             }),
             Failure::Loan(LoanError::Busy) => Err(PrepareFailure::Busy),
             Failure::Loan(
@@ -68,7 +68,10 @@ pub(super) fn explained(failure: Failure, path: &Path) -> PrepareFailure {
             match stamp_of(path) {
                 Ok(None) => PrepareFailure::Vanished,
                 // The file is being written right now. It is read again shortly.
-                _ => PrepareFailure::NoRoom(format!("{} changes while it is read", to_text(path))),
+                _ => PrepareFailure::NoRoom(format!(
+                    "{} changed while it was being read",
+                    to_text(path)
+                )),
             }
         }
         Failure::Ingest(error) => unreadable(path, error.to_string()),

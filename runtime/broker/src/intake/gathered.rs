@@ -240,7 +240,7 @@ impl Source for Links<'_> {
         match self.intake.publish_expanded(expanded) {
             Ok(published) => Ok(Ok(published)),
             Err(failure) => {
-                let path = Path::new("what a modular scenario is expanded to");
+                let path = Path::new("the expansion of a modular scenario");
                 failure.of_linked(path).map(Err)
             }
         }

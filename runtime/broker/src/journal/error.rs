@@ -12,7 +12,8 @@ use crate::directory_lock::LockError;
 pub enum JournalError {
     /// Another process has locked the journal.
     #[error(
-        "the journal {path} is locked by another process ({source}); stop the other broker on this state directory, or give this one another with --state"
+        "the journal {path} is locked by another process ({source}); stop the other broker on this state \
+         directory, or choose another directory for this one with --state"
     )]
     Locked {
         /// Path of the journal.
@@ -24,14 +25,17 @@ pub enum JournalError {
     #[error("{0}")]
     State(#[from] LockError),
     /// The disk of the journal is full.
-    #[error("the journal {path} cannot be written: its disk is full; make room")]
+    #[error("the journal {path} cannot be written: its disk is full; free some space")]
     Full {
         /// Path of the journal.
         path: PathBuf,
     },
     /// The file is no journal, or is corrupt.
     #[error(
-        "the journal {path} cannot be used: {source}. It remembers which files are finished, and which bundles joined that were started by hand: move it away (`mv {path} {path}.broken`) and start again, everything is then judged anew, and bundles that were started by hand must judge once they have joined again; `qcbus doctor` looks into it"
+        "the journal {path} cannot be used: {source}. It records which files are finished, and which manually \
+         started bundles have joined. Move it away (`mv {path} {path}.broken`) and start again: all files are \
+         then judged again, and manually started bundles are required once they have joined again; `qcbus \
+         doctor` examines the journal"
     )]
     Broken {
         /// Path of the journal.
@@ -41,7 +45,8 @@ pub enum JournalError {
     },
     /// A newer version of qcbus wrote the journal.
     #[error(
-        "the journal {path} has schema {found}, this version of qcbus knows {SCHEMA_VERSION}: use the newer qcbus, or give this one another directory with --state"
+        "the journal {path} has schema {found}, this version of qcbus supports {SCHEMA_VERSION}: use the newer \
+         qcbus, or choose another directory for this one with --state"
     )]
     Newer {
         /// Path of the journal.
@@ -51,11 +56,14 @@ pub enum JournalError {
     },
     /// Another user can change the contents of the state directory.
     #[error(
-        "the state is not in this broker's hands alone: {0}; or choose another directory with --out or --state"
+        "the state directory is not under this user's sole control: {0}; or choose another directory with --out \
+         or --state"
     )]
     Foreign(TrustError),
     /// The state directory cannot be created.
-    #[error("cannot make the state directory {path}: {source}; choose another with --state")]
+    #[error(
+        "cannot create the state directory {path}: {source}; choose another directory with --state"
+    )]
     Directory {
         /// Path of the directory.
         path: PathBuf,

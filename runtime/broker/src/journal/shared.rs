@@ -38,7 +38,7 @@ struct Note {
 /// Handle of waiting entries. They are written by the thread that added them, or by one that writes
 /// earlier.
 #[derive(Debug)]
-#[must_use = "nothing is written before it is settled"]
+#[must_use = "entries are not written until they are settled"]
 pub struct Noted(Arc<OnceLock<Answer>>);
 
 impl From<Journal> for SharedJournal {
@@ -85,7 +85,7 @@ impl SharedJournal {
         write(&mut self.get(), &together);
         drop(lead);
         // If the writing thread panics, the entries of other threads get no answer.
-        let lost = || Err("the journal was not written: a writer has panicked".to_owned());
+        let lost = || Err("the journal was not written: a writer thread panicked".to_owned());
         noted.0.get().cloned().unwrap_or_else(lost)
     }
 

@@ -35,7 +35,8 @@ impl Scanner {
         if let Err(error) = tree.open() {
             let seconds = TURNS as u64 * INTERVAL.as_secs();
             tracing::warn!(
-                "changes of results are found within {seconds} s, not at once, because the kernel gives no events: {error}"
+                "changes of results are detected within {seconds} s instead of immediately, because the kernel \
+                 provides no events: {error}"
             );
         }
         Scanner {
@@ -93,7 +94,7 @@ impl Scanner {
         let events = match self.tree.events() {
             Ok(events) => events,
             Err(error) => {
-                tracing::warn!("changes of results cannot be read from the kernel: {error}");
+                tracing::warn!("cannot read the kernel's events about results: {error}");
                 Vec::new()
             }
         };

@@ -23,7 +23,7 @@ pub fn differences(old: &Loaded, new: &Loaded) -> Vec<String> {
     }
     match (&old.config, &new.config) {
         (Some(old), Some(new)) => config_differences(old, new, &mut lines),
-        (None, Some(_)) => lines.push("a configuration is in force".to_owned()),
+        (None, Some(_)) => lines.push("a configuration is now in force".to_owned()),
         (Some(_), None) => lines.push("no configuration is in force any more".to_owned()),
         (None, None) => {}
     }
@@ -47,17 +47,17 @@ fn config_differences(old: &Config, new: &Config, lines: &mut Vec<String>) {
             .iter()
             .find(|it| it.application == bundle.application)
         {
-            None => lines.push(format!("{} is demanded", bundle.application)),
+            None => lines.push(format!("{} is required", bundle.application)),
             Some(before) => bundle_differences(before, bundle, lines),
         }
     }
     if new.bundles.is_empty() && !old.bundles.is_empty() {
-        lines.push("every bundle is demanded, because none is named".to_owned());
+        lines.push("every bundle is required, because none is named".to_owned());
     }
     for bundle in &old.bundles {
         let is_named = |it: &BundleConfig| it.application == bundle.application;
         if !new.bundles.is_empty() && !new.bundles.iter().any(is_named) {
-            lines.push(format!("{} is no longer demanded", bundle.application));
+            lines.push(format!("{} is no longer required", bundle.application));
         }
     }
     let names = |config: &Config| {
@@ -80,7 +80,7 @@ fn bundle_differences(old: &BundleConfig, new: &BundleConfig, lines: &mut Vec<St
     }
     for checker in &new.checkers {
         match old.checkers.iter().find(|it| it.id == checker.id) {
-            None => lines.push(format!("{name}: {} is demanded", checker.id)),
+            None => lines.push(format!("{name}: {} is required", checker.id)),
             Some(before)
                 if before.levels != checker.levels || before.relevel != checker.relevel =>
             {
@@ -100,12 +100,12 @@ fn bundle_differences(old: &BundleConfig, new: &BundleConfig, lines: &mut Vec<St
     }
     if new.checkers.is_empty() && !old.checkers.is_empty() {
         lines.push(format!(
-            "{name}: every checker is demanded, because none is named"
+            "{name}: every checker is required, because none is named"
         ));
     }
     for checker in &old.checkers {
         if !new.checkers.is_empty() && new.checkers.iter().all(|it| it.id != checker.id) {
-            lines.push(format!("{name}: {} is no longer demanded", checker.id));
+            lines.push(format!("{name}: {} is no longer required", checker.id));
         }
     }
 }

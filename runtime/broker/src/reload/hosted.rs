@@ -59,7 +59,7 @@ impl Adapter {
         }
         let joined = format!("{PREFIX}{name}");
         loaded.notices.push(format!(
-            "{}: `{name}` comes with qcbus, so this module of ASAM's framework joins as `{joined}`; that is its \
+            "{}: `{name}` comes with qcbus, so this module of ASAM's framework joins as `{joined}`; use that \
              name in configurations, too",
             to_text(&module.manifest)
         ));
@@ -148,8 +148,8 @@ impl Adapter {
                 continue;
             }
             loaded.notices.push(format!(
-                "no manifest brings `{name}`, which the configuration names: {shown} is run as a one-shot module of \
-                 ASAM's framework"
+                "no manifest defines `{name}`, which the configuration names: {shown} is run as a one-shot ASAM \
+                 module"
             ));
             let module = named_module(name);
             let command = self.words(name, &module, Role::Bundle);
@@ -179,7 +179,7 @@ pub fn unwritable(directory: &Path) -> Option<String> {
     let why = match access(there, Access::WRITE_OK | Access::EXEC_OK) {
         Err(error) => error.to_string(),
         Ok(()) if there.is_dir() => return None,
-        Ok(()) => "it is no directory".to_owned(),
+        Ok(()) => "it is not a directory".to_owned(),
     };
     Some(format!("{}: {why}", to_text(there)))
 }

@@ -219,14 +219,17 @@ impl Sources {
             return Ok(Vec::new());
         };
         let cannot_look = |error: &std::io::Error| {
-            LoadError::Manifest(format!("cannot look into {}: {error}", to_text(directory)))
+            LoadError::Manifest(format!(
+                "cannot read the directory {}: {error}",
+                to_text(directory)
+            ))
         };
         match trust::directory(directory) {
             Ok(_) => {}
             Err(error) if error.is_absent() => return Ok(Vec::new()),
             Err(error) => {
                 return Err(LoadError::Manifest(format!(
-                    "{error}; or choose another place with --out, --state or --bundles-d"
+                    "{error}; or choose another directory with --out, --state or --bundles-d"
                 )));
             }
         }
@@ -249,7 +252,9 @@ impl Sources {
         others.sort();
         notices.extend(others.iter().map(|path| {
             let shown = to_text(path);
-            format!("{shown}: is no manifest, those are files of this directory that end in .json")
+            format!(
+                "{shown}: not a manifest; manifests are files of this directory that end in .json"
+            )
         }));
         paths.sort();
         Ok(paths)
@@ -292,8 +297,8 @@ impl Sources {
         }
         let shown = to_text(directory);
         Err(LoadError::Manifest(format!(
-            "{shown} is not the directory that it was, and there is no manifest in it; its bundles stay \
-             demanded until it is back (to do without them, start the broker anew)"
+            "{shown} is missing, or was replaced by a directory without manifests; its bundles stay required \
+             until it is back (to continue without them, restart the broker)"
         )))
     }
 }
@@ -301,7 +306,7 @@ impl Sources {
 /// Returns the notice that a run of `check` ignores a shadow: no output of the run is from it.
 fn no_shadow_in_a_run(module: &Module) -> String {
     format!(
-        "{}: `{}` is a shadow: it takes no part in a run, only where a broker stays (`qcbus serve`)",
+        "{}: `{}` is a shadow: it is not used in a run, only by a broker (`qcbus serve`)",
         to_text(&module.manifest),
         module.name
     )
@@ -322,7 +327,8 @@ fn named_shadows(path: &Path, config: &Config, loaded: &Loaded) -> Vec<String> {
     shadows
         .map(|it| {
             let name = &it.name;
-            format!("{shown} names `{name}`, which is a shadow: it is tried as it is configured, and nobody misses it")
+            format!("{shown} names `{name}`, which is a shadow: it is tried as configured, but it is not \
+                     required")
         })
         .collect()
 }
@@ -338,7 +344,7 @@ fn unasked(path: &Path, config: &Config, loaded: &Loaded) -> Vec<String> {
     let unasked = brought.filter(|(name, _)| !config.bundles.is_empty() && !named(name));
     let (shown, note) = (
         to_text(path),
-        "it judges nothing, unless it is named by its short name",
+        "it judges nothing unless it is named by its short name",
     );
     unasked
         .map(|(name, manifest)| format!("{manifest}: {shown} does not name `{name}`: {note}"))

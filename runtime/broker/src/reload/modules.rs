@@ -39,7 +39,7 @@ pub(super) fn add_module(
         ModuleType::ReportModule => Role::Reporter,
         ModuleType::ResultPooling => {
             let name = &module.name;
-            let notice = format!("{manifest}: `{name}`: qcbus pools results itself");
+            let notice = format!("{manifest}: `{name}` is not started: qcbus pools results itself");
             loaded.notices.push(notice);
             return Ok(());
         }
@@ -54,14 +54,14 @@ pub(super) fn add_module(
     };
     if let Some(other) = loaded.brought.get(&name) {
         return Err(LoadError::Manifest(format!(
-            "{manifest}: `{name}` is the name of a module in {other}, too: one of them would not run; give \
-             it another name"
+            "{manifest}: `{name}` is also the name of a module in {other}, so one of them would not run; give it \
+             another name"
         )));
     }
     if name == OWN_BUNDLE || loaded.children.iter().any(|child| child.name == name) {
         return Err(LoadError::Manifest(format!(
-            "{manifest}: `{name}` comes with qcbus and would be replaced; give it another name (to do \
-             without the bundles that come with qcbus, start it with --no-standard-bundles)"
+            "{manifest}: `{name}` comes with qcbus and would be replaced; give it another name (to run without \
+             the bundles that come with qcbus, start it with --no-standard-bundles)"
         )));
     }
     programs::look_at(&module.exec_command).map_err(|why| {
@@ -84,12 +84,12 @@ fn not_on_the_bus(module: &Module, role: Role, loaded: &mut Loaded) -> Result<()
     let (manifest, name) = (to_text(&module.manifest), &module.name);
     if role == Role::Bundle {
         return Err(LoadError::Manifest(format!(
-            "{manifest}: `{name}` has no \"mode\": \"bus\", so it cannot be asked, and what it would reject \
-             would be accepted; add the mode if it speaks on the bus, or take the manifest out"
+            "{manifest}: `{name}` has no \"mode\": \"bus\", so it cannot be used, and files that it would reject \
+             would be accepted; add the mode if it supports the bus, or remove the manifest"
         )));
     }
     loaded.notices.push(format!(
-        "{manifest}: `{name}` has no \"mode\": \"bus\" and is not started: it does not speak on the bus"
+        "{manifest}: `{name}` has no \"mode\": \"bus\" and is not started: it does not support the bus"
     ));
     Ok(())
 }

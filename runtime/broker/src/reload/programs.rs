@@ -110,7 +110,7 @@ fn resolve(command: &str) -> Result<Option<(String, &str)>, String> {
     let rest = words.rest;
     let Some(program) = program.filter(|it| !it.is_empty()) else {
         return Err(format!(
-            "`{}`: the shell would have to work out what it runs; begin the command with the path of the \
+            "`{}`: the program can only be determined by the shell; begin the command with the path of the \
              program",
             first_word(command)
         ));
@@ -123,7 +123,7 @@ fn resolve(command: &str) -> Result<Option<(String, &str)>, String> {
         accept(&script)?;
     }
     let found = found.into_os_string().into_string();
-    let found = found.map_err(|it| format!("{}: its name is no UTF-8", it.display()))?;
+    let found = found.map_err(|it| format!("{}: its name is not valid UTF-8", it.display()))?;
     Ok(Some((found, rest)))
 }
 

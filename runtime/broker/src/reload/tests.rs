@@ -100,7 +100,7 @@ fn what_has_changed_is_told_line_by_line() {
     let expected = [
         "added yours",
         "removed mine",
-        "xodrBundle is no longer demanded",
+        "xodrBundle is no longer required",
         "xoscBundle is demanded",
     ];
     assert_eq!(lines, expected);
@@ -118,11 +118,11 @@ fn who_names_nothing_any_more_demands_everything() {
     for (config, expected) in [
         (
             CONFIG,
-            "xodrBundle: every checker is demanded, because none is named",
+            "xodrBundle: every checker is required, because none is named",
         ),
         (
             "<Config>\n</Config>\n",
-            "every bundle is demanded, because none is named",
+            "every bundle is required, because none is named",
         ),
     ] {
         put(dir.path(), config, &[]);

@@ -102,7 +102,7 @@ impl Simulation {
         let mut world = self.world();
         let breaks = world.meddles && world.serving.is_some() && world.rng.u32(0..40) == 0;
         if breaks {
-            world.say(|| "  the disk does not answer".to_owned());
+            world.say(|| "  the disk does not respond".to_owned());
         }
         breaks
     }

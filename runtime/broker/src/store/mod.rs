@@ -187,7 +187,7 @@ impl Store {
     pub fn close_gate(&self, path: &Arc<Path>) -> Result<(), StoreFailure> {
         let revoked = self.gate.as_ref().map_or(Ok(()), |gate| gate.revoke(path));
         revoked.map_err(|error| StoreFailure {
-            what: format!("cannot take {} from the gate: {error}", to_text(path)),
+            what: format!("cannot remove {} from the gate: {error}", to_text(path)),
             concerns_all: false,
         })
     }
@@ -267,7 +267,7 @@ impl StoreFailure {
 
 fn unlooked(path: &Path, error: &io::Error) -> String {
     let path = to_text(path);
-    format!("cannot tell whether {path} is still what was checked: {error}; it is tried again")
+    format!("cannot tell whether {path} has changed since it was checked: {error}; it is retried")
 }
 
 /// Reason why a result is missing.
@@ -283,7 +283,7 @@ struct Unwritten {
 fn unwritten(path: &Path, error: &io::Error) -> Unwritten {
     Unwritten {
         what: format!("cannot write {}: {error}", to_text(path)),
-        further: "; it is tried again",
+        further: "; it is retried",
         for_good: is_for_good(error),
     }
 }

@@ -94,7 +94,7 @@ fn unanswered(job: &FinishedJob) -> Option<Remark> {
     let (checker, description, open) = if let Some(why) = &job.unreadable {
         (
             "qcbus_file",
-            "The file is whole and can be read.",
+            "The file is complete and can be read.",
             why.clone(),
         )
     } else if job.bundles.iter().any(takes) {
@@ -102,8 +102,8 @@ fn unanswered(job: &FinishedJob) -> Option<Remark> {
     } else {
         let kind = job.kind.as_str();
         let why = format!(
-            "nobody must check .{kind} files: no bundle that takes them is known, or the configuration \
-             asks none of its checkers"
+            "no bundle is required for .{kind} files: no known bundle checks them, or the configuration requests \
+             none of its checkers"
         );
         ("qcbus_bundles", "A bundle checks files of this kind.", why)
     };
@@ -120,9 +120,9 @@ fn unanswered(job: &FinishedJob) -> Option<Remark> {
 fn unseen_root() -> Remark {
     Remark {
         checker: "qcbus_file".to_owned(),
-        description: "The file is whole and can be read.".to_owned(),
+        description: "The file is complete and can be read.".to_owned(),
         issue: None,
-        open: Some("its image was let go of before its result was written".to_owned()),
+        open: Some("its image was released before its result was written".to_owned()),
     }
 }
 

@@ -202,7 +202,7 @@ impl Store {
             let results = some_of(&removed);
             let out = to_text(&self.places.out);
             found.said.push(format!(
-                "results removed from {out}, because the journal does not know them: those of {results}"
+                "results removed from {out}, because the journal does not contain them: those of {results}"
             ));
         }
     }
@@ -270,7 +270,7 @@ impl Reconciled {
     fn cannot_withdraw(&mut self, path: &Path, error: &io::Error) {
         let path = to_text(path);
         self.said.push(format!(
-            "cannot withdraw the result of {path}: {error}; it is tried again when qcbus is started anew"
+            "cannot withdraw the result of {path}: {error}; it is retried at the next start of qcbus"
         ));
     }
 }
@@ -278,8 +278,8 @@ impl Reconciled {
 fn said(fall: Fall, paths: &[Arc<Path>]) -> String {
     let why = match fall {
         Fall::Unwatched => "their files are not watched any more",
-        Fall::Moved => "they lay elsewhere than results of these directories do now",
-        Fall::Incomplete => "they were not complete, and their files are judged anew",
+        Fall::Moved => "results of these directories are now written to another place",
+        Fall::Incomplete => "they were not complete, and their files are judged again",
     };
     format!("results withdrawn: {}: {why}", some_of(paths))
 }
@@ -293,9 +293,8 @@ fn directory_of(xqar: &Path) -> PathBuf {
 fn left_alone(directories: &BTreeSet<PathBuf>, out: &Path) -> String {
     let directories: Vec<Arc<Path>> = directories.iter().map(|it| it.as_path().into()).collect();
     format!(
-        "results in {} are left alone: the journal names them, but this broker writes to {} only. The state was \
-         copied from another broker, or --out was another directory before; remove them only if no other broker writes \
-         there",
+        "results in {} are left alone: the journal lists them, but this broker only writes to {}. The state was \
+         copied from another broker, or --out was changed; remove them only if no other broker writes there",
         some_of(&directories),
         to_text(out)
     )

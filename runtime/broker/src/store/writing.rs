@@ -25,7 +25,7 @@ impl Store {
     ) -> Result<(), Unwritten> {
         self.lock.hold().map_err(|error| Unwritten {
             what: error.to_string(),
-            further: "; it is tried again",
+            further: "; it is retried",
             for_good: false,
         })?;
         if let Some(gate) = &self.gate {
@@ -52,7 +52,7 @@ impl Store {
         };
         self.record(&[entry]).map_err(|what| Unwritten {
             what,
-            further: "; it is tried again",
+            further: "; it is retried",
             for_good: false,
         })
     }

@@ -20,7 +20,7 @@ pub(super) async fn watch(
     words.take_down(launch, name, started.heard).await;
     let end = match ended {
         Ok(status) => end_of(status),
-        Err(error) => ChildEnd::Failed(format!("its end could not be learned: {error}")),
+        Err(error) => ChildEnd::Failed(format!("its exit status cannot be read: {error}")),
     };
     // The broker may have stopped meanwhile.
     let _ = events.send(Event::Exited { launch, end });

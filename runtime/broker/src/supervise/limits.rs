@@ -8,7 +8,7 @@ use super::Surroundings;
 /// Sets the limits that must be set between fork and exec.
 #[expect(
     unsafe_code,
-    reason = "pre_exec is the only place where a child's own limits can be set"
+    reason = "a child's own limits can only be set in pre_exec"
 )]
 pub(super) fn restrict(command: &mut Command, surroundings: &Surroundings) {
     let memory = surroundings.memory_limit;

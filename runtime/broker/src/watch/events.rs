@@ -60,9 +60,8 @@ impl Scanner {
         self.dependencies.poll_all();
         if first {
             (self.tell)(Seen::Notice(format!(
-                "cannot watch by events ({error}); looking around every {} s instead. The usual limits \
-                 are `sysctl fs.inotify.max_user_instances` and `ulimit -n`; once there is room, events \
-                 are used again.",
+                "cannot watch by events ({error}); scanning every {} s instead. The usual limits are `sysctl \
+                 fs.inotify.max_user_instances` and `ulimit -n`; events are used again once there is room.",
                 EVERY.as_secs()
             )));
         }
@@ -118,9 +117,9 @@ impl Scanner {
         let limit = std::fs::read_to_string("/proc/sys/fs/inotify/max_user_watches");
         let limit = limit.map_or_else(|_| String::new(), |it| format!(", now {}", it.trim()));
         (self.tell)(Seen::Notice(format!(
-            "the kernel has no more watches for this user (`sysctl fs.inotify.max_user_watches`{limit}): \
-             directories beyond that are looked through every {} s or less often, the others are \
-             watched as ever. Raise the limit; it is tried again by itself.",
+            "the kernel has no more watches for this user (`sysctl fs.inotify.max_user_watches`{limit}): further \
+             directories are scanned every {} s or less often, the others are watched as before. Raise the \
+             limit; it is then retried automatically.",
             EVERY.as_secs()
         )));
     }
@@ -145,14 +144,14 @@ impl Scanner {
     fn tell_mode(&mut self) {
         let (_, without) = self.tree.counts();
         let mode = match (self.options.poll, &self.polling.without) {
-            (Some(every), _) => format!("poll every {} s, as asked", every.as_secs_f64()),
+            (Some(every), _) => format!("poll every {} s, as requested", every.as_secs_f64()),
             (None, Some(why)) => format!(
-                "poll every {} s, because events cannot be had: {why}",
+                "poll every {} s, because events are not available: {why}",
                 EVERY.as_secs()
             ),
             (None, None) if without == 0 => "events".to_owned(),
             (None, None) => format!(
-                "events; {without} directories every {} s or less often, which cannot be watched",
+                "events; {without} directories that cannot be watched are scanned every {} s or less often",
                 EVERY.as_secs()
             ),
         };
@@ -167,7 +166,7 @@ impl Scanner {
         let events = match self.tree.events() {
             Ok(events) => events,
             Err(error) => {
-                tracing::warn!(%error, "events cannot be read");
+                tracing::warn!(%error, "cannot read events");
                 return self.have_lost_events();
             }
         };
@@ -186,7 +185,7 @@ impl Scanner {
         if last.is_none_or(|last| since(last) >= SAY_AGAIN) {
             self.polling.lost_events = Some(now());
             (self.tell)(Seen::Notice(
-                "the kernel dropped file events; everything is looked through again".to_owned(),
+                "the kernel dropped file events; everything is scanned again".to_owned(),
             ));
         }
         self.dependencies.poll_all();

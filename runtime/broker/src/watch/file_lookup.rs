@@ -57,15 +57,15 @@ impl std::fmt::Display for NoFile {
         match self {
             NoFile::Dangling(target) => {
                 let target = text(target);
-                write!(f, "it is a symbolic link to {target}, which is not there")
+                write!(f, "it is a symbolic link to {target}, which does not exist")
             }
             NoFile::Loop => write!(f, "it is a symbolic link that leads back to itself"),
             NoFile::Outside(target) => {
                 let target = text(target);
                 write!(
                     f,
-                    "it is a symbolic link to the directory {target}, and such links are not \
-                     followed; name that directory, too, to have it looked at"
+                    "it is a symbolic link to the directory {target}, and such links are not followed; name that \
+                     directory as well to have it scanned"
                 )
             }
             NoFile::Special => write!(f, "it is a pipe, a socket or a device, not a file"),
@@ -77,7 +77,7 @@ impl std::fmt::Display for NoFile {
 /// symbolic link to a directory counts as missing.
 pub fn look_at(path: &Path, roots: &[PathBuf]) -> FileLookup {
     let looked = foreign::access(path, || Ok(look(path, roots)));
-    looked.unwrap_or_else(|error| FileLookup::Hidden(format!("cannot look at it: {error}")))
+    looked.unwrap_or_else(|error| FileLookup::Hidden(format!("cannot access it: {error}")))
 }
 
 fn look(path: &Path, roots: &[PathBuf]) -> FileLookup {
@@ -85,7 +85,7 @@ fn look(path: &Path, roots: &[PathBuf]) -> FileLookup {
         return match std::fs::metadata(path) {
             // Behind a link loop it is unknown whether the path still exists.
             Err(error) if !is_absent(&error) => {
-                FileLookup::Hidden(format!("cannot look at it: {error}"))
+                FileLookup::Hidden(format!("cannot access it: {error}"))
             }
             _ => FileLookup::Nothing,
         };
@@ -96,7 +96,7 @@ fn look(path: &Path, roots: &[PathBuf]) -> FileLookup {
         Ok(data) if data.is_symlink() => behind(path, roots),
         Ok(_) => FileLookup::NoFile(NoFile::Special),
         Err(error) if is_absent(&error) => FileLookup::Nothing,
-        Err(error) => FileLookup::Hidden(format!("cannot look at it: {error}")),
+        Err(error) => FileLookup::Hidden(format!("cannot access it: {error}")),
     }
 }
 
@@ -106,7 +106,7 @@ fn behind(link: &Path, roots: &[PathBuf]) -> FileLookup {
         Ok(data) if data.is_dir() => match std::fs::canonicalize(link) {
             Ok(real) if is_looked_into(roots, &real) => FileLookup::Known,
             Ok(real) => FileLookup::NoFile(NoFile::Outside(real)),
-            Err(error) => FileLookup::Hidden(format!("cannot look behind this link: {error}")),
+            Err(error) => FileLookup::Hidden(format!("cannot follow this link: {error}")),
         },
         Ok(_) => FileLookup::NoFile(NoFile::Special),
         Err(error) if is_absent(&error) => {
@@ -115,7 +115,7 @@ fn behind(link: &Path, roots: &[PathBuf]) -> FileLookup {
             FileLookup::NoFile(NoFile::Dangling(target))
         }
         Err(error) if error.raw_os_error() == Some(libc::ELOOP) => FileLookup::NoFile(NoFile::Loop),
-        Err(error) => FileLookup::Hidden(format!("cannot look behind this link: {error}")),
+        Err(error) => FileLookup::Hidden(format!("cannot follow this link: {error}")),
     }
 }
 

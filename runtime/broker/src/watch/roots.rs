@@ -49,7 +49,7 @@ impl Scanner {
         if before.is_some_and(|before| is_unmounted(root, before, now)) {
             return self.lose_root(
                 root,
-                "is empty and on another file system than before, as after an unmount",
+                "is empty and on a different file system than before, as after an unmount",
             );
         }
         let was_lost = self.roots.lost.remove(root);
@@ -62,7 +62,7 @@ impl Scanner {
         let what = match before {
             _ if was_lost => "is back",
             Some(before) if before != now || !is_watched => {
-                "is another one than before, and is looked through again"
+                "is a different directory than before, and is scanned again"
             }
             Some(_) => return,
             None => {
@@ -92,7 +92,7 @@ impl Scanner {
             (self.tell)(Seen::Away(Unseen { path, why }));
             self.say_of_root(
                 root,
-                &format!("{how}; its results are kept, and it is watched again when it comes back"),
+                &format!("{how}; its results are kept, and it is watched again when it is back"),
             );
         }
     }
@@ -123,13 +123,14 @@ fn look(root: &Path) -> Root {
         // A link would have been resolved at the start of the broker. The kernel reports no events
         // through it.
         Ok(data) if data.is_symlink() => {
-            "has become a symbolic link, which only a broker that starts anew follows".to_owned()
+            "has become a symbolic link, which is only followed after a restart of the broker"
+                .to_owned()
         }
-        Ok(_) => "is no directory any more".to_owned(),
+        Ok(_) => "is not a directory any more".to_owned(),
         Err(error) => match error.kind() {
-            io::ErrorKind::TimedOut => "does not answer".to_owned(),
+            io::ErrorKind::TimedOut => "does not respond".to_owned(),
             io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => "is gone".to_owned(),
-            _ => format!("cannot be looked at: {error}"),
+            _ => format!("cannot be accessed: {error}"),
         },
     };
     Root::Away(how)

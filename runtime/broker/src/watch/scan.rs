@@ -29,7 +29,7 @@ pub const MOST_UNSEEN: usize = 1_000;
 
 /// Text that represents all further inaccessible paths.
 pub const MORE_UNSEEN: &str =
-    "more than a thousand things below cannot be looked at; the first of them are named";
+    "more than a thousand paths below cannot be accessed; only the first ones are listed";
 
 /// Result of a scan.
 #[derive(Debug, Default)]
@@ -80,11 +80,11 @@ pub fn is_too_much(directory: &Path, roots: &[PathBuf], number: usize) -> Option
     let depth = inside.map(|below| below.components().count()).min();
     if depth.is_some_and(|depth| depth > DEEPEST) {
         Some(format!(
-            "it lies more than {DEEPEST} directories deep, and such are not looked into"
+            "it is more than {DEEPEST} directories deep, and such directories are not scanned"
         ))
     } else if number > MOST_DIRECTORIES {
         Some(format!(
-            "there are more than {MOST_DIRECTORIES} directories, and no more are looked into"
+            "there are more than {MOST_DIRECTORIES} directories, and further ones are not scanned"
         ))
     } else {
         None
@@ -99,7 +99,7 @@ pub fn cannot_look_into(error: &io::Error) -> Option<String> {
         io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
     );
     let is_link = error.raw_os_error() == Some(libc::ELOOP);
-    (!is_gone && !is_link).then(|| format!("cannot look into this directory: {error}"))
+    (!is_gone && !is_link).then(|| format!("cannot read this directory: {error}"))
 }
 
 /// Entries of one directory.

@@ -60,12 +60,12 @@ impl std::fmt::Display for Why {
         match self {
             Why::Open(most) => write!(
                 f,
-                "it is open for writing; it is judged when it is closed, or has not changed for {} s",
+                "it is open for writing; it is judged once it is closed, or has not changed for {} s",
                 most.as_secs_f64()
             ),
             Why::Young(rest) => write!(
                 f,
-                "it is being written to; it is judged when it has not changed for {} s",
+                "it is being written; it is judged once it has not changed for {} s",
                 rest.as_secs_f64()
             ),
         }

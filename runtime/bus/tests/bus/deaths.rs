@@ -160,7 +160,7 @@ fn without_a_new_broker_a_peer_gives_up() {
         let PeerEvent::Closed { reason } = event else {
             panic!("{event:?}")
         };
-        assert_eq!(reason, "the broker has been gone for 0.1 s");
+        assert_eq!(reason, "the broker has been unavailable for 0.1 s");
         assert!(matches!(peer.next().await, PeerEvent::Closed { .. }));
         peer.leave().await;
     });

@@ -318,7 +318,7 @@ fn one_peer_too_many_is_told_so() {
         let JoinError::Refused(why) = error else {
             panic!("{error}")
         };
-        assert_eq!(why, "the broker serves 1 bundles and reporters already");
+        assert_eq!(why, "the broker already serves 1 bundles and reporters");
     });
 }
 

@@ -63,10 +63,9 @@ pub struct BusArgs {
 /// `qcbus bundle add`.
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "A bundle that does not become ready is taken out again, for what it would judge would be \
-undetermined.\n\nExamples:\n  \
-qcbus bundle add mine /opt/mine/bundle -- --its-own-flag\n  \
-qcbus bundle add rules ./rules.py       with the python3 beside qcbus, or of PATH"
+    after_help = "A bundle that does not become ready is removed again, because everything that it judges would \
+                  be undetermined.\n\nExamples:\n  qcbus bundle add mine /opt/mine/bundle -- --its-own-flag\n  \
+                  qcbus bundle add rules ./rules.py       with the python3 beside qcbus, or from PATH"
 )]
 pub struct BundleAddArgs {
     /// Name of the bundle as the bundle itself reports it
@@ -96,8 +95,8 @@ pub struct BundleAddArgs {
 /// `qcbus bundle upgrade`.
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "The process before goes on until the newer one is ready. A program that is replaced at \
-its path is noticed without this command, too; this one says what became of it."
+    after_help = "The previous process continues until the newer one is ready. A program that is replaced at its \
+                  path is also detected without this command; this command reports the outcome."
 )]
 pub struct BundleUpgradeArgs {
     /// The bundle's name
@@ -124,9 +123,10 @@ pub struct BundleUpgradeArgs {
 /// `qcbus bundle trials`.
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "A shadow is a bundle that was added with --shadow. `qcbus bundle upgrade NAME --no-shadow` lets it \
-judge.\n\nExit codes: 0 nothing would be rejected or undetermined because of it, 1 something would be rejected, 3 something \
-would be undetermined, it has not tried everything yet, or nothing at all"
+    after_help = "A shadow is a bundle that was added with --shadow. `qcbus bundle upgrade NAME --no-shadow` \
+                  lets it judge.\n\nExit codes: 0 nothing would be rejected or undetermined because of it, 1 \
+                  something would be rejected, 3 something would be undetermined, or it has not tried everything \
+                  yet, or has tried nothing"
 )]
 pub struct BundleTrialsArgs {
     /// Name of the shadow

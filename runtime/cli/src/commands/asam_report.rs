@@ -34,7 +34,7 @@ fn begin(
     let (module, rest) = ReportModule::start(&[standard::ASAM_ADAPTER], arguments)?;
     let usage = |why: String| (Exit::Usage, why);
     let Mode::Bus(bus) = Mode::parse(rest).map_err(|error| usage(error.to_string()))? else {
-        return Err(usage("it runs on the bus only".to_owned()));
+        return Err(usage("it runs only on the bus".to_owned()));
     };
     let instance = match bus.instance_dir {
         Some(directory) => Ok(Instance::at(directory)),

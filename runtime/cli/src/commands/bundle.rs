@@ -28,7 +28,7 @@ pub fn list(args: &StatusArgs) -> Exit {
             (Vec::new(), "unknown")
         }
         Err(error) => {
-            talk::fail(&format!("what runs is not known: {error}"));
+            talk::fail(&format!("the running bundles are unknown: {error}"));
             (Vec::new(), "unknown")
         }
     };

@@ -48,7 +48,7 @@ fn tell(file: &Path, loaded: &Loaded) -> Exit {
     let is_warning = |oddity: &&Oddity| oddity.level <= Level::Warning;
     let warnings = loaded.oddities.iter().filter(is_warning).count();
     if warnings == 0 {
-        talk::say(&format!("{shown}: in order"));
+        talk::say(&format!("{shown}: valid"));
         return Exit::Accepted;
     }
     let warnings = match warnings {
@@ -56,7 +56,7 @@ fn tell(file: &Path, loaded: &Loaded) -> Exit {
         several => format!("{several} warnings"),
     };
     talk::fail(&format!(
-        "{shown}: not in order, {warnings}: what they name is not done as the file says"
+        "{shown}: not valid, {warnings}: the settings that they name do not take effect as written"
     ));
     Exit::Usage
 }

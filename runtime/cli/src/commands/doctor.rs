@@ -37,7 +37,7 @@ pub fn run(args: &DoctorArgs) -> Exit {
         Err(why) => bad(
             "runtime directory",
             why,
-            "set XDG_RUNTIME_DIR to a directory of your own",
+            "set XDG_RUNTIME_DIR to a directory that you own",
         ),
     });
     let asked = instance(&args.instance).ok();
@@ -89,7 +89,8 @@ const SHM_WANTED: u64 = 512 << 20;
 
 fn shared_memory() -> Remark {
     let what = "shared memory";
-    let advice = "mount /dev/shm larger (`mount -o remount,size=2G /dev/shm`; containers: --shm-size=2g), or remove what others left there";
+    let advice = "increase the size of /dev/shm (`mount -o remount,size=2G /dev/shm`; containers: \
+                  --shm-size=2g), or remove files that others left there";
     if let Ok(true) = SharedMemory::is_read_only() {
         let text = "/dev/shm is mounted for reading only: no broker can start".to_owned();
         let advice = "make it writable: `mount -o remount,rw /dev/shm`";
@@ -99,7 +100,7 @@ fn shared_memory() -> Remark {
         Ok(memory) => {
             let (free, size) = (memory.free, memory.size);
             let text = format!(
-                "{} MiB of {} MiB free in /dev/shm: room for images of {} MiB beside the bus",
+                "{} MiB of {} MiB free in /dev/shm: room for {} MiB of images in addition to the bus",
                 free >> 20,
                 size >> 20,
                 room_for_images(&memory) >> 20
@@ -130,12 +131,12 @@ fn addresses() -> Remark {
     let limit = rustix::process::getrlimit(rustix::process::Resource::As).current;
     let (least, all) = HostOptions::default().address_bytes();
     match limit {
-        None => good(what, "no limit on it".to_owned()),
+        None => good(what, "no limit".to_owned()),
         Some(limit) if limit >= all => good(what, format!("limited to {} MiB", limit >> 20)),
         Some(limit) => bad(
             what,
             format!(
-                "limited to {} MiB: a broker needs {} MiB, or {} MiB for small files alone",
+                "limited to {} MiB: a broker needs {} MiB, or {} MiB for small files only",
                 limit >> 20,
                 all >> 20,
                 least >> 20
@@ -214,19 +215,15 @@ fn broker(asked: &Result<Response, AskError>) -> Remark {
     let status = match asked {
         Ok(Response::Status(status)) => status,
         Ok(other) => {
-            return bad(
-                what,
-                format!("it answers something else: {other:?}"),
-                UPGRADE,
-            );
+            return bad(what, format!("unexpected answer: {other:?}"), UPGRADE);
         }
         Err(AskError::NoBroker { others, .. }) if others.is_empty() => {
-            return good(what, "none runs as this instance".to_owned());
+            return good(what, "no broker runs as this instance".to_owned());
         }
-        Err(error) => return bad(what, error.to_string(), "ask the broker that you mean"),
+        Err(error) => return bad(what, error.to_string(), "name the broker with --instance"),
     };
     let text = format!(
-        "process {} runs, {} files known",
+        "process {} is running, {} files known",
         status.pid, status.files.total
     );
     match health::reasons(status) {
@@ -234,7 +231,7 @@ fn broker(asked: &Result<Response, AskError>) -> Remark {
         reasons => bad(
             what,
             format!("{text}; {}", reasons.join("; ")),
-            "`qcbus status` says more, and the log of the broker",
+            "see `qcbus status` and the log of the broker",
         ),
     }
 }
@@ -261,7 +258,7 @@ fn temporary(status: Option<&Status>) -> Remark {
         None => good(what, to_text(&scratch.directory)),
         Some(why) => bad(
             what,
-            format!("one-shot modules cannot run, nothing can be written to {why}"),
+            format!("one-shot modules cannot run, cannot write to {why}"),
             "start the broker with TMPDIR set to a directory that it may write to (systemd: PrivateTmp=yes)",
         ),
     }
@@ -289,10 +286,14 @@ fn directory(what: &'static str, path: &Path) -> Remark {
     let shown = to_text(path);
     match access(path, Access::WRITE_OK | Access::EXEC_OK) {
         Err(rustix::io::Errno::NOENT) => {
-            good(what, format!("{shown} does not exist; `serve` makes it"))
+            good(what, format!("{shown} does not exist; `serve` creates it"))
         }
         Ok(()) if path.is_dir() => good(what, shown),
-        Ok(()) => bad(what, format!("{shown} is no directory"), "name another one"),
+        Ok(()) => bad(
+            what,
+            format!("{shown} is not a directory"),
+            "use another directory",
+        ),
         Err(error) => bad(what, format!("{shown}: {error}"), "make it writable"),
     }
 }
@@ -302,7 +303,7 @@ fn stale_instances() -> Remark {
     let text = if swept == 0 {
         "none".to_owned()
     } else {
-        format!("{swept} left by what was killed, removed")
+        format!("removed {swept} that killed processes left behind")
     };
     good("stale instances", text)
 }
@@ -316,11 +317,12 @@ fn journal(state: &Path) -> Remark {
             what,
             format!("{shown} does not exist; name the directory of a broker with --out or --state"),
         ),
-        None => good(what, format!("{shown} is sound")),
+        None => good(what, format!("{shown} is intact")),
         Some(wrong) => bad(
             what,
             wrong,
-            "stop the broker, move journal.sqlite (with -wal and -shm) away and start again: everything is judged anew, results stay",
+            "stop the broker, move journal.sqlite (with -wal and -shm) away and start the broker again: all \
+             files are judged again, results stay",
         ),
     }
 }

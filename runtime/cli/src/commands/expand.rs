@@ -42,7 +42,7 @@ fn expanded(args: &ExpandArgs) -> Result<Exit, Failed> {
             true => String::new(),
             false => format!(": {}: {}", why.place, why.text),
         };
-        return Err((Exit::Rejected, format!("{name} is not expanded{why}")));
+        return Err((Exit::Rejected, format!("{name} cannot be expanded{why}")));
     }
     if expansion.references.is_empty() {
         talk::say(&format!(
@@ -56,7 +56,8 @@ fn expanded(args: &ExpandArgs) -> Result<Exit, Failed> {
     };
     if let Some(source) = source_at(&expansion, output) {
         let output = to_text(output);
-        let text = format!("{output} is not written: the scenario is made of it ({source})");
+        let text =
+            format!("{output} is not written: it is a source file of the scenario ({source})");
         return Err((Exit::Usage, text));
     }
     qcbus_disk::write_named(output, text.as_bytes(), false).map_err(|error| {
@@ -89,7 +90,7 @@ fn load(path: &Path) -> Result<Loaded, Failed> {
         return Ok(loaded);
     }
     let text = format!(
-        "{} is no scenario: its name ends in neither .xosc nor .mosc",
+        "{} is not a scenario: its name ends in neither .xosc nor .mosc",
         to_text(path)
     );
     Err((Exit::Usage, text))
@@ -134,7 +135,8 @@ fn say_moved(expansion: &Expansion<'_>, args: &ExpandArgs) {
     let is_relative = |path: &&str| !path.starts_with(['/', '$']) && !path.contains("://");
     for path in paths.filter(is_relative) {
         talk::say(&format!(
-            "warning: `{path}` starts where a scenario lies, and {} is in another directory than {}",
+            "warning: `{path}` is relative to the directory of the scenario, but {} is in another directory than \
+             {}",
             to_text(output),
             to_text(&args.file)
         ));
@@ -154,7 +156,7 @@ fn in_the_way(expansion: &Expansion<'_>) -> Option<InTheWay> {
         return Some(InTheWay {
             place: root.path().to_owned(),
             text: fault
-                .map_or("there is nothing in it", |fault| fault.text)
+                .map_or("it has no content", |fault| fault.text)
                 .to_owned(),
         });
     }

@@ -39,7 +39,7 @@ pub fn reasons(status: &Status) -> Vec<String> {
     let unseen = status.unseen.iter().take(NAMED).map(|it| it.to_string());
     reasons.extend(unseen);
     if let Some(more) = status.unseen.len().checked_sub(NAMED).filter(|it| *it > 0) {
-        reasons.push(format!("{more} more cannot be looked at"));
+        reasons.push(format!("{more} more cannot be read"));
     }
     let mut told: BTreeMap<&str, u64> = BTreeMap::new();
     for notice in status.notices.iter().filter(|it| is_failure(it)) {
@@ -63,8 +63,8 @@ fn of_peer(peer: &PeerStatus) -> Option<String> {
     } = peer;
     let what = match peer.state.as_str() {
         "down" => "is down",
-        "gave up" => "failed too often and is left alone for a while",
-        "silent" => "has work and says nothing",
+        "gave up" => "failed too often and is not restarted for a while",
+        "silent" => "has work but does not respond",
         "starting" => "is starting",
         _ if peer.unreported > 0 => "cannot report",
         _ => return None,
@@ -174,6 +174,6 @@ mod tests {
             ..status()
         });
         assert_eq!(found.len(), NAMED + 1);
-        assert_eq!(found[NAMED], "15 more cannot be looked at");
+        assert_eq!(found[NAMED], "15 more cannot be read");
     }
 }

@@ -86,13 +86,13 @@ fn try_add(args: &BundleAddArgs) -> Result<String, Refusal> {
         Err((exit, why)) if args.keep => Err((
             exit,
             format!(
-                "`{name}` is not ready: {why}; {shown} stays, and what it would judge is undetermined \
-                 until it is (`qcbus bundle remove {name}` takes it out)"
+                "`{name}` is not ready: {why}; {shown} stays, and the files that it must check are undetermined \
+                 until it is ready (`qcbus bundle remove {name}` removes it)"
             ),
         )),
         Err((exit, why)) => {
             let then = home.take_back(&path, before.as_deref());
-            let why = format!("`{name}` is not ready: {why}; {then} (--keep leaves it in)");
+            let why = format!("`{name}` is not ready: {why}; {then} (use --keep to leave it in)");
             Err((exit, why))
         }
     }
@@ -105,7 +105,7 @@ pub(super) fn good_name(name: &str) -> Result<(), Refusal> {
         return Ok(());
     }
     Err(usage(format!(
-        "`{name}` is no name for a bundle: use A-Z a-z 0-9 . _ -, and no dot at the start"
+        "`{name}` is not a valid bundle name: use A-Z a-z 0-9 . _ -, and no dot at the start"
     )))
 }
 
@@ -140,7 +140,7 @@ fn put_back(path: &Path, before: Option<&[u8]>) {
         None => std::fs::remove_file(path),
     };
     if let Err(error) = done {
-        talk::fail(&format!("cannot put back {}: {error}", to_text(path)));
+        talk::fail(&format!("cannot restore {}: {error}", to_text(path)));
     }
 }
 
@@ -170,10 +170,10 @@ impl Home {
             });
         }
         let advice = if exit == Exit::NoBroker {
-            "start one with `qcbus serve`, name another one with --instance, or use --offline for \
-             one that will be started"
+            "start one with `qcbus serve`, name another one with --instance, or use --offline for a broker that \
+             starts later"
         } else {
-            "leave --bundles-d away, or name another broker with --instance"
+            "omit --bundles-d, or name another broker with --instance"
         };
         Err((exit, format!("nothing was done: {why}; {advice}")))
     }
@@ -195,7 +195,7 @@ impl Home {
         };
         let Some(watched) = status.bundles_d else {
             return Err(usage(format!(
-                "the broker of instance `{name}` watches no directory of manifests"
+                "the broker of instance `{name}` watches no manifest directory"
             )));
         };
         if given.is_some_and(|given| real(given) != real(&watched)) {
@@ -252,9 +252,9 @@ impl Home {
     pub fn take_back(&self, path: &Path, before: Option<&[u8]>) -> String {
         put_back(path, before);
         match self.reload() {
-            Ok(_) if before.is_some() => "its manifest from before is in force again".to_owned(),
-            Ok(_) => "it was taken out again, and what was in force before is in force".to_owned(),
-            Err((_, why)) => format!("it was taken out again, but {why}"),
+            Ok(_) if before.is_some() => "its previous manifest is in force again".to_owned(),
+            Ok(_) => "it was removed again, and the previous state is in force".to_owned(),
+            Err((_, why)) => format!("the change was undone, but {why}"),
         }
     }
 
@@ -273,7 +273,7 @@ impl Home {
 
     /// Removes a bundle that no manifest in this directory names.
     fn forget(&self, name: &str, path: &Path) -> Result<String, Refusal> {
-        let missing = format!("there is no {}", to_text(path));
+        let missing = format!("{} does not exist", to_text(path));
         let Some(broker) = &self.broker else {
             let unwatched = &self.unwatched;
             return Err(usage(format!(

@@ -84,16 +84,14 @@ pub fn page((offer, rule): OfferedRule<'_>) -> String {
     let asked = if rule.default_on {
         ""
     } else {
-        ", not on by default"
+        ", off by default"
     };
     lines.push(format!(
         "  level {level}, files: {}{asked}",
         kinds.join(", ")
     ));
     let (name, version) = (&offer.name, &offer.version);
-    lines.push(format!(
-        "  of the bundle {name} {version}, which is running"
-    ));
+    lines.push(format!("  from the running bundle {name} {version}"));
     lines.push(String::new());
     lines.push(rule.description.to_string());
     for param in &rule.params {

@@ -30,7 +30,10 @@ fn packed(args: &PackArgs) -> Result<Exit, Failed> {
     let usage = |text: String| (Exit::Usage, text);
     let output = &args.output;
     if FileKind::of_path(output) != Some(FileKind::Mosc) {
-        let text = format!("{}: the name of an archive ends in .mosc", to_text(output));
+        let text = format!(
+            "{}: the name of an archive must end in .mosc",
+            to_text(output)
+        );
         return Err(usage(text));
     }
     let members = members(&args.files).map_err(usage)?;
@@ -71,12 +74,12 @@ fn read(path: &Path) -> Result<Vec<u8>, String> {
     let failed = |error: std::io::Error| format!("cannot read {}: {error}", to_text(path));
     let data = std::fs::metadata(path).map_err(failed)?;
     if !data.is_file() {
-        return Err(format!("cannot read {}: it is no file", to_text(path)));
+        return Err(format!("cannot read {}: it is not a file", to_text(path)));
     }
     if data.len() > most {
         let (path, found) = (to_text(path), data.len());
         return Err(format!(
-            "{path} has {found} bytes; an archive holds {most} in all"
+            "{path} has {found} bytes; an archive may have at most {most} in total"
         ));
     }
     std::fs::read(path).map_err(failed)
@@ -89,7 +92,7 @@ fn members(files: &[PathBuf]) -> Result<Vec<(String, PathBuf)>, String> {
     };
     if FileKind::of_path(main) != Some(FileKind::Xosc) {
         return Err(format!(
-            "{}: the main scenario comes first, and its name ends in .xosc",
+            "{}: the main scenario must come first, and its name must end in .xosc",
             to_text(main)
         ));
     }
@@ -103,7 +106,7 @@ fn members(files: &[PathBuf]) -> Result<Vec<(String, PathBuf)>, String> {
         let name = below.or_else(|| whole.file_name().map(Path::new));
         let name = name
             .and_then(Path::to_str)
-            .ok_or_else(|| format!("{}: names in archives are UTF-8", to_text(path)))?;
+            .ok_or_else(|| format!("{}: names in archives must be UTF-8", to_text(path)))?;
         if let Some((_, other)) = members.iter().find(|(other, _)| other == name) {
             return Err(format!(
                 "{} and {} would both be called {name} in the archive",

@@ -24,7 +24,7 @@ pub(super) fn asam_module_command(command: &str) -> Result<String, Refusal> {
     let found = find_program(&program).map_err(usage)?;
     let Some(path) = found.to_str() else {
         let shown = to_text(&found);
-        return Err(usage(format!("{shown}: a manifest takes UTF-8 only")));
+        return Err(usage(format!("{shown}: paths in a manifest must be UTF-8")));
     };
     Ok(format!("{}{rest}", quote(path)))
 }
@@ -33,7 +33,7 @@ pub(super) fn asam_module_command(command: &str) -> Result<String, Refusal> {
 /// unchanged rest.
 fn first_word(command: &str) -> Result<(String, &str), Refusal> {
     if shlex::split(command).is_none() {
-        let why = "a quote is not closed, or nothing follows a backslash at the end";
+        let why = "a quote is not closed, or the command ends with a backslash";
         return Err(usage(format!("cannot run `{command}`: {why}")));
     }
     let spaces = command.char_indices().filter(|(_, c)| c.is_whitespace());
@@ -42,7 +42,7 @@ fn first_word(command: &str) -> Result<(String, &str), Refusal> {
     let mut words = ends.filter_map(|end| Some((shlex::split(&command[..end])?, end)));
     let first = words.find_map(|(words, end)| Some((words.into_iter().next()?, end)));
     let Some((program, end)) = first.filter(|(program, _)| !program.is_empty()) else {
-        return Err(usage("no program is named"));
+        return Err(usage("no program is given"));
     };
     Ok((program, &command[end..]))
 }
@@ -52,7 +52,7 @@ fn first_word(command: &str) -> Result<(String, &str), Refusal> {
 /// which decides what the script can import.
 pub(super) fn command_line(words: &[String]) -> Result<String, Refusal> {
     let Some((program, arguments)) = words.split_first() else {
-        return Err(usage("no program is named"));
+        return Err(usage("no program is given"));
     };
     let script = Path::new(program);
     let programs = if script.extension().is_some_and(|it| it == "py") {
@@ -67,7 +67,7 @@ pub(super) fn command_line(words: &[String]) -> Result<String, Refusal> {
     for program in &programs {
         let Some(program) = program.to_str() else {
             let shown = to_text(program);
-            return Err(usage(format!("{shown}: a manifest takes UTF-8 only")));
+            return Err(usage(format!("{shown}: paths in a manifest must be UTF-8")));
         };
         quoted.push(quote(program));
     }
@@ -80,7 +80,7 @@ fn script_at(script: &Path) -> Result<PathBuf, Refusal> {
     let shown = to_text(&path);
     match std::fs::metadata(&path) {
         Ok(data) if data.is_file() => Ok(path),
-        Ok(_) => Err(usage(format!("cannot run {shown}: it is no file"))),
+        Ok(_) => Err(usage(format!("cannot run {shown}: it is not a file"))),
         Err(error) => Err(usage(format!("cannot run {shown}: {error}"))),
     }
 }
@@ -93,7 +93,8 @@ fn interpreter_of(script: &Path) -> Result<Vec<PathBuf>, String> {
     let mut words = words.into_iter();
     let program = words.next().unwrap_or_default();
     let found = find_program(&program);
-    let found = found.map_err(|why| format!("{why}, as {} begins", to_text(script)))?;
+    let found =
+        found.map_err(|why| format!("{why} (named in the first line of {})", to_text(script)))?;
     Ok(std::iter::once(found)
         .chain(words.map(PathBuf::from))
         .collect())
@@ -137,15 +138,15 @@ fn find_program(program: &str) -> Result<PathBuf, String> {
     let paths = OwnProgram::this().search_path();
     let mut found = std::env::split_paths(&paths).map(|directory| directory.join(program));
     let found = found.find(|path| executable(path).is_ok());
-    found.map(|path| absolute(&path)).ok_or_else(|| {
-        format!("cannot run `{program}`: no directory of PATH has such a program; name its path")
-    })
+    found
+        .map(|path| absolute(&path))
+        .ok_or_else(|| format!("cannot run `{program}`: not found in PATH; name its path"))
 }
 
 fn executable(path: &Path) -> Result<(), String> {
     let metadata = std::fs::metadata(path).map_err(|error| error.to_string())?;
     if !metadata.is_file() {
-        return Err("it is no file".to_owned());
+        return Err("it is not a file".to_owned());
     }
     access(path, Access::EXEC_OK).map_err(|error| format!("it is not executable ({error})"))
 }

@@ -40,7 +40,7 @@ pub fn wait(home: &Home, name: &str, command: &str, limit: Duration) -> Result<R
         let bundle = readiness(broker, name)?;
         let ours = bundle.filter(|it| it.command.as_deref() == Some(command));
         let Some(bundle) = ours else {
-            let why = "somebody has changed its manifest meanwhile".to_owned();
+            let why = "another process has changed its manifest in the meantime".to_owned();
             return Err((Exit::Undetermined, why));
         };
         match (bundle.readiness, bundle.runs) {
@@ -51,9 +51,9 @@ pub fn wait(home: &Home, name: &str, command: &str, limit: Duration) -> Result<R
             (Readiness::Coming { joined }, _) if begin.elapsed() >= limit => {
                 let seconds = limit.as_secs_f64();
                 let what = if joined {
-                    "it has said hello, but not what it checks"
+                    "it connected, but did not report what it checks"
                 } else {
-                    "it has not said hello"
+                    "it did not connect"
                 };
                 return Err((Exit::Undetermined, format!("{what} within {seconds} s")));
             }
@@ -66,12 +66,12 @@ pub fn wait(home: &Home, name: &str, command: &str, limit: Duration) -> Result<R
 fn failing(name: &str, why: &str, said: &[String]) -> String {
     let why = shown::line(why);
     if said.is_empty() {
-        return format!("{why}; what it said itself is in the broker's log");
+        return format!("{why}; its output is in the broker's log");
     }
     let lines = said.iter().map(|it| format!("\n  {}", shown::line(it)));
     let lines: String = lines.collect();
     talk::say_lines(&format!(
-        "`{name}` said last (all of it is in the broker's log):{lines}"
+        "last output of `{name}` (the full output is in the broker's log):{lines}"
     ));
     why.into_owned()
 }
@@ -85,14 +85,14 @@ pub fn ready(name: &str, runs: &Runs, was: &str, notices: &[String]) -> String {
         kinds.join(", ")
     );
     if runs.shadow {
-        text.push_str("; a shadow: without weight in any verdict (`qcbus bundle trials ");
+        text.push_str("; it is a shadow and does not affect verdicts (`qcbus bundle trials ");
         text.push_str(name);
         text.push_str("` shows what it would change)");
     }
     if runs.demanded == 0 {
         text.push_str(
-            "; but none of them is asked: the configuration in force does not name it, or they are not on \
-             by default",
+            "; but none of its checkers runs: the configuration in force does not name the bundle, or they are \
+             off by default",
         );
     }
     let text = shown::line(&text).to_string();

@@ -88,7 +88,9 @@ pub fn wait(args: &WaitArgs) -> Exit {
         Ok(Response::Unreported { verdict, reporters }) => {
             tell(args, &verdict);
             let (file, why) = (to_text(&args.file), reporters.join("; "));
-            talk::fail(&format!("not all reports on {file} in time: {why}"));
+            talk::fail(&format!(
+                "not all reports on {file} were finished in time: {why}"
+            ));
             Exit::Undetermined
         }
         Ok(Response::Unanswered { reason }) => {
@@ -127,7 +129,7 @@ fn why_no_verdict(args: &WaitArgs) -> String {
     }
     match args.file.exists() {
         true => String::new(),
-        false => ": there is no such file".to_owned(),
+        false => ": the file does not exist".to_owned(),
     }
 }
 
@@ -165,7 +167,7 @@ fn count(number: u64, of: &str) -> String {
 fn unexpected(response: &Response) -> Exit {
     match response {
         Response::Failed { reason } => talk::fail(reason),
-        other => talk::fail(&format!("the broker answered something else: {other:?}")),
+        other => talk::fail(&format!("unexpected answer from the broker: {other:?}")),
     }
     match response {
         Response::Failed { .. } => Exit::Usage,

@@ -93,9 +93,7 @@ fn show_offered(id: &str, offered: &Offered, format: Format) -> Exit {
         }
         ref several => {
             let count = several.len();
-            talk::fail(&format!(
-                "`{id}` is not one rule; there are {count} that it may mean:"
-            ));
+            talk::fail(&format!("`{id}` is ambiguous; {count} rules match:"));
             let rows = several
                 .iter()
                 .map(|rule| format!("  {}", offered::line(*rule)));
@@ -110,7 +108,7 @@ fn list_candidates(id: &str, checkers: &[(&Bundle, Checker)]) {
     let names = checkers.iter().map(|(_, it)| it.id.chars().count());
     let width = names.max().unwrap_or(0);
     talk::fail(&format!(
-        "`{id}` is not one rule; there are {} that it may mean:",
+        "`{id}` is ambiguous; {} rules match:",
         checkers.len()
     ));
     let rows = checkers.iter().map(|(_, checker)| {
@@ -141,7 +139,7 @@ fn unknown(id: &str, offered: &Offered) -> Exit {
     let hint = standard::hint(id);
     let why = offered.why_not.as_deref();
     let why = why.map(|it| format!(" ({it})")).unwrap_or_default();
-    talk::fail(&format!("there is no rule `{id}`; {hint}{why}"));
+    talk::fail(&format!("rule `{id}` not found; {hint}{why}"));
     Exit::Usage
 }
 

@@ -13,12 +13,12 @@ use crate::talk;
 pub fn compile(path: &Path, output: &Path) -> Exit {
     let files = match schema_files(path) {
         Ok(files) if files.is_empty() => {
-            talk::fail(&format!("there is no .xsd file in {}", to_text(path)));
+            talk::fail(&format!("no .xsd file found in {}", to_text(path)));
             return Exit::Usage;
         }
         Ok(files) => files,
         Err(error) => {
-            talk::fail(&format!("cannot look into {}: {error}", to_text(path)));
+            talk::fail(&format!("cannot read {}: {error}", to_text(path)));
             return Exit::Usage;
         }
     };
@@ -97,7 +97,7 @@ fn write(output: &Path, text: &str, files: usize) -> Exit {
                 files => format!("{files} files"),
             };
             talk::say(&format!(
-                "{files} compiled to {output}, to be used by --schema-dir {output}",
+                "{files} compiled to {output}; use it with --schema-dir {output}",
                 output = to_text(output)
             ));
             Exit::Accepted

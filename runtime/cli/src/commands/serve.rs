@@ -86,7 +86,8 @@ fn explain(error: &StartError) -> String {
     match error {
         StartError::Bus(BusError::AlreadyRunning { .. }) => {
             format!(
-                "{error}; use `qcbus status` to look at it, `qcbus down` to stop it, or --instance NAME for one more"
+                "{error}; use `qcbus status` to inspect it, `qcbus down` to stop it, or --instance NAME to start \
+                 another one"
             )
         }
         _ => error.to_string(),
@@ -121,7 +122,7 @@ fn tell(told: Told) {
         ),
         Told::Verdict(_) => {}
         Told::Notice(notice) => tracing::warn!("{notice}"),
-        Told::Scanned { files } => tracing::info!("{} files are there", files.len()),
+        Told::Scanned { files } => tracing::info!("{} files found", files.len()),
     }
 }
 
@@ -131,15 +132,15 @@ fn keep_apart(gate: &Path, roots: &[PathBuf]) -> Result<(), String> {
     let shown = gate.display();
     if let Some(root) = roots.iter().find(|root| gate.starts_with(root)) {
         return Err(format!(
-            "the gate {shown} lies inside the watched directory {}: what is published there would \
-             be checked and published again; choose a directory outside",
+            "the gate {shown} is inside the watched directory {}: published files would be checked and published \
+             again; choose a directory outside it",
             root.display()
         ));
     }
     if let Some(root) = roots.iter().find(|root| root.starts_with(gate)) {
         return Err(format!(
-            "the watched directory {} lies inside the gate {shown}: what is published there might \
-             replace what is to be checked; choose a directory of its own",
+            "the watched directory {} is inside the gate {shown}: published files might replace files that must \
+             be checked; choose a separate directory for the gate",
             root.display()
         ));
     }
@@ -153,8 +154,8 @@ fn of_its_own(gate: &Path, other: &Path, what: &str) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "the gate {} and the {what} {} lie in each other: whatever was not published is removed \
-         from a gate; choose a directory of its own for it",
+        "the gate {} and the {what} {} overlap: files that were not published are removed from a gate; choose a \
+         separate directory for the gate",
         gate.display(),
         other.display()
     ))
@@ -167,7 +168,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
             .map_err(|error| format!("cannot watch {}: {error}", directory.display()))?;
         if !real.is_dir() {
             return Err(format!(
-                "cannot watch {}: it is no directory; use `qcbus check` for files",
+                "cannot watch {}: it is not a directory; use `qcbus check` for files",
                 directory.display()
             ));
         }
@@ -188,7 +189,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         None => state.join("bundles.d"),
     };
     if let Some(gate) = &gate {
-        of_its_own(gate, &real(&out), "directory of results")?;
+        of_its_own(gate, &real(&out), "results directory")?;
         of_its_own(gate, &real(&state), "state directory")?;
     }
     let program = program();

@@ -16,7 +16,7 @@ pub fn run(args: &StatusArgs) -> Exit {
     let status = match ask(&args.instance, &Request::Status) {
         Ok(Response::Status(status)) => status,
         Ok(other) => {
-            talk::fail(&format!("the broker answered something else: {other:?}"));
+            talk::fail(&format!("unexpected answer from the broker: {other:?}"));
             return Exit::Internal;
         }
         // The broker runs but does not answer. The error has already been printed.
@@ -101,13 +101,13 @@ pub fn render(status: &Status) -> String {
         line("note", unseen.to_string());
     }
     if let Some(more) = status.unseen.len().checked_sub(5).filter(|it| *it > 0) {
-        line("note", format!("and {more} more that cannot be looked at"));
+        line("note", format!("and {more} more that cannot be read"));
     }
     for unfinished in status.unfinished.iter().take(5) {
         line("note", unfinished.to_string());
     }
     if let Some(more) = status.unfinished.len().checked_sub(5).filter(|it| *it > 0) {
-        line("note", format!("and {more} more that are being written to"));
+        line("note", format!("and {more} more that are being written"));
     }
     // Current unseen files are listed above; older notices about them are outdated.
     let notices = status.notices.iter().filter(|it| it.kind != "unseen");
@@ -134,10 +134,14 @@ fn queue_line(queue: &qcbus_messages::control::QueueStatus) -> String {
         let _ = write!(line, ", {} to be checked again", queue.background);
     }
     if queue.waiting > 0 {
-        let _ = write!(line, "; the oldest for {}", span(queue.oldest_waiting_s));
+        let _ = write!(
+            line,
+            "; the oldest has waited {}",
+            span(queue.oldest_waiting_s)
+        );
     }
     if let Some(left) = queue.estimated_s.filter(|left| *left > 0.0) {
-        let _ = write!(line, "; {:.0} per second, {} to go", queue.rate, span(left));
+        let _ = write!(line, "; {:.0} per second, {} left", queue.rate, span(left));
     }
     line
 }
@@ -161,12 +165,12 @@ fn peer_line(peer: &PeerStatus) -> String {
         let _ = write!(line, ", {}", super::trials::counted(trials));
     }
     if peer.restarts > 0 {
-        let _ = write!(line, ", started again {} times", peer.restarts);
+        let _ = write!(line, ", restarted {} times", peer.restarts);
     }
     if let Some(sandbox) = &peer.sandbox {
         let _ = match sandbox.state.as_str() {
             "confined" => write!(line, ", confined"),
-            "partly" => write!(line, ", not wholly confined: {}", sandbox.why),
+            "partly" => write!(line, ", only partly confined: {}", sandbox.why),
             _ => write!(line, ", not confined: {}", sandbox.why),
         };
     }
@@ -227,10 +231,10 @@ mod tests {
                 threads: 4,
                 done: 99,
                 restarts: 1,
-                note: "slow: 16 jobs wait for it and for nobody else".into(),
+                note: "slow: 16 jobs wait only for this bundle".into(),
                 sandbox: Some(SandboxStatus {
                     state: "partly".into(),
-                    why: "this kernel has no Landlock".into(),
+                    why: "this kernel does not support Landlock".into(),
                 }),
                 ..PeerStatus::default()
             }],
@@ -243,7 +247,7 @@ mod tests {
             }],
             unseen: vec![Unseen {
                 path: "/farm/closed".into(),
-                why: "cannot look into this directory: Permission denied".into(),
+                why: "cannot read the directory this directory: Permission denied".into(),
             }],
             ..Status::default()
         };

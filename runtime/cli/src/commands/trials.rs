@@ -17,7 +17,7 @@ pub fn run(args: &BundleTrialsArgs) -> Exit {
     let (counts, trials) = match ask(&args.instance, &Request::Trials { name }) {
         Ok(Response::Trials { counts, trials }) => (counts, trials),
         Ok(other) => {
-            talk::fail(&format!("the broker answered something else: {other:?}"));
+            talk::fail(&format!("unexpected answer from the broker: {other:?}"));
             return Exit::Internal;
         }
         Err(exit) => return exit,
@@ -25,8 +25,8 @@ pub fn run(args: &BundleTrialsArgs) -> Exit {
     let Some(counts) = counts else {
         let name = &args.name;
         talk::fail(&format!(
-            "`{name}` is no shadow here; `qcbus bundle add --shadow {name} PROGRAM` makes one, and `qcbus \
-             status` shows which there are"
+            "`{name}` is not a shadow here; `qcbus bundle add --shadow {name} PROGRAM` adds one, and `qcbus \
+             status` lists them"
         ));
         return Exit::Usage;
     };
@@ -57,7 +57,7 @@ pub fn counted(counts: &TrialCounts) -> String {
         (counts.would_reject, "would be rejected"),
         (counts.would_leave_open, "would be undetermined"),
         (counts.would_accept, "would be accepted"),
-        (counts.failed, "about which it failed"),
+        (counts.failed, "on which it failed"),
     ];
     for (number, what) in parts.into_iter().filter(|(number, _)| *number > 0) {
         // Writing to a string cannot fail.
@@ -84,8 +84,8 @@ fn render(name: &str, counts: &TrialCounts, trials: &[Trial]) -> String {
     }
     let nothing = counts.would_reject + counts.would_leave_open + counts.would_accept == 0;
     let nothing = match (nothing, counts.tried) {
-        (true, 0) => "; what it would change is not known yet",
-        (true, _) => "; it would change none of their verdicts",
+        (true, 0) => "; its effect is not known yet",
+        (true, _) => "; it would change no verdict",
         (false, _) => "",
     };
     let summary = format!("{name}: {}{nothing}", counted(counts));
@@ -100,7 +100,7 @@ fn line(trial: &Trial) -> String {
         return format!("{file}: {verdict}; it failed: {why}");
     }
     let would = match trial.would == verdict {
-        true => format!("{verdict}, and would be"),
+        true => format!("{verdict}, and would stay so"),
         false => format!("{verdict}, would be {}", trial.would),
     };
     let levels = [

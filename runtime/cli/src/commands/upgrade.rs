@@ -70,8 +70,8 @@ fn before(home: &Home, name: &str) -> Result<BundleReadiness, Refusal> {
     let readiness = readiness.filter(|it| it.command.is_some()).map(|it| *it);
     readiness.ok_or_else(|| {
         usage(format!(
-            "no manifest brings `{name}`: what comes with qcbus is upgraded with it, what was started by hand is \
-             started by hand, and `qcbus bundle add` brings what is new"
+            "no manifest contains `{name}`: bundles of qcbus are upgraded with qcbus, bundles that were started \
+             by hand must be restarted by hand, and `qcbus bundle add` adds new ones"
         ))
     })
 }
@@ -87,7 +87,7 @@ fn change(
     let shown = to_text(path);
     let bytes = std::fs::read(path).map_err(|error| {
         usage(format!(
-            "cannot read {shown}: {error}; change the command of `{name}` where its manifest lies"
+            "cannot read {shown}: {error}; change the command in the manifest that contains `{name}`"
         ))
     })?;
     let parsed = serde_json::from_slice(&bytes);
@@ -97,7 +97,7 @@ fn change(
     let mut modules = modules.into_iter().flatten();
     let module = modules.find(|it| it.get("name").is_some_and(|it| it == name));
     let Some(module) = module.and_then(|it| it.as_object_mut()) else {
-        return Err(usage(format!("{shown} does not bring `{name}`")));
+        return Err(usage(format!("{shown} does not contain `{name}`")));
     };
     module.insert("exec_command".to_owned(), command.into());
     match shadow {
@@ -117,15 +117,15 @@ fn done(home: &Home, name: &str, was: &BundleReadiness, runs: &Runs, notices: &[
         .and_then(|it| readiness::readiness(it, name).ok());
     let spec = now.flatten().map(|it| it.spec);
     if spec == Some(was.spec) && was.readiness == Readiness::Ready {
-        let nothing = "; nothing has changed: what runs is its program as it lies there (`touch` it when \
-                       something has that it loads)";
+        let nothing = "; nothing has changed: the running program is the current one (`touch` it if a file that \
+                       it loads has changed)";
         return readiness::ready(name, runs, nothing, notices);
     }
     let was = match &was.runs {
         Some(before) => {
             let judges = match (before.shadow, runs.shadow) {
-                (true, false) => "; it judges from now on",
-                (false, true) => "; it judges no more",
+                (true, false) => "; it affects verdicts from now on",
+                (false, true) => "; it no longer affects verdicts",
                 _ => "",
             };
             format!(
@@ -133,7 +133,7 @@ fn done(home: &Home, name: &str, was: &BundleReadiness, runs: &Runs, notices: &[
                 before.checkers, before.version, runs.version
             )
         }
-        None => " (nobody judged before)".to_owned(),
+        None => " (no process ran before)".to_owned(),
     };
     readiness::ready(name, runs, &was, notices)
 }
@@ -144,11 +144,13 @@ fn goes_on(home: &Home, name: &str) -> String {
     let readiness = broker.and_then(|it| readiness::readiness(it, name).ok());
     match readiness.flatten().and_then(|it| it.runs) {
         Some(runs) => format!(
-            "the process before goes on ({}, version {}, {})",
+            "the previous process continues ({}, version {}, {})",
             runs.pid,
             runs.version,
             readiness::counted(runs.checkers)
         ),
-        None => "nobody judges in its place, so what it would judge is undetermined".to_owned(),
+        None => {
+            "no process replaces it, so the files that it must check are undetermined".to_owned()
+        }
     }
 }

@@ -58,7 +58,7 @@ pub(super) fn may_read(data: &Metadata) -> io::Result<()> {
     match READER.get() {
         Some(reader) if !reader.may_read(data) => {
             let why = format!(
-                "it may not be read by the user with the number {}, to whom the file belongs that leads here",
+                "it may not be read by user {}, who owns the file that refers to it",
                 reader.user
             );
             Err(io::Error::new(io::ErrorKind::PermissionDenied, why))

@@ -161,18 +161,20 @@ impl IoWatchdog {
         }
         let lost = lock(&self.lost);
         if lost.contains_key(path) {
-            return Some("it has not answered for too long, and is still waited for".to_owned());
+            return Some(
+                "it has not responded for too long, and the access is still pending".to_owned(),
+            );
         }
         let beside = |it: &&PathBuf| it.parent() == path.parent();
         if lost.keys().filter(beside).count() >= PER_DIRECTORY {
-            return Some("files in its directory have not answered for too long".to_owned());
+            return Some("files in its directory have not responded for too long".to_owned());
         }
         let mounts = lost.values().filter_map(|it| it.mount.as_ref());
         if mounts.filter(|it| path.starts_with(it)).count() >= PER_MOUNT {
-            return Some("files on its file system have not answered for too long".to_owned());
+            return Some("files on its file system have not responded for too long".to_owned());
         }
         (self.losses.load(Ordering::Acquire) >= IN_TOTAL)
-            .then(|| format!("{IN_TOTAL} files have not answered for too long"))
+            .then(|| format!("{IN_TOTAL} files have not responded for too long"))
     }
 
     /// Records that the system has answered, even if late.
@@ -266,7 +268,7 @@ impl Access {
             return Ok(Access(None));
         };
         let given_up = lock(&attended.post.state).lost;
-        let given_up = given_up.then(|| "it has taken too long".to_owned());
+        let given_up = given_up.then(|| "it took too long".to_owned());
         if let Some(why) = given_up.or_else(|| attended.io_watchdog.refuses(path)) {
             let error = io::Error::new(io::ErrorKind::TimedOut, why);
             note(path, &error);

@@ -238,7 +238,7 @@ fn regular(file: &File) -> Result<Metadata, Refused> {
         let system = retry_on_intr(|| rustix::fs::fstatfs(file)).map_err(io::Error::from)?;
         // The type of this field differs between machines, but all the numbers fit.
         if u32::try_from(system.f_type).is_ok_and(|kind| MADE_UP.contains(&kind)) {
-            return Err(Refused::Special("a file that the kernel makes up"));
+            return Err(Refused::Special("a virtual file of the kernel"));
         }
     }
     Ok(data)

@@ -30,9 +30,7 @@ pub(super) fn replace<'d>(
             what: What::Actor,
             at: Spot::Node(referring),
             target: Some(Spot::Node(library)),
-            text: format!(
-                "the group `{name}`{what} names no actor (`Actors/EntityRef`), so {then}"
-            ),
+            text: format!("the group `{name}`{what} has no actor (`Actors/EntityRef`), so {then}"),
         });
     };
     match (entity(referring), entity(copy.group)) {
@@ -42,12 +40,12 @@ pub(super) fn replace<'d>(
         (None, _) => lacks(
             referring,
             "",
-            "it is open for whom the maneuvers are that it refers to",
+            "the actor of the maneuvers that it refers to is undefined",
         ),
         (_, None) => lacks(
             library,
             ", which is referred to,",
-            "there is none in whose place the actor of the referring group could be put",
+            "there is none that the actor of the referring group could replace",
         ),
     }
 }

@@ -41,7 +41,7 @@ pub(super) fn say<'d>(reference: Node<'d>, problems: &mut Problems<'d>) -> bool 
                 attributes.contains(&name) || name == OFFERS || name.starts_with("xmlns");
             if !is_known {
                 let text = format!(
-                    "`{}` has no attribute `{name}`, and nobody reads it{}",
+                    "`{}` must not have the attribute `{name}`; it is ignored{}",
                     element.name(),
                     did_you_mean(name, attributes.iter().copied())
                 );
@@ -54,7 +54,7 @@ pub(super) fn say<'d>(reference: Node<'d>, problems: &mut Problems<'d>) -> bool 
             }
         }
         if !element.text().trim().is_empty() {
-            let text = format!("`{}` has no text, and nobody reads it", element.name());
+            let text = format!("`{}` must not contain text; it is ignored", element.name());
             push(What::ForeignAttribute, Spot::Node(element), text, problems);
         }
     }
@@ -69,9 +69,9 @@ fn say_children<'d>(element: Node<'d>, children: &[&str], problems: &mut Problem
     {
         let (own, name) = (element.name(), child.name());
         let text = match children {
-            [] => format!("`{own}` has nothing in it, and nobody reads `{name}`"),
+            [] => format!("`{own}` must be empty; its element `{name}` is ignored"),
             _ => format!(
-                "`{own}` has no `{name}` in it, so what that was to say is lost{}",
+                "`{own}` must not contain `{name}`; its meaning is lost{}",
                 did_you_mean(name, children.iter().copied())
             ),
         };

@@ -43,11 +43,11 @@ pub(super) fn read<'d>(within: Node<'d>, problems: &mut Problems<'d>) -> Vec<Key
         if let Some(&before) = before {
             let text = match before.attr("value") == Some(value.value()) {
                 true => {
-                    format!("the key `{key}` is given twice with the same value; once is enough")
+                    format!("the key `{key}` is given twice with the same value; remove one")
                 }
                 false => format!(
-                    "the key `{key}` has been given before; the reference tool takes the later value, `{}`, instead of \
-                     `{}`: remove the one that is not meant",
+                    "the key `{key}` is given twice; the reference tool takes the later value, `{}`, instead of \
+                     `{}`: remove the wrong one",
                     value.value(),
                     before.attr("value").unwrap_or("")
                 ),
@@ -173,12 +173,12 @@ fn overlap<'d>(
         return;
     }
     let of_the_tool = match other.key.contains('.') {
-        true => "one or the other, by chance",
-        false => "the one without an element",
+        true => "one of the two at random",
+        false => "the key without an element",
     };
     let text = format!(
-        "the keys `{}` and `{}` both fit `{}` of `{}` and give it different values, `{}` and `{}`: here the one that \
-         names more elements wins, while the reference tool takes {of_the_tool}",
+        "the keys `{}` and `{}` both match `{}` of `{}` and give it different values, `{}` and `{}`: here the \
+         key that names more elements wins, but the reference tool takes {of_the_tool}",
         best.key,
         other.key,
         attribute.name(),
@@ -212,7 +212,7 @@ fn tie<'d>(one: &Key<'d>, other: &Key<'d>, attribute: Attribute<'d>, problems: &
         return;
     }
     let text = format!(
-        "`{}` of `{}` can have one value only, but the key `{}` says `{}` and `{}`",
+        "`{}` of `{}` can have only one value, but the key `{}` gives it `{}` and `{}`",
         attribute.name(),
         attribute.node().name(),
         one.key,
@@ -231,11 +231,12 @@ fn unmatched<'d>(key: &Key<'d>, group: Node<'d>) -> Problem<'d> {
     let name = group.attr("name").unwrap_or("");
     let text = match key.key.trim().is_empty() {
         true => format!(
-            "`key` is empty, so its value `{}` goes nowhere",
+            "`key` is empty, so its value `{}` is not used",
             key.value.value()
         ),
         false => format!(
-            "the key `{}` fits no attribute that the group `{name}` offers by `{OFFERS}`, so its value `{}` goes nowhere",
+            "the key `{}` matches no attribute that the group `{name}` offers by `{OFFERS}`, so its value `{}` \
+             is not used",
             key.key,
             key.value.value()
         ),

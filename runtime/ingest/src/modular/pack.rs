@@ -10,7 +10,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 #[derive(Debug, thiserror::Error)]
 pub enum PackError {
     /// Two files have the same name in the archive.
-    #[error("pack {0}: two of the files have this name in the archive")]
+    #[error("pack {0}: two of the files would have this name in the archive")]
     Twice(String),
     /// The archive could not be written.
     #[error("pack {name}: {why}")]

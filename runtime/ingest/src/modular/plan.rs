@@ -171,8 +171,8 @@ impl<'d> Expander<'d> {
                 continue;
             }
             let text = format!(
-                "`ScenarioReference` belongs in a `ManeuverGroup`, whose place the groups that it refers to take; \
-                 here it is in `{}`",
+                "`ScenarioReference` must be in a `ManeuverGroup`, which the groups that it refers to replace; \
+                 found in `{}`",
                 parent.map_or("", |parent| parent.name())
             );
             self.say(What::Placement, node.into(), None, text);
@@ -186,8 +186,9 @@ impl<'d> Expander<'d> {
         let mut copies = Vec::new();
         for &reference in &references {
             if reference != first {
-                let text = "a `ManeuverGroup` has one `ScenarioReference`, this is a further one: the reference tool passes \
-                            over it and gives its values to the first; put it into a group of its own"
+                let text = "a `ManeuverGroup` may have only one `ScenarioReference`, this is another one: the \
+                            reference tool skips it and gives its values to the first; put it into a separate \
+                            group"
                     .to_owned();
                 self.say(
                     What::SecondReference,
@@ -242,15 +243,15 @@ impl<'d> Expander<'d> {
             // An unknown element hides which form was intended.
             (Form::Direct, _) if is_open => {}
             (Form::Direct, _) => {
-                let text = "without a `ManeuverGroupReference` all groups of the file are taken; this form is documented, \
-                            but later versions of the reference tool delete the referring group without a word: name \
-                            the groups in `ManeuverGroupReference`"
+                let text = "without a `ManeuverGroupReference` all groups of the file are taken; this form is \
+                            documented, but later versions of the reference tool delete the referring group \
+                            without a message: name the groups in `ManeuverGroupReference`"
                     .to_owned();
                 self.say(What::DirectForm, node.into(), None, text);
             }
             (Form::Named, Some(direct)) => {
-                let text = "`ParameterReference` beside `ManeuverGroupReference` is for no group, and its value goes \
-                            nowhere; it belongs in one of the `ManeuverGroupReference` elements"
+                let text = "`ParameterReference` beside `ManeuverGroupReference` applies to no group, and its \
+                            value is not used; move it into one of the `ManeuverGroupReference` elements"
                     .to_owned();
                 self.say(What::MixedForm, direct.into(), Some(node.into()), text);
             }
@@ -274,7 +275,7 @@ impl<'d> Expander<'d> {
             return None;
         };
         if target >= self.out.pieces.len() {
-            let text = "the scenario that is referred to is not at hand".to_owned();
+            let text = "the scenario that is referred to is not available".to_owned();
             self.say(What::FileNotFound, at, None, text);
             return None;
         }
@@ -282,7 +283,7 @@ impl<'d> Expander<'d> {
             let chain = self.chain[from..].iter().chain([&target]);
             let names: Vec<String> = chain.map(|&piece| self.short_name(piece)).collect();
             let text = format!(
-                "the scenario refers to itself, so that it has no end: {}",
+                "the scenario refers to itself in an endless cycle: {}",
                 names.join(" → ")
             );
             self.say(What::Cycle, at, None, text);
@@ -301,7 +302,7 @@ impl<'d> Expander<'d> {
         }
         if let Some(catalog) = catalog_of(document) {
             let file = self.short_name(target);
-            let text = format!("`{file}` is a catalog; groups are taken from scenarios");
+            let text = format!("`{file}` is a catalog; groups can be taken only from scenarios");
             self.say(What::Unreadable, at, Some(catalog.into()), text);
             return None;
         }
@@ -312,7 +313,8 @@ impl<'d> Expander<'d> {
         let last = self.chain.last();
         let last = last.map_or_else(String::new, |&piece| self.short_name(piece));
         format!(
-            "scenarios refer to scenarios more than {MAX_DEPTH} deep; that of `{last}` is not followed any more"
+            "references between scenarios are more than {MAX_DEPTH} deep; the reference in `{last}` is not \
+             followed"
         )
     }
 
@@ -385,7 +387,8 @@ impl<'d> Expander<'d> {
     ) -> Option<Use<'d>> {
         let Some(wanted) = node.attribute("maneuverGroupName") else {
             let text =
-                "`ManeuverGroupReference` needs the attribute `maneuverGroupName`: which group is taken is open".to_owned();
+                "`ManeuverGroupReference` needs the attribute `maneuverGroupName`: the group to take is \
+                 undefined".to_owned();
             self.say(What::GroupUnknown, node.into(), None, text);
             return None;
         };
@@ -507,8 +510,9 @@ impl<'d> Expander<'d> {
             };
             if let Some(&before) = first.get(name) {
                 let text = format!(
-                    "the group `{name}` is referred to twice here, so that two groups get one name, and the reference \
-                     tool gives both the values of the last; refer to it from a `ManeuverGroup` of its own"
+                    "the group `{name}` is referred to twice here, so two groups get the same name, and the \
+                     reference tool gives both the values of the last; refer to it from a separate \
+                     `ManeuverGroup`"
                 );
                 let at = Spot::of(node, "maneuverGroupName");
                 self.say(What::GroupTwice, at, Some(before.into()), text);
@@ -534,8 +538,8 @@ impl<'d> Expander<'d> {
         });
         if let Some(inner) = groups.iter().find(inner).filter(|_| refers) {
             return format!(
-                "the maneuver group `{name}` of `{file}` refers to others itself; what takes its place is called \
-                 `{}`",
+                "the maneuver group `{name}` of `{file}` refers to other groups itself; the group that replaces \
+                 it is called `{}`",
                 inner.name()
             );
         }

@@ -14,44 +14,44 @@ pub(super) fn not_found(node: Node<'_>) -> (What, String) {
         return (What::FileNotFound, text);
     };
     if name.trim().is_empty() {
-        let text =
-            "`scenarioFileName` is empty; it names the file from which groups are taken".to_owned();
+        let text = "`scenarioFileName` is empty; it must name the file from which groups are taken"
+            .to_owned();
         return (What::FileNotFound, text);
     }
     if !name.ends_with(".xosc") && !name.ends_with(".mosc") {
         let text = format!(
-            "`{name}` is not looked for: the name of a scenario ends in `.xosc`, that of an archive in `.mosc`, in \
-             small letters"
+            "`{name}` is not searched for: the name of a scenario must end in `.xosc`, the name of an archive in \
+             `.mosc`, in lower case"
         );
         return (What::Extension, text);
     }
     if let Some((archive, member)) = split_archive(name) {
         let text = format!(
-            "`{name}` leads into an archive; refer to `{archive}`, or put `{member}` beside it"
+            "`{name}` points into an archive; refer to `{archive}`, or put `{member}` beside it"
         );
         return (What::Escapes, text);
     }
     let in_archive = split_archive(node.document().path()).is_some();
     if in_archive && has_only_backslashes(name) {
         let text = format!(
-            "`{name}` is not looked for: names in archives are parted by `/`; write `{}`",
+            "`{name}` is not searched for: names in archives use `/` as separator; write `{}`",
             name.replace('\\', "/")
         );
         return (What::Escapes, text);
     }
     if in_archive && !stays_inside(name) {
         let text = format!(
-            "`{name}` leads out of the archive; what an archive refers to lies in it or in a directory of the search \
-             path, by a relative name with `/` and without `..`"
+            "`{name}` points outside the archive; files that an archive refers to must be in it or in a \
+             directory of the search path; use a relative name with `/` and without `..`"
         );
         return (What::Escapes, text);
     }
     let around = match in_archive {
-        true => "in the archive nor in those around it",
+        true => "in the archive, in the archives around it",
         false => "beside the scenario",
     };
     let text = format!(
-        "`{name}` is neither {around} nor in a directory of the search path ({SEARCH_PATH_VARIABLE})"
+        "`{name}` not found {around} or in a directory of the search path ({SEARCH_PATH_VARIABLE})"
     );
     (What::FileNotFound, text)
 }
@@ -79,6 +79,10 @@ pub(super) fn trouble(document: Document<'_>) -> Option<String> {
     }
     let root = document.root()?;
     let found = root.name();
-    (found != "OpenSCENARIO")
-        .then(|| format!("{} is no scenario: its root is `{found}`", document.path()))
+    (found != "OpenSCENARIO").then(|| {
+        format!(
+            "{} is not a scenario: its root is `{found}`",
+            document.path()
+        )
+    })
 }

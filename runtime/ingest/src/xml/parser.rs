@@ -58,7 +58,7 @@ fn parse_by<S: Sink>(mut parser: Parser<'_, '_, S>) -> Result<Vec<TextFault>, Ha
         Ok(()) | Err(Stop::File | Stop::All) => Ok(parser.faults),
         Err(Stop::Sink(Halt::Build(BuildError::TooManyNames))) => {
             let text = format!(
-                "more than {} distinct names, an image holds no more",
+                "more than {} distinct names, the maximum of an image",
                 Capacities::MAX_NAMES
             );
             parser
@@ -300,7 +300,10 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         seen_root: bool,
     ) -> Result<(), Stop> {
         if seen_root {
-            let text = format!("a second root element <{}>; a file has one", shown(name));
+            let text = format!(
+                "a second root element <{}>; only one is allowed",
+                shown(name)
+            );
             self.fault(file, FaultCode::SecondRoot, from, &text)?;
             return Err(Stop::File);
         }
@@ -326,7 +329,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         let text = if name.is_empty() {
             "no element name follows <; a literal < is written &lt;".to_string()
         } else {
-            format!("{:?} is no name for an element", shown(name))
+            format!("{:?} is not a valid element name", shown(name))
         };
         self.fault(file, FaultCode::BadName, from, &text)
     }
@@ -467,8 +470,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
             return Ok(());
         };
         let text = format!(
-            "the prefix of {} belongs to no namespace, so that readers that know namespaces refuse the file; \
-             xmlns:{} is missing",
+            "the prefix of {} has no namespace, so namespace-aware parsers refuse the file; xmlns:{} is missing",
             shown(name),
             shown(prefix)
         );
@@ -507,7 +509,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
     fn mismatch(&mut self, file: File<'t>, from: usize, to: usize, name: &str) -> Result<(), Stop> {
         let text = match self.stack[file.floor..].last() {
             Some(open) => format!(
-                "</{}> where </{}> is due, for the element opened in row {}",
+                "found </{}>, expected </{}> for the element opened in row {}",
                 shown(name),
                 shown(open.name),
                 row(file.text, open.at)
@@ -541,7 +543,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
             return Ok(());
         };
         let text = format!(
-            "the file ends while <{}>, opened in row {}, is open",
+            "the file ends before <{}>, opened in row {}, is closed",
             shown(open.name),
             row(file.text, open.at)
         );
@@ -605,7 +607,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         };
         if self.chain.contains(&target) {
             let text = format!(
-                "this include leads back to {}, which is being included",
+                "this include is circular: it leads back to {}, which is being included",
                 self.input.texts[target].path
             );
             return self.fault(file, FaultCode::IncludeCycle, key.1, &text);
@@ -663,7 +665,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
             self.faults.push(TextFault::new(code, at, text));
             return Ok(());
         }
-        let text = format!("more than {limit} faults, the rest of the file is not read");
+        let text = format!("more than {limit} faults; the rest of the file is not read");
         self.faults
             .push(TextFault::new(FaultCode::FaultLimit, at, text));
         Err(Stop::All)

@@ -165,7 +165,7 @@ impl<'t> AttributeScanner<'t> {
         let text = if shown.is_empty() {
             "an attribute's name is missing".to_string()
         } else {
-            format!("{shown:?} is no name for an attribute")
+            format!("{shown:?} is not a valid attribute name")
         };
         TagFault {
             code: FaultCode::BadName,
@@ -317,13 +317,13 @@ mod tests {
                 " 1a='1'",
                 FaultCode::BadName,
                 1,
-                "\"1a\" is no name for an attribute",
+                "\"1a\" is not a valid attribute name",
             ),
             (
                 " ×='1'",
                 FaultCode::BadName,
                 1,
-                "\"×\" is no name for an attribute",
+                "\"×\" is not a valid attribute name",
             ),
             (
                 " ='1'",
@@ -335,7 +335,7 @@ mod tests {
                 " /",
                 FaultCode::BadName,
                 1,
-                "\"/\" is no name for an attribute",
+                "\"/\" is not a valid attribute name",
             ),
         ];
         for (inside, code, offset, text) in cases {

@@ -33,8 +33,8 @@ pub(crate) fn resolve_reference(name: &str) -> Result<char, String> {
     let code = all_digits.then(|| u32::from_str_radix(digits, radix).unwrap_or(u32::MAX));
     match code.map(char::from_u32) {
         Some(Some(c)) if is_char(c) => Ok(c),
-        Some(_) => Err(format!("&{shown}; is no character that XML allows")),
-        None => Err(format!("&{shown}; is no character reference")),
+        Some(_) => Err(format!("&{shown}; is not a character that XML allows")),
+        None => Err(format!("&{shown}; is not a valid character reference")),
     }
 }
 

@@ -9,7 +9,7 @@
 
 #![expect(
     clippy::indexing_slicing,
-    reason = "a test may fail and tell what it tried"
+    reason = "a test may panic and report what it tried"
 )]
 
 mod judge;
@@ -79,7 +79,10 @@ impl Study<'_> {
         }));
         assert!(errors.is_empty(), "cannot be tried:\n{}", errors.join("\n"));
         if faults.done.is_empty() && harmless.done.is_empty() {
-            return tell(&format!("skipped: none of the {} is at hand\n", self.what));
+            return tell(&format!(
+                "skipped: none of the {} is available\n",
+                self.what
+            ));
         }
         if !wanted.is_empty() {
             return told(&faults, &harmless);

@@ -39,11 +39,13 @@ pub fn read(text: &str, key: &str) -> Result<Vec<Entry>, String> {
             continue;
         }
         let read = if line.starts_with(' ') {
-            let entry = all.last_mut().ok_or_else(|| "there is no entry".to_owned());
+            let entry = all
+                .last_mut()
+                .ok_or_else(|| "no entry precedes this line".to_owned());
             entry.and_then(|entry| entry.line(trimmed, key))
         } else if let Some((name, file)) = alias(trimmed) {
             let before = aliases.insert(name, file);
-            before.map_or(Ok(()), |_| Err(format!("@{name} is given twice")))
+            before.map_or(Ok(()), |_| Err(format!("@{name} is defined twice")))
         } else {
             Entry::head(trimmed, &aliases).map(|entry| all.push(entry))
         };
@@ -53,7 +55,9 @@ pub fn read(text: &str, key: &str) -> Result<Vec<Entry>, String> {
     for entry in &all {
         let id = &entry.id;
         if entry.edits.is_empty() || entry.why.is_empty() || !ids.insert(id) {
-            return Err(format!("{id}: no edit, no reason, or twice"));
+            return Err(format!(
+                "{id}: the entry has no edit or no reason, or its id is used twice"
+            ));
         }
     }
     Ok(all)
@@ -69,20 +73,21 @@ impl Entry {
         let (id, category, file, level) = match fields[..] {
             [id, category, file] => (id, category, file, None),
             [id, category, file, level] => {
-                let level = Level::from_word(level).ok_or_else(|| format!("no level: {level}"))?;
+                let level =
+                    Level::from_word(level).ok_or_else(|| format!("unknown level: {level}"))?;
                 (id, category, file, Some(level))
             }
-            _ => return Err(format!("no entry: {line}")),
+            _ => return Err(format!("not an entry: {line}")),
         };
         let file = match file.strip_prefix('@') {
             Some(alias) => aliases
                 .get(alias)
-                .ok_or_else(|| format!("no alias: {file}"))?,
+                .ok_or_else(|| format!("unknown alias: {file}"))?,
             None => file,
         };
         let (producer, path) = file
             .split_once(':')
-            .ok_or_else(|| format!("no file: {file}"))?;
+            .ok_or_else(|| format!("expected producer:path, found: {file}"))?;
         Ok(Entry {
             id: id.to_owned(),
             category: category.to_owned(),

@@ -74,7 +74,7 @@ impl Study<'_> {
         entry: &'e Entry,
         before: &[Said],
     ) -> Result<Trial<'e>, String> {
-        let source = self.directory(&entry.original).ok_or("not at hand")?;
+        let source = self.directory(&entry.original).ok_or("not available")?;
         let (changed, spots) = apply(&entry.edits, &entry.at, &source)?;
         let after = self.said(overlays, plan, &entry.original, &changed)?;
         Ok(judge(entry, spots, new_ones(before, after)))
@@ -89,7 +89,7 @@ impl Study<'_> {
     ) -> Result<Vec<Said>, String> {
         let producer = &original.producer;
         if !overlays.0.contains_key(producer) {
-            let source = self.directory(original).ok_or("not at hand")?;
+            let source = self.directory(original).ok_or("not available")?;
             let overlay = Overlay::of(&source).map_err(|error| error.to_string())?;
             overlays.0.insert(producer.clone(), overlay);
         }

@@ -396,7 +396,7 @@ fn wanted(row: &Row) -> String {
         (Beyond(low), Open) => format!("be greater than {}", number(low)),
         (Open, At(high)) => format!("be at most {}", number(high)),
         (Open, Beyond(high)) => format!("be less than {}", number(high)),
-        (At(low), At(high)) => format!("lie between {} and {}", named(low, ""), number(high)),
+        (At(low), At(high)) => format!("be between {} and {}", named(low, ""), number(high)),
         (At(low), Beyond(high)) => {
             format!(
                 "be at least {} and less than {}",
@@ -409,7 +409,7 @@ fn wanted(row: &Row) -> String {
         }
         (Beyond(low), At(high) | Beyond(high)) => {
             format!(
-                "lie between {} and {}, both excluded",
+                "be greater than {} and less than {}",
                 named(low, ""),
                 number(high)
             )
@@ -487,7 +487,7 @@ mod tests {
         let half = between(-PI, PI, "A", "a", "rad", "");
         assert_eq!(
             super::wanted(&half),
-            "lie between -π (-3.1416) and π (3.1416) rad"
+            "be between -π (-3.1416) and π (3.1416) rad"
         );
         assert_eq!(super::other_unit(&half, 90.0), "90° are 1.5708 rad");
         assert_eq!(super::other_unit(&half, 900.0), "");

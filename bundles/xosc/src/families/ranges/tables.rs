@@ -28,12 +28,12 @@ macro_rules! table {
     };
 }
 
-const BEHIND: &str = "zero is where the rear axle is";
-const A_RATE: &str = "a rate is a magnitude, the target says which way it goes";
-const A_TURN: &str = "a turn away it is the same direction";
-const ANY_ANGLE: &str = "it takes any angle";
-const NO_SIDE: &str = "version 1.0 has no `displacement` to say the side";
-const ZERO: &str = "zero leaves it without effect";
+const BEHIND: &str = "zero is the position of the rear axle";
+const A_RATE: &str = "a rate is a magnitude; the target defines the direction";
+const A_TURN: &str = "a full turn does not change the direction";
+const ANY_ANGLE: &str = "such a tolerance accepts any angle";
+const NO_SIDE: &str = "version 1.0 has no `displacement` that defines the side";
+const ZERO: &str = "with zero it has no effect";
 
 table! {
     ACTIONS:

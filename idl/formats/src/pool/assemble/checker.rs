@@ -19,11 +19,11 @@ const UNREADABLE: &str = "qcbus.unreadableRuleUID";
 /// Sets the ending of a checker. A missing or contradictory ending counts as a failure.
 pub(super) fn settle(outcome: &mut CheckerOutcome) {
     let wrong = match &outcome.ending {
-        None => "the bundle never said how it ended",
+        None => "the bundle did not report how the checker ended",
         Some(Ending::NotApplicable { .. } | Ending::Blocked { .. })
             if !outcome.issues.is_empty() =>
         {
-            "the bundle said that it was skipped, and yet reported issues"
+            "the bundle reported that the checker was skipped, but also reported issues"
         }
         Some(_) => return,
     };
@@ -94,7 +94,7 @@ fn rules(outcome: &mut CheckerOutcome) -> Arc<[Text]> {
         if !is_rule_uid(&issue.rule_uid) {
             let given = std::mem::replace(&mut issue.rule_uid, UNNAMED.to_owned());
             if !given.is_empty() {
-                issue.description = format!("{} (rule as given: `{given}`)", issue.description);
+                issue.description = format!("{} (reported rule: `{given}`)", issue.description);
             }
         }
         if !rules.iter().any(|uid| **uid == *issue.rule_uid) {
@@ -119,7 +119,7 @@ fn blocked(ending: &Ending) -> Option<Metadata> {
     Some(Metadata {
         key: BLOCKED.to_owned(),
         value,
-        description: String::from("What kept the checker from looking: it owes an answer."),
+        description: String::from("The cause that blocked the checker; its answer is missing."),
     })
 }
 
@@ -127,7 +127,7 @@ fn unreadable(uid: &Text) -> Metadata {
     Metadata {
         key: UNREADABLE.to_owned(),
         value: String::from(&**uid),
-        description: String::from("The bundle gave this rule UID, which is no rule UID."),
+        description: String::from("The bundle reported this rule UID, which is invalid."),
     }
 }
 

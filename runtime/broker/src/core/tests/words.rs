@@ -285,7 +285,7 @@ fn a_file_without_room_is_undetermined_when_nothing_moves_for_long() {
         }
     }
     assert!(world.now >= begun + limit);
-    let why = "full; nothing became free for 60 seconds";
+    let why = "full; no room became free for 60 seconds";
     assert_eq!(world.storing[0].unreadable.as_deref(), Some(why));
     // A file that has waited as long does not wait as long again.
     let (job, _) = world.preparing.pop().unwrap();

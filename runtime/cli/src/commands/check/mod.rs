@@ -217,7 +217,7 @@ fn choice(args: &CheckArgs) -> Result<Choice, Refusal> {
     for name in choice.select.iter().chain(&choice.ignore) {
         if !standard::is_named(name) {
             let hint = standard::hint(name);
-            return Err(usage(format!("no checker is called `{name}`; {hint}")));
+            return Err(usage(format!("checker `{name}` not found; {hint}")));
         }
     }
     Ok(choice)
@@ -225,7 +225,8 @@ fn choice(args: &CheckArgs) -> Result<Choice, Refusal> {
 
 /// Returns the current directory of the command.
 fn here() -> Result<PathBuf, Refusal> {
-    std::env::current_dir().map_err(|error| usage(format!("cannot see where this is: {error}")))
+    std::env::current_dir()
+        .map_err(|error| usage(format!("cannot determine the current directory: {error}")))
 }
 
 /// Rejects an output directory that is not writable, before any check starts.
@@ -270,7 +271,7 @@ fn private_instance() -> Result<Instance, Refusal> {
 fn random_bytes() -> Result<[u8; 8], String> {
     let mut bytes = [0; 8];
     rustix::rand::getrandom(&mut bytes, rustix::rand::GetRandomFlags::empty())
-        .map_err(|error| format!("no random number: {error}"))?;
+        .map_err(|error| format!("cannot get a random number: {error}"))?;
     Ok(bytes)
 }
 
@@ -391,10 +392,10 @@ async fn start(
         }
         if moved.elapsed() >= limit {
             let waited = limit.as_secs();
-            let why = format!("{error} (waited until nothing had moved for {waited} seconds)");
+            let why = format!("{error} (waited until nothing had changed for {waited} seconds)");
             return Err((Exit::Internal, why));
         }
-        let waits = "waiting for shared memory, which others use at the moment";
+        let waits = "waiting for shared memory, which is in use by other processes";
         let _ = news.send(News::Waits(waits));
         tokio::select! {
             _ = stops.recv() => return Ok(None),

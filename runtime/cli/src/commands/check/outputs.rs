@@ -89,7 +89,7 @@ impl Outputs {
         match self.reporters.iter().find(|it| it.to == to) {
             None => Ok(()),
             Some(other) => Err(usage(format!(
-                "{} is the file of the {} report already: name another one",
+                "{} is already the file of the {} report: name another one",
                 to_text(file),
                 other.alias
             ))),
@@ -189,7 +189,7 @@ pub(in crate::commands) fn report_place(file: &Path) -> Result<(), Refusal> {
     let is_result = file.extension().is_some_and(|it| it == "xqar");
     if is_result || FileKind::of_path(file).is_some() {
         return Err(usage(format!(
-            "a report would be written over {shown}, which is a file to check or a result; name another one"
+            "the report would overwrite {shown}, which is a file to check or a result; name another one"
         )));
     }
     if shown.is_empty() || shown.ends_with('/') || file.is_dir() {
@@ -201,7 +201,7 @@ pub(in crate::commands) fn report_place(file: &Path) -> Result<(), Refusal> {
     let data = std::fs::metadata(file);
     if !is_device && data.is_ok_and(|data| !data.is_file()) {
         return Err(usage(format!(
-            "cannot write a report to {shown}: it is no regular file"
+            "cannot write a report to {shown}: it is not a regular file"
         )));
     }
     let cleared = qcbus_reporter_sdk::clear_place(file);

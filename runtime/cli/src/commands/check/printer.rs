@@ -264,12 +264,12 @@ impl Printer {
     /// Reports the files that were not checked.
     fn say_unjudged(&self, missing: &[Arc<Path>]) {
         let why = match self.interrupted {
-            true => "ended by a signal",
-            false => "not there any more",
+            true => "stopped by a signal",
+            false => "removed in the meantime",
         };
         if self.interrupted && !self.scanned {
             talk::fail(&format!(
-                "{why} before it was known what is to be checked: nothing was looked at"
+                "{why} before the files to check were known: nothing was checked"
             ));
         }
         if missing.is_empty() {
@@ -325,7 +325,7 @@ impl Printer {
         if !names.is_empty() {
             let names = names.join(", ");
             talk::fail(&format!(
-                "not written, as not everything was checked: {names}"
+                "not written, because not everything was checked: {names}"
             ));
         }
         true
@@ -337,11 +337,11 @@ impl Printer {
             return Exit::Undetermined;
         }
         if self.unseen > 0 {
-            talk::fail("nothing was checked: what there may be could not be looked at");
+            talk::fail("nothing was checked: paths that may contain files could not be accessed");
             return Exit::Undetermined;
         }
         talk::fail(&format!(
-            "nothing to check: there is no file that qcbus checks ({})",
+            "nothing to check: no file found that qcbus checks ({})",
             Suffix::list()
         ));
         Exit::Usage
@@ -382,12 +382,12 @@ impl Printer {
     fn last_line(&self) -> String {
         let mut line = self.tally.line();
         if self.unseen > 0 {
-            line.push_str(&format!(", {} not looked at", self.unseen));
+            line.push_str(&format!(", {} not scanned", self.unseen));
         }
         let failing = self.failing();
         if failing > 0 {
             line.push_str(&format!(
-                ", {failing} accepted but with findings that --fail-level names"
+                ", {failing} accepted but with findings of the level of --fail-level or worse"
             ));
         }
         let out = relative(&self.places.out);

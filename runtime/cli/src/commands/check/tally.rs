@@ -154,13 +154,13 @@ impl Tally {
                 files => format!("{files} files"),
             };
             said.push(format!(
-                "{checks} checks of {files} could not run because of errors above; mend those and check again"
+                "{checks} checks of {files} could not run because of errors above; fix them and check again"
             ));
         }
         if !self.left_out.is_empty() {
             let left_out: Vec<String> = self.left_out.values().map(ToString::to_string).collect();
             said.push(format!(
-                "not asked, so the verdicts say nothing about it: {}",
+                "not requested, so the verdicts do not cover it: {}",
                 shown::line(&left_out.join(", "))
             ));
         }

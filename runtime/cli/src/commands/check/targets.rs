@@ -35,7 +35,7 @@ pub(super) fn targets(
         };
         let Some(input) = config.input_file() else {
             return Err(usage(
-                "the configuration names no InputFile; add one, or name a file after -c CONFIG",
+                "the configuration has no InputFile; add one, or name a file after -c CONFIG",
             ));
         };
         paths.push(input_path(&from_text(input), config_path));
@@ -51,7 +51,7 @@ pub(super) fn targets(
         } else if !real.is_file() {
             let shown = to_text(path);
             return Err(usage(format!(
-                "cannot check {shown}: it is no regular file"
+                "cannot check {shown}: it is not a regular file"
             )));
         } else if FileKind::of_path(&file).is_some() {
             files.insert(file);
@@ -60,7 +60,7 @@ pub(super) fn targets(
         } else {
             let shown = to_text(path);
             return Err(usage(format!(
-                "{shown} is no file that qcbus checks ({})",
+                "{shown} is not a file type that qcbus checks ({})",
                 Suffix::list()
             )));
         }

@@ -43,9 +43,7 @@ pub(super) fn check(
         Ok((given, told)) => Ok(print(args, prepared, given, told)),
         Err(Elsewhere::Here(why)) => {
             if args.print.verbose && !why.is_empty() {
-                talk::say(&format!(
-                    "note: checked without the broker that runs: {why}"
-                ));
+                talk::say(&format!("note: checked without the running broker: {why}"));
             }
             Err(Box::new(prepared))
         }
@@ -98,7 +96,7 @@ fn ask(
     let mut line = Line::to(directory.dir()).ok_or_else(|| here(""))?;
     let like_us = line.process().filter(|_| line.is_like_us());
     let by = like_us.ok_or_else(|| {
-        here("it is another program, has other rights or does not see the same files")
+        here("it is a different program, has different permissions or does not see the same files")
     })?;
     let in_force = InForce::new(None, SearchPath::of_environment());
     let config = in_force.map_err(|error| here(&error.to_string()))?.digest;
@@ -207,7 +205,7 @@ fn ask_for(line: &mut Line, (file, check_context): &Question) -> Result<Checked,
     match line.ask(&request) {
         Ok(Response::Checked(checked)) => Ok(*checked),
         Ok(Response::Elsewhere { reason } | Response::Failed { reason }) => Err(reason),
-        Ok(_) => Err("it answers something else".to_owned()),
+        Ok(_) => Err("it sent an unexpected answer".to_owned()),
         Err(error) => Err(error.to_string()),
     }
 }
@@ -217,9 +215,9 @@ fn ask_for_all(directory: &Path, questions: &[Question]) -> Result<Vec<Checked>,
     let (next, over) = (AtomicUsize::new(0), AtomicBool::new(false));
     let answers: Mutex<Vec<Option<Checked>>> = Mutex::new(vec![None; questions.len()]);
     let some = || -> Result<(), String> {
-        let mut line = Line::to(directory).ok_or("it has gone")?;
+        let mut line = Line::to(directory).ok_or("it has ended")?;
         if !line.is_like_us() {
-            return Err("another one has come".to_owned());
+            return Err("another broker has replaced it".to_owned());
         }
         while !over.load(Ordering::Relaxed) {
             let at = next.fetch_add(1, Ordering::Relaxed);
@@ -239,13 +237,13 @@ fn ask_for_all(directory: &Path, questions: &[Question]) -> Result<Vec<Checked>,
         let threads: Vec<_> = (0..AT_ONCE.min(questions.len()))
             .map(|_| scope.spawn(one))
             .collect();
-        let panicked = |_| "a thread has panicked".to_owned();
+        let panicked = |_| "a thread panicked".to_owned();
         let ended = threads.into_iter().map(|it| it.join().map_err(panicked)?);
         ended.collect::<Result<(), String>>()
     })?;
     let answers = answers.into_inner().map_err(|error| error.to_string())?;
     let all: Option<Vec<Checked>> = answers.into_iter().collect();
-    all.ok_or_else(|| "it has not answered everything".to_owned())
+    all.ok_or_else(|| "it did not answer all requests".to_owned())
 }
 
 /// Prints the same output as a run in this process.
@@ -253,7 +251,7 @@ fn print(args: &CheckArgs, prepared: Prepared, given: Given, left: Vec<String>) 
     if args.print.verbose {
         let by = given.by;
         talk::say(&format!(
-            "note: checked by the broker that runs (process {by})"
+            "note: checked by the running broker (process {by})"
         ));
     }
     let mut printer = printer(args, prepared);

@@ -45,7 +45,7 @@ fn new(args: &BundleNewArgs) -> Result<String, Refusal> {
     let shown = to_text(&directory);
     // The directory must be new, so that no existing file is overwritten.
     std::fs::create_dir(&directory)
-        .map_err(|error| usage(format!("cannot make {shown}: {error}")))?;
+        .map_err(|error| usage(format!("cannot create {shown}: {error}")))?;
     for (path, text) in &layout.files {
         write_new(&directory.join(path), text).map_err(|error| {
             (
@@ -56,7 +56,7 @@ fn new(args: &BundleNewArgs) -> Result<String, Refusal> {
     }
     let name = &args.name;
     Ok(format!(
-        "{shown} is made; next:\n  cd {name}\n{}",
+        "{shown} is created; next:\n  cd {name}\n{}",
         layout.next
     ))
 }

@@ -35,14 +35,14 @@ pub(super) fn layout(name: &str, sdk: Option<&Path>) -> Result<Layout, Refusal> 
     let good = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
     if !begins || !name.chars().all(good) {
         return Err(usage(format!(
-            "`{name}` is no name for a crate: begin with a letter, and use A-Z a-z 0-9 _ -"
+            "`{name}` is not a valid crate name: begin with a letter, and use A-Z a-z 0-9 _ -"
         )));
     }
     let sdk = checkout(sdk)?;
     let Some(sdk_text) = sdk.to_str().filter(|it| !it.contains(['"', '\\'])) else {
         let shown = to_text(&sdk);
         return Err(usage(format!(
-            "{shown}: Cargo.toml cannot name such a path"
+            "{shown}: Cargo.toml cannot contain this path"
         )));
     };
     let ident = name.replace('-', "_").to_ascii_lowercase();
@@ -77,10 +77,10 @@ fn checkout(named: Option<&Path>) -> Result<PathBuf, Refusal> {
     }
     let shown = to_text(&path);
     Err(usage(match named {
-        Some(_) => format!("{shown} is no checkout of qcbus: there is no bundles/sdk in it"),
+        Some(_) => format!("{shown} is not a checkout of qcbus: it has no bundles/sdk"),
         None => format!(
-            "the crates of qcbus are not published, and the checkout that this program was built from is not at \
-             {shown} any more; name one with --sdk DIR"
+            "the crates of qcbus are not published, and the checkout that this program was built from is no \
+             longer at {shown}; name one with --sdk DIR"
         ),
     }))
 }

@@ -16,7 +16,7 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
             .find("--")
             .or_else(|| content.ends_with('-').then(|| content.len() - 1));
         let Some(at) = at else { return Ok(()) };
-        let text = "-- within a comment; XML allows it only as its end";
+        let text = "-- within a comment; XML allows it only at the end";
         self.fault(file, FaultCode::BadComment, from + HEAD + at, text)
     }
 
@@ -32,12 +32,12 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
             .next()
             .unwrap_or(content);
         if target.eq_ignore_ascii_case("xml") {
-            let text = format!("<?{target}?> is reserved; an XML declaration is spelt <?xml …?>");
+            let text = format!("<?{target}?> is reserved; write an XML declaration as <?xml …?>");
             return self.fault(file, FaultCode::BadDeclaration, from, &text);
         }
         if name_with_colon(target).is_none() {
             let text = format!(
-                "{:?} is no name for a processing instruction",
+                "{:?} is not a valid name for a processing instruction",
                 shown(target)
             );
             return self.fault(file, FaultCode::BadName, from, &text);
@@ -78,8 +78,8 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
         if std::mem::replace(&mut self.refused_doctype, true) {
             return Ok(());
         }
-        let text = "a DOCTYPE is refused: it can pull in files and grow without bound; \
-                    neither it nor its entities are read";
+        let text = "a DOCTYPE is refused: it can load files and expand without limit; it and its entities are \
+                    not read";
         self.fault(file, FaultCode::Doctype, from, text)
     }
 }
@@ -118,7 +118,10 @@ fn declaration_trouble(text: &str, from: usize, to: usize) -> Option<(usize, Str
             return Some((at, format!("no space before {name} in the XML declaration")));
         }
         let Some(place) = expected.iter().position(|&known| known == name) else {
-            let text = format!("{:?} has no place here in the XML declaration", shown(name));
+            let text = format!(
+                "{:?} is not allowed here in the XML declaration",
+                shown(name)
+            );
             return Some((at, text));
         };
         if place > 0 && expected[0] == "version" {
@@ -135,7 +138,10 @@ fn declaration_trouble(text: &str, from: usize, to: usize) -> Option<(usize, Str
             _ => value.starts_with(|c: char| c.is_ascii_alphabetic()),
         };
         if !sound {
-            let text = format!("{:?} is no {name} for an XML declaration", shown(value));
+            let text = format!(
+                "{:?} is not a valid {name} for an XML declaration",
+                shown(value)
+            );
             return Some((at, text));
         }
     }
