@@ -209,7 +209,8 @@ fn thirty_thousand_findings_lose_the_least_severe_and_say_it() {
     assert_eq!(all.len(), MOST_ENTRIES + 1);
     assert_eq!(
         all[0]["description"],
-        only the "25000 most severe of 30000 entries are in this report; left out: 0 blocker, 0 major, 0 minor, 5000 info"
+        "only the 25000 most severe of 30000 entries are in this report; left out: 0 blocker, \
+         0 major, 0 minor, 5000 info"
     );
     let of = |severity: &str| all.iter().filter(|it| it["severity"] == severity).count();
     assert_eq!(
