@@ -40,7 +40,7 @@ fn header_faults() -> PathBuf {
 const ALL: &str = "maxLevel=\"1\" minLevel=\"3\"";
 
 #[test]
-fn a_configuration_runs_what_it_names_and_nothing_else() {
+fn configuration_runs_only_the_named_checkers() {
     let cli = Cli::new();
     cli.write("config.xml", config(&header_faults(), ALL, ""));
     let said = cli.qcbus(&["check", "-c", "config.xml"]);
@@ -83,7 +83,7 @@ fn levels_kept(results: &Results) -> Vec<u8> {
 }
 
 #[test]
-fn levels_are_an_interval_in_both_orders() {
+fn level_limits_may_be_in_either_order() {
     let kept = |levels: &str| {
         let cli = Cli::new();
         cli.write("config.xml", config(&header_faults(), levels, ""));
@@ -143,7 +143,7 @@ fn report_modules_run_afterwards_with_their_params() {
 }
 
 #[test]
-fn a_malformed_configuration_is_refused_with_its_place() {
+fn malformed_configuration_is_refused_with_its_place() {
     let cli = Cli::new();
     // This is the mistake in an example of 2023: a letter outside the quotes.
     let broken = config(&header_faults(), ALL, "").replace("value=\"", "value=\"e\"");
@@ -185,7 +185,7 @@ fn unknown_names_are_warned_about_with_their_place() {
 }
 
 #[test]
-fn a_bundle_is_a_module_of_the_framework() {
+fn bundle_runs_as_a_module_of_the_framework() {
     let cli = Cli::new();
     let with_file = config(&header_faults(), ALL, "").replace(
         "<Checker checkerId=\"check_asam",
@@ -244,10 +244,10 @@ for name in sys.argv[1:]:
 ";
 
 #[test]
-fn asams_own_library_reads_every_result() {
+fn asam_library_reads_every_result() {
     let python = match python() {
         Ok(python) => python,
-        Err(why) => return skip("asams_own_library_reads_every_result", &why),
+        Err(why) => return skip("asam_library_reads_every_result", &why),
     };
     let cli = Cli::new();
     cli.check_in(&sample_farm(), &["."], "out");

@@ -44,7 +44,7 @@ fn nothing_is_lost_whatever_dies() {
 }
 
 #[test]
-fn a_broker_killed_under_load_loses_nothing_and_doubles_nothing() {
+fn broker_killed_under_load_loses_and_doubles_no_file() {
     let farm = Farm::new();
     let mut broker = farm.serve_ready();
     let mut dice = Dice::new(seed());
@@ -78,7 +78,7 @@ fn a_broker_killed_under_load_loses_nothing_and_doubles_nothing() {
 }
 
 #[test]
-fn memory_does_not_follow_the_number_of_files() {
+fn memory_does_not_grow_with_the_number_of_files() {
     let many = number_from("QCBUS_MANY_FILES", 1500);
     let (few_kib, few) = (peak_with(many / 5), many / 5);
     let many_kib = peak_with(many);

@@ -39,7 +39,7 @@ fn told(said: &Output) -> (Option<i32>, String) {
 }
 
 #[test]
-fn a_directory_of_bundles_that_is_not_there_is_refused() {
+fn missing_directory_of_bundles_is_refused() {
     let cli = Cli::new();
     cli.write("a.xodr", Content::Good(1).bytes());
     let words = "cannot take bundles from --bundles-d";
@@ -53,7 +53,7 @@ fn a_directory_of_bundles_that_is_not_there_is_refused() {
 }
 
 #[test]
-fn a_bundle_whose_program_cannot_be_run_is_not_added() {
+fn bundle_without_a_runnable_program_is_not_added() {
     let cli = Cli::new();
     cli.write("notes", "no program");
     for program in [
@@ -71,7 +71,7 @@ fn a_bundle_whose_program_cannot_be_run_is_not_added() {
 }
 
 #[test]
-fn without_a_broker_a_bundle_is_added_and_removed_only_by_saying_so() {
+fn editing_bundles_without_a_broker_needs_offline() {
     let cli = Cli::new();
     let program = idler(cli.path());
     let add = ["bundle", "add", "mine", &program, "--bundles-d", "d"];
@@ -95,7 +95,7 @@ fn without_a_broker_a_bundle_is_added_and_removed_only_by_saying_so() {
 }
 
 #[test]
-fn a_program_is_written_by_its_whole_path() {
+fn program_is_stored_with_its_absolute_path() {
     let cli = Cli::new();
     idler(cli.path());
     let add = |program: &str| {
@@ -110,7 +110,7 @@ fn a_program_is_written_by_its_whole_path() {
 }
 
 #[test]
-fn a_running_broker_takes_a_bundle_or_nothing_is_added() {
+fn bundle_is_added_only_if_the_broker_accepts_it() {
     let farm = Farm::new();
     let program = zoo().display().to_string();
     let elsewhere = farm.base().join("elsewhere");
@@ -186,7 +186,7 @@ fn says_it_all(text: &str) {
 }
 
 #[test]
-fn what_a_configuration_names_in_vain_is_said_wherever_it_is_used() {
+fn unknown_names_in_a_configuration_are_always_reported() {
     let cli = Cli::new();
     cli.write("a.xodr", Content::Good(1).bytes());
     cli.write("config.xml", ODD);
@@ -201,7 +201,7 @@ fn what_a_configuration_names_in_vain_is_said_wherever_it_is_used() {
 }
 
 #[test]
-fn a_misspelt_parameter_alone_is_said_and_judges_nothing() {
+fn misspelt_parameter_is_reported_and_changes_no_verdict() {
     let cli = Cli::new();
     cli.write("a.xodr", Content::Good(1).bytes());
     let kept: Vec<&str> = ODD
@@ -233,7 +233,7 @@ fn a_misspelt_parameter_alone_is_said_and_judges_nothing() {
 }
 
 #[test]
-fn serve_and_reload_say_what_a_configuration_names_in_vain() {
+fn serve_and_reload_report_unknown_configuration_names() {
     let mut farm = Farm::new();
     let config = farm.base().join("config.xml");
     std::fs::write(&config, ODD).unwrap();
@@ -250,7 +250,7 @@ fn serve_and_reload_say_what_a_configuration_names_in_vain() {
 }
 
 #[test]
-fn a_bundle_of_ones_own_is_known_by_its_manifest() {
+fn own_bundle_is_known_by_its_manifest() {
     let cli = Cli::new();
     let program = idler(cli.path());
     let add = [

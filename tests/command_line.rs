@@ -51,7 +51,7 @@ fn help_of_every_command() {
 }
 
 #[test]
-fn mistakes_are_said_with_what_to_do() {
+fn mistakes_are_reported_with_advice() {
     let cli = Cli::new();
     cli.write("notes.txt", "nothing");
     std::fs::create_dir(cli.path().join("empty")).unwrap();
@@ -87,7 +87,7 @@ fn mistakes_are_said_with_what_to_do() {
 }
 
 #[test]
-fn parameter_that_every_checker_has_is_in_order_and_one_that_it_cannot_read_is_not() {
+fn parameters_of_a_checker_are_validated() {
     let cli = Cli::new();
     let config = |name: &str, value: &str| {
         format!(
@@ -105,7 +105,7 @@ fn parameter_that_every_checker_has_is_in_order_and_one_that_it_cannot_read_is_n
 }
 
 #[test]
-fn wait_knows_why_there_will_be_no_verdict() {
+fn wait_reports_why_there_will_be_no_verdict() {
     use support::farm::Farm;
     let farm = Farm::new();
     farm.write(".qcignore", b"*_wip.xodr\n");
@@ -126,11 +126,11 @@ fn wait_knows_why_there_will_be_no_verdict() {
         text.push_str(&String::from_utf8_lossy(&said.stderr));
         text.push_str(&format!("--- exit {}\n", said.status.code().unwrap()));
     }
-    insta::assert_snapshot!(text.replace(&*farm.base().to_string_lossy(), "[DESK]"));
+    insta::assert_snapshot!(text.replace(&*farm.base().to_string_lossy(), "[DIR]"));
 }
 
 #[test]
-fn a_rule_explains_itself() {
+fn rule_command_explains_each_rule() {
     let cli = Cli::new();
     let said = cli.qcbus(&["rule", "check_asam_xodr_xml_fileheader_is_present"]);
     insta::assert_snapshot!(said.whole(&cli));
@@ -163,7 +163,7 @@ fn doctor_and_bundle_list_work_without_a_broker() {
 }
 
 #[test]
-fn quiet_and_json_say_no_more_than_asked() {
+fn quiet_and_json_print_no_more_than_requested() {
     let cli = Cli::new();
     cli.write("in/a.xodr", Content::Good(1).bytes());
     cli.write("in/b.xodr", Content::NoHeader(1).bytes());
@@ -189,7 +189,7 @@ fn quiet_and_json_say_no_more_than_asked() {
 }
 
 #[test]
-fn a_bundle_is_added_where_the_options_say_and_gets_what_follows_two_dashes() {
+fn bundle_is_added_in_bundles_d_with_its_arguments() {
     let cli = Cli::new();
     let add = |name: &str, further: &[&str]| {
         let mut arguments = vec!["bundle", "add", name, "/bin/sh", "--offline"];
@@ -215,7 +215,7 @@ fn a_bundle_is_added_where_the_options_say_and_gets_what_follows_two_dashes() {
 }
 
 #[test]
-fn a_gate_that_is_watched_is_refused_whatever_the_way_to_it() {
+fn gate_inside_a_watched_directory_is_refused() {
     let cli = Cli::new();
     cli.write("in/a.xodr", "");
     std::os::unix::fs::symlink("in", cli.path().join("farm")).unwrap();
@@ -238,7 +238,7 @@ fn a_gate_that_is_watched_is_refused_whatever_the_way_to_it() {
 
 /// A check without a broker needs no instance.
 #[test]
-fn a_check_is_made_where_no_instance_can_be() {
+fn check_works_where_no_instance_is_possible() {
     let cli = Cli::new();
     let map = cli.write("map.xodr", Content::Good(1).bytes());
     let map = map.to_str().unwrap();

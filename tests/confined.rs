@@ -75,7 +75,7 @@ fn sound_files(farm: &Farm) -> Files {
 }
 
 #[test]
-fn nobody_scribbles_on_what_others_read() {
+fn confined_bundle_cannot_write_to_files_of_others() {
     if landlock_is_missing() {
         return;
     }
@@ -102,7 +102,7 @@ fn nobody_scribbles_on_what_others_read() {
 }
 
 #[test]
-fn without_a_sandbox_anybody_can_and_that_is_said() {
+fn unconfined_bundle_can_write_and_status_reports_it() {
     let farm = Farm::with(&["--no-sandbox"]);
     let _broker = farm.serve_ready();
     farm.let_in("scribbles_on_others", "");
@@ -121,7 +121,7 @@ fn without_a_sandbox_anybody_can_and_that_is_said() {
 }
 
 #[test]
-fn standard_bundles_are_confined_and_that_is_said() {
+fn standard_bundles_are_reported_as_confined() {
     if landlock_is_missing() {
         return;
     }
@@ -241,7 +241,7 @@ fn meddlings(log: &str) -> Vec<&str> {
 }
 
 #[test]
-fn nobody_meddles_with_what_is_not_his() {
+fn confined_bundle_cannot_affect_other_processes() {
     if landlock_is_missing() {
         return;
     }
@@ -254,7 +254,7 @@ fn nobody_meddles_with_what_is_not_his() {
 }
 
 #[test]
-fn what_a_manifest_declares_is_allowed_and_nothing_else() {
+fn only_access_declared_in_a_manifest_is_allowed() {
     if landlock_is_missing() {
         return;
     }
@@ -268,7 +268,7 @@ fn what_a_manifest_declares_is_allowed_and_nothing_else() {
 }
 
 #[test]
-fn what_a_bundle_leaves_behind_does_not_outlive_down() {
+fn descendants_of_a_bundle_end_with_the_broker() {
     let (farm, _broker, victims, log) = with_a_meddler(&["--no-sandbox"], None);
     let all = meddlings(&log);
     assert_eq!(all.len(), 7, "each of them is possible: {all:?}");
@@ -280,7 +280,7 @@ fn what_a_bundle_leaves_behind_does_not_outlive_down() {
 }
 
 #[test]
-fn what_a_bundle_leaves_behind_goes_with_it() {
+fn descendants_of_a_bundle_end_with_it() {
     let (farm, _broker, victims, _) = with_a_meddler(&["--no-sandbox"], None);
     until("what it has started sleeps", || {
         (victims.sleepers() > 0).then_some(())

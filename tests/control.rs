@@ -76,7 +76,7 @@ fn socket(farm: &Farm) -> PathBuf {
 }
 
 #[test]
-fn two_thousand_idle_connections_stop_nothing() {
+fn two_thousand_idle_connections_do_not_stop_the_broker() {
     be_many();
     let farm = Farm::new();
     let broker = serve(&farm);
@@ -96,7 +96,7 @@ fn two_thousand_idle_connections_stop_nothing() {
 }
 
 #[test]
-fn who_waits_and_vanishes_makes_room_for_others() {
+fn vanished_clients_make_room_for_others() {
     be_many();
     let farm = Farm::new();
     let broker = serve(&farm);
@@ -173,7 +173,7 @@ fn attack(dice: &mut Dice, socket: &Path, kept: &mut Vec<UnixStream>) {
 }
 
 #[test]
-fn an_honest_client_is_answered_beside_hostile_ones() {
+fn honest_client_is_answered_beside_hostile_ones() {
     be_many();
     let farm = Farm::with(&["--no-standard-bundles"]);
     let mut broker = serve(&farm);
@@ -227,7 +227,7 @@ fn an_honest_client_is_answered_beside_hostile_ones() {
 
 /// A stopped broker does not answer, and its clients must not hang with it.
 #[test]
-fn a_broker_that_is_stopped_is_named_and_not_waited_for() {
+fn stopped_broker_is_named_and_not_waited_for() {
     let farm = Farm::new();
     let broker = farm.serve_ready();
     let pid = i32::try_from(broker.pid()).unwrap();
@@ -243,7 +243,7 @@ fn a_broker_that_is_stopped_is_named_and_not_waited_for() {
 }
 
 #[test]
-fn whoever_waits_when_the_broker_is_stopped_is_told_that_none_runs() {
+fn waiting_client_learns_that_the_broker_left() {
     let farm = Farm::new();
     let broker = farm.serve_ready();
     let before = descriptors(&broker);
@@ -266,7 +266,7 @@ fn whoever_waits_when_the_broker_is_stopped_is_told_that_none_runs() {
 
 /// `qcbus down && qcbus serve` is a common command line.
 #[test]
-fn what_is_down_can_be_started_again_at_once() {
+fn broker_can_be_restarted_right_after_down() {
     let farm = Farm::new();
     for number in 0..200 {
         farm.write(&format!("{number}.xodr"), b"<OpenDRIVE/>");

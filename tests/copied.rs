@@ -65,7 +65,7 @@ fn copy_tree(from: &Path, to: &Path) {
 }
 
 #[test]
-fn copied_farm_takes_nothing_from_the_original() {
+fn copied_farm_changes_nothing_in_the_original() {
     let live = farm_with_everything();
     let mut broker = serve_both(&live);
     let before = written(&live);
@@ -102,7 +102,7 @@ fn copied_farm_takes_nothing_from_the_original() {
 }
 
 #[test]
-fn removed_directory_takes_its_directories_of_results_with_it() {
+fn results_of_a_removed_directory_are_removed() {
     let farm = farm_with_everything();
     let mut broker = farm.serve_ready();
     for day in ["2026-11-20/a", "2026-11-21", "kept"] {
@@ -133,7 +133,7 @@ fn removed_directory_takes_its_directories_of_results_with_it() {
 }
 
 #[test]
-fn results_in_a_former_directory_belong_to_whoever_writes_there_now() {
+fn results_of_another_broker_are_left_alone() {
     let first = farm_with_everything();
     let mut broker = serve_both(&first);
     assert_eq!(first.qcbus(&["down"]).status.code(), Some(0));

@@ -300,22 +300,22 @@ fn killed_anywhere(work: Work, meanwhile: Meanwhile) {
 }
 
 #[test]
-fn a_broker_killed_anywhere_in_a_job_is_made_good_by_the_next() {
+fn kill_during_a_job_is_repaired_after_restart() {
     killed_anywhere(Work::Job, Meanwhile::Nothing);
 }
 
 #[test]
-fn a_broker_killed_anywhere_in_its_start_is_made_good_by_the_next() {
+fn kill_during_the_start_is_repaired_after_restart() {
     killed_anywhere(Work::Start, Meanwhile::Nothing);
 }
 
 #[test]
-fn a_file_deleted_after_a_crash_leaves_nothing_behind() {
+fn file_deleted_after_a_crash_leaves_nothing_behind() {
     killed_anywhere(Work::Job, Meanwhile::Deleted);
 }
 
 #[test]
-fn a_file_rewritten_after_a_crash_has_a_verdict_for_what_it_is() {
+fn file_rewritten_after_a_crash_gets_a_current_verdict() {
     killed_anywhere(Work::Job, Meanwhile::Rewritten);
 }
 

@@ -31,7 +31,7 @@ fn check_with(cli: &Cli, bundle: &str, checkers: &[&str], file: &Path) -> Said {
 const IDS: &str = "check_asam_xodr_ids_id_unique_in_class";
 
 #[test]
-fn what_a_demanded_checker_rests_on_counts_whoever_demanded_it() {
+fn preconditions_of_a_requested_checker_always_count() {
     let cli = Cli::new();
     let broken = sample_farm().join("faulty/not_well_formed.xodr");
     let said = check_with(&cli, "xodrBundle", &[IDS], &broken);
@@ -52,7 +52,7 @@ fn what_a_demanded_checker_rests_on_counts_whoever_demanded_it() {
 }
 
 #[test]
-fn a_module_tells_what_kept_a_demanded_checker_from_looking() {
+fn module_reports_failed_preconditions_of_a_checker() {
     let cli = Cli::new();
     let broken = sample_farm().join("faulty/not_well_formed.xodr");
     cli.write(
@@ -74,7 +74,7 @@ fn a_module_tells_what_kept_a_demanded_checker_from_looking() {
 }
 
 #[test]
-fn a_filter_on_what_a_checker_rests_on_makes_no_acceptance() {
+fn filtered_precondition_prevents_acceptance() {
     let cli = Cli::new();
     let broken = sample_farm().join("faulty/not_well_formed.xodr");
     cli.write(
@@ -90,7 +90,7 @@ fn a_filter_on_what_a_checker_rests_on_makes_no_acceptance() {
 }
 
 #[test]
-fn where_no_demanded_checker_applies_nobody_looked() {
+fn file_without_an_applicable_checker_is_undetermined() {
     let cli = Cli::new();
     // This checker is for a later version than that of the file.
     let later = "check_asam_xodr_road_lane_layer_lane_group_width_temporary";
@@ -107,7 +107,7 @@ fn where_no_demanded_checker_applies_nobody_looked() {
 }
 
 #[test]
-fn how_little_was_asked_is_said_in_one_line() {
+fn number_of_unrequested_checkers_is_reported() {
     let cli = Cli::new();
     let good = sample_farm().join("maps/ring.xodr");
     let said = check_with(&cli, "xodrBundle", &[IDS], &good);

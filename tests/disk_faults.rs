@@ -159,8 +159,8 @@ fn error(
 }
 
 #[test]
-fn errors_of_a_moment_pass_when_the_moment_does() {
-    let Some(mut victim) = Victim::new("errors_of_a_moment_pass_when_the_moment_does") else {
+fn temporary_disk_errors_have_no_lasting_effect() {
+    let Some(mut victim) = Victim::new("temporary_disk_errors_have_no_lasting_effect") else {
         return;
     };
     let root = victim.farm.root();
@@ -194,8 +194,8 @@ fn interruptions_and_short_reads_change_nothing() {
 }
 
 #[test]
-fn a_disk_without_room_costs_no_verdict() {
-    let Some(mut victim) = Victim::new("a_disk_without_room_costs_no_verdict") else {
+fn full_disk_costs_no_verdict() {
+    let Some(mut victim) = Victim::new("full_disk_costs_no_verdict") else {
         return;
     };
     let (out, gate) = (victim.farm.out(), victim.farm.gate());
@@ -220,8 +220,8 @@ fn a_disk_without_room_costs_no_verdict() {
 
 /// A server is gone: requests for its files never get an answer.
 #[test]
-fn a_file_that_never_answers_is_named_and_holds_up_nobody() {
-    let test = "a_file_that_never_answers_is_named_and_holds_up_nobody";
+fn hanging_file_is_named_and_delays_no_other() {
+    let test = "hanging_file_is_named_and_delays_no_other";
     let Some(mut victim) = Victim::new(test) else {
         return;
     };
@@ -282,8 +282,8 @@ fn a_file_that_never_answers_is_named_and_holds_up_nobody() {
 
 /// The program of a manifest is on a lost server. Its process and all others go on.
 #[test]
-fn a_program_that_never_answers_holds_up_nobody() {
-    let test = "a_program_that_never_answers_holds_up_nobody";
+fn hanging_program_delays_no_other_work() {
+    let test = "hanging_program_delays_no_other_work";
     let Some(mut victim) = Victim::new(test) else {
         return;
     };
@@ -342,8 +342,8 @@ fn a_program_that_never_answers_holds_up_nobody() {
 }
 
 #[test]
-fn a_broker_ends_though_a_file_never_answers() {
-    let Some(mut victim) = Victim::new("a_broker_ends_though_a_file_never_answers") else {
+fn broker_ends_although_a_file_hangs() {
+    let Some(mut victim) = Victim::new("broker_ends_although_a_file_hangs") else {
         return;
     };
     victim.broker.failure(Some(Failure {

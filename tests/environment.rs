@@ -130,7 +130,7 @@ fn script_is_run_by_the_interpreter_beside_the_program() {
 }
 
 #[test]
-fn link_to_the_program_of_an_environment_is_in_it_as_well() {
+fn link_to_a_program_belongs_to_its_environment() {
     let service = Service::new().start();
     let link = service.farm.base().join("qcbus");
     symlink(&service.program, &link).unwrap();
@@ -141,7 +141,7 @@ fn link_to_the_program_of_an_environment_is_in_it_as_well() {
 }
 
 #[test]
-fn first_line_of_a_script_says_otherwise() {
+fn first_line_of_a_script_selects_the_interpreter() {
     let service = Service::new().start();
     let (script, other) = (service.script(), service.farm.base().join("other python"));
     install(&other, &as_a_bundle("3.0.0"));
@@ -166,7 +166,7 @@ fn first_line_of_a_script_says_otherwise() {
 }
 
 #[test]
-fn manifest_that_names_python_by_its_name_means_the_environment() {
+fn python_in_a_manifest_means_the_environment() {
     let service = Service::new().start();
     let module = serde_json::json!({
         "name": "mine",
@@ -180,7 +180,7 @@ fn manifest_that_names_python_by_its_name_means_the_environment() {
 }
 
 #[test]
-fn one_shot_module_is_run_by_the_python_of_the_environment() {
+fn python_of_the_environment_runs_a_one_shot_module() {
     const MANNERS: &str = include_str!("../bundles/asam-adapter/tests/guests/manners.sh");
     let service = Service::new();
     install(&service.python, "#!/bin/sh\nexec sh \"$@\"\n");
@@ -202,7 +202,7 @@ fn one_shot_module_is_run_by_the_python_of_the_environment() {
 }
 
 #[test]
-fn last_words_of_a_bundle_that_fails_are_shown() {
+fn last_output_of_a_failing_bundle_is_shown() {
     let service = Service::new();
     let said = "Traceback (most recent call last):\n  File \"mine.py\", line 1\n\
                 ModuleNotFoundError: No module named 'qcbus'\n\u{1b}[2Kerror: none\n";

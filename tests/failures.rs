@@ -65,7 +65,7 @@ fn notice(farm: &Farm, words: &str) -> String {
 }
 
 #[test]
-fn a_corrupt_journal() {
+fn corrupt_journal_is_reported() {
     let farm = Farm::new();
     std::fs::create_dir_all(farm.journal().parent().unwrap()).unwrap();
     std::fs::write(
@@ -83,7 +83,7 @@ fn a_corrupt_journal() {
 }
 
 #[test]
-fn a_second_broker_on_the_same_instance() {
+fn second_broker_on_the_same_instance_is_refused() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     let output = farm.serve_command().output().unwrap();
@@ -95,7 +95,7 @@ fn a_second_broker_on_the_same_instance() {
 }
 
 #[test]
-fn a_bundle_of_another_version() {
+fn bundle_of_another_version_is_refused() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     farm.let_in("speaks_another_protocol", "");
@@ -117,7 +117,7 @@ fn a_bundle_of_another_version() {
 }
 
 #[test]
-fn a_broker_that_stands_still_keeps_nobody_who_has_a_limit() {
+fn wait_with_a_timeout_ends_beside_a_stopped_broker() {
     let farm = Farm::new();
     let broker = farm.serve_ready();
     farm.write("a.xodr", &Content::Good(1).bytes());
@@ -132,7 +132,7 @@ fn a_broker_that_stands_still_keeps_nobody_who_has_a_limit() {
 }
 
 #[test]
-fn a_bundle_that_cannot_be_started() {
+fn bundle_that_cannot_be_started_is_reported() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     let manifest = r#"{"module": [{"name": "missing", "exec_type": "executable",
@@ -142,7 +142,7 @@ fn a_bundle_that_cannot_be_started() {
 }
 
 #[test]
-fn a_watched_directory_that_goes_and_comes_back() {
+fn missing_watched_directory_is_reported_until_it_is_back() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     farm.write("a.xodr", &Content::Good(1).bytes());
@@ -173,7 +173,7 @@ fn a_watched_directory_that_goes_and_comes_back() {
 }
 
 #[test]
-fn what_takes_the_place_of_a_watched_directory_is_not_said_to_be_gone() {
+fn replaced_watched_directory_is_not_reported_as_gone() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     let aside = farm.base().join("aside");
@@ -206,7 +206,7 @@ fn what_must_be_judged_again_while_its_directory_is_away(farm: &Farm, aside: &Pa
 }
 
 #[test]
-fn a_watched_directory_that_is_not_there() {
+fn missing_watched_directory_is_refused_at_the_start() {
     let farm = Farm::new();
     std::fs::remove_dir(farm.root()).unwrap();
     let output = farm.serve_command().output().unwrap();
@@ -233,8 +233,8 @@ fn mount(directory: &Path, options: &str) {
 }
 
 #[test]
-fn an_output_directory_that_cannot_be_written() {
-    inside("an_output_directory_that_cannot_be_written", "true", || {
+fn unwritable_output_directory_is_reported() {
+    inside("unwritable_output_directory_is_reported", "true", || {
         let mut farm = Farm::new();
         std::fs::create_dir(farm.out()).unwrap();
         // Root may write anywhere except on a read-only file system.
@@ -252,8 +252,8 @@ fn an_output_directory_that_cannot_be_written() {
 }
 
 #[test]
-fn an_output_disk_that_is_full() {
-    inside("an_output_disk_that_is_full", "true", || {
+fn full_output_disk_is_reported() {
+    inside("full_output_disk_is_reported", "true", || {
         let mut farm = Farm::new();
         std::fs::create_dir(farm.out()).unwrap();
         mount(&farm.out(), "size=1m");
@@ -286,8 +286,8 @@ fn an_output_disk_that_is_full() {
 }
 
 #[test]
-fn a_state_disk_that_is_full() {
-    inside("a_state_disk_that_is_full", "true", || {
+fn full_state_disk_is_reported() {
+    inside("full_state_disk_is_reported", "true", || {
         let mut farm = Farm::new();
         let state = farm.base().join("state");
         std::fs::create_dir(&state).unwrap();
@@ -313,9 +313,9 @@ fn a_state_disk_that_is_full() {
 }
 
 #[test]
-fn a_shared_memory_that_is_full() {
+fn full_shared_memory_is_reported() {
     let prepare = "mount -t tmpfs -o size=64m tmpfs /dev/shm";
-    inside("a_shared_memory_that_is_full", prepare, || {
+    inside("full_shared_memory_is_reported", prepare, || {
         let farm = Farm::new();
         let _broker = farm.serve_ready();
         let filler = std::fs::File::create("/dev/shm/filler").unwrap();
@@ -340,10 +340,10 @@ fn a_shared_memory_that_is_full() {
 }
 
 #[test]
-fn shared_memory_that_others_fill_to_the_last_page_kills_no_broker() {
+fn shared_memory_filled_by_others_kills_no_broker() {
     let prepare = "mount -t tmpfs -o size=64m tmpfs /dev/shm";
     inside(
-        "shared_memory_that_others_fill_to_the_last_page_kills_no_broker",
+        "shared_memory_filled_by_others_kills_no_broker",
         prepare,
         || {
             let farm = Farm::new();
@@ -367,25 +367,21 @@ fn shared_memory_that_others_fill_to_the_last_page_kills_no_broker() {
 }
 
 #[test]
-fn a_shared_memory_that_is_mounted_for_reading_only() {
+fn read_only_shared_memory_is_reported() {
     let prepare = "mount -t tmpfs -o ro tmpfs /dev/shm";
-    inside(
-        "a_shared_memory_that_is_mounted_for_reading_only",
-        prepare,
-        || {
-            let farm = Farm::new();
-            let served = farm.serve_command().output().unwrap();
-            assert_eq!(served.status.code(), Some(5));
-            insta::assert_snapshot!(told(&farm, &stderr(&served)));
-            let looked_at = farm.qcbus(&["doctor"]);
-            assert_eq!(looked_at.status.code(), Some(1));
-            let remarks = String::from_utf8_lossy(&looked_at.stdout).into_owned();
-            let remark: Vec<&str> = remarks
-                .lines()
-                .skip_while(|line| !line.contains("shared memory"))
-                .take(2)
-                .collect();
-            insta::assert_snapshot!(remark.join("\n"));
-        },
-    );
+    inside("read_only_shared_memory_is_reported", prepare, || {
+        let farm = Farm::new();
+        let served = farm.serve_command().output().unwrap();
+        assert_eq!(served.status.code(), Some(5));
+        insta::assert_snapshot!(told(&farm, &stderr(&served)));
+        let looked_at = farm.qcbus(&["doctor"]);
+        assert_eq!(looked_at.status.code(), Some(1));
+        let remarks = String::from_utf8_lossy(&looked_at.stdout).into_owned();
+        let remark: Vec<&str> = remarks
+            .lines()
+            .skip_while(|line| !line.contains("shared memory"))
+            .take(2)
+            .collect();
+        insta::assert_snapshot!(remark.join("\n"));
+    });
 }

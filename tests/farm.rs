@@ -84,7 +84,7 @@ fn checkable() -> Vec<PathBuf> {
 }
 
 #[test]
-fn every_promised_issue_is_found_at_its_place() {
+fn every_expected_issue_is_found_at_its_place() {
     let cli = Cli::new();
     let said = cli.check_in(&sample_farm(), &["."], "out");
     assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
@@ -118,7 +118,7 @@ fn every_promised_issue_is_found_at_its_place() {
 }
 
 #[test]
-fn good_files_are_accepted_without_a_word_of_blame() {
+fn good_files_are_accepted_without_findings() {
     let cli = Cli::new();
     let said = cli.check_in(&sample_farm(), &["."], "out");
     let good = table("Accepted");
@@ -169,7 +169,7 @@ fn every_issue_is_printed_with_row_and_column() {
 }
 
 #[test]
-fn only_valid_xml_is_judged_on_its_meaning() {
+fn only_valid_xml_is_checked_for_its_meaning() {
     let cli = Cli::new();
     let said = cli.check_in(&sample_farm(), &["faulty/not_well_formed.xodr"], "out");
     assert_eq!(said.code, Some(1));
@@ -190,7 +190,7 @@ fn only_valid_xml_is_judged_on_its_meaning() {
 }
 
 #[test]
-fn results_lie_where_they_are_looked_for() {
+fn results_are_written_to_predictable_places() {
     let cli = Cli::new();
     let farm = sample_farm();
     cli.check_in(&farm, &["."], "tree");
@@ -248,7 +248,7 @@ fn two_runs_write_the_same_bytes() {
 }
 
 #[test]
-fn every_result_is_as_asam_describes_it() {
+fn every_result_conforms_to_the_asam_format() {
     let cli = Cli::new();
     cli.check_in(&sample_farm(), &["."], "out");
     let files = files_below(&cli.path().join("out"));
@@ -262,12 +262,12 @@ fn every_result_is_as_asam_describes_it() {
 }
 
 #[test]
-fn the_whole_farm_is_told_on_one_screen() {
+fn output_for_the_whole_farm_fits_on_one_screen() {
     let cli = Cli::new();
     let said = cli.check_in(&sample_farm(), &["."], "out");
     assert_eq!((said.code, said.stderr.as_str()), (Some(1), ""));
     let place = cli.path().canonicalize().unwrap();
-    let text = said.stdout.replace(&*place.to_string_lossy(), "DESK");
+    let text = said.stdout.replace(&*place.to_string_lossy(), "DIR");
     let text = text.replace(&*sample_farm().to_string_lossy(), "FARM");
     assert!(text.lines().count() <= 60, "{text}");
     insta::assert_snapshot!(text);

@@ -75,7 +75,7 @@ fn becomes(farm: &Farm, gate: &Path, name: &str, verdict: Option<Verdict>) {
 }
 
 #[test]
-fn a_file_behind_a_link_is_judged_whatever_happens_behind_it() {
+fn linked_file_is_judged_again_when_its_target_changes() {
     let (farm, gate, beside) = farm_with_gate();
     let target = beside.join("target");
     let good = Content::Good(1).bytes();
@@ -122,7 +122,7 @@ fn a_file_behind_a_link_is_judged_whatever_happens_behind_it() {
 }
 
 #[test]
-fn a_verdict_on_what_lies_behind_a_link_outlives_the_broker() {
+fn verdict_on_a_linked_file_survives_a_restart() {
     let (farm, gate, beside) = farm_with_gate();
     std::fs::write(beside.join("target"), Content::Good(1).bytes()).unwrap();
     symlink(beside.join("target"), farm.root().join("a.xodr")).unwrap();
@@ -137,7 +137,7 @@ fn a_verdict_on_what_lies_behind_a_link_outlives_the_broker() {
 }
 
 #[test]
-fn a_directory_keeps_its_name_however_many_links_lead_to_it() {
+fn directory_with_several_links_keeps_its_own_name() {
     let (farm, gate, beside) = farm_with_gate();
     std::fs::create_dir(farm.root().join("maps")).unwrap();
     // One link sorts before the name of the directory, the other one after it.
@@ -159,7 +159,7 @@ fn check(cli: &Cli, more: &[&str]) -> Said {
 }
 
 #[test]
-fn what_a_linked_file_includes_lies_beside_the_link() {
+fn includes_of_a_linked_file_lie_beside_the_link() {
     let cli = Cli::new();
     let (outer, view) = Content::road_in_two_parts();
     let target = cli.write("store/4711", outer);
@@ -184,7 +184,7 @@ fn cli_with_a_good_file() -> Cli {
 }
 
 #[test]
-fn what_cannot_be_looked_at_is_said_and_counts() {
+fn unscanned_entry_is_reported_and_prevents_acceptance() {
     type Failure = fn(&Cli, &Path);
     let troubles: [(&str, Failure); 5] = [
         ("maps/b.xodr", |_, path| symlink("gone", path).unwrap()),
@@ -201,7 +201,7 @@ fn what_cannot_be_looked_at_is_said_and_counts() {
         failure(&cli, &cli.path().join(name));
         let said = check(&cli, &["maps"]);
         assert_eq!(said.code, Some(3), "{}", said.whole(&cli));
-        let note = format!("note: not scanned: [DESK]/{name}: ");
+        let note = format!("note: not scanned: [DIR]/{name}: ");
         let told = cli.tidy(&said.stderr);
         assert_eq!(told.matches(&note).count(), 1, "{told}");
         // An error has a higher priority.
@@ -217,7 +217,7 @@ fn what_cannot_be_looked_at_is_said_and_counts() {
 }
 
 #[test]
-fn links_to_what_is_looked_at_anyway_are_nothing_to_speak_of() {
+fn links_to_scanned_entries_are_not_reported() {
     let cli = cli_with_a_good_file();
     cli.write("maps/deep/b.xodr", Content::Good(2).bytes());
     symlink("deep", cli.path().join("maps/again")).unwrap();
@@ -232,7 +232,7 @@ fn links_to_what_is_looked_at_anyway_are_nothing_to_speak_of() {
 }
 
 #[test]
-fn a_file_is_known_by_a_link_to_its_directory_and_judged_once() {
+fn file_behind_a_directory_link_is_judged_once() {
     let (farm, gate, beside) = farm_with_gate();
     let day = farm.root().join("2026-11-20");
     std::fs::create_dir(&day).unwrap();
@@ -314,12 +314,12 @@ fn give_to_nobody(path: &Path) {
 }
 
 #[test]
-fn a_directory_that_may_not_be_read_counts() {
+fn unreadable_directory_prevents_acceptance() {
     let cli = cli_with_a_good_file();
     let closed = cli.path().join("maps/closed");
     std::fs::create_dir(&closed).unwrap();
     rights(&closed, 0o000);
-    let Some(who) = as_nobody("a_directory_that_may_not_be_read_counts", &closed) else {
+    let Some(who) = as_nobody("unreadable_directory_prevents_acceptance", &closed) else {
         return;
     };
     let run = cli.path().join(".run");
@@ -333,7 +333,7 @@ fn a_directory_that_may_not_be_read_counts() {
     rights(&closed, 0o700);
     assert_eq!(said.code, Some(3), "{}", said.whole(&cli));
     let told = cli.tidy(&said.stderr);
-    let note = "note: not scanned: [DESK]/maps/closed: cannot look into this directory";
+    let note = "note: not scanned: [DIR]/maps/closed: cannot look into this directory";
     assert_eq!(told.matches(note).count(), 1, "{told}");
 }
 
@@ -362,10 +362,10 @@ fn wait_for_mode(farm: &Farm, mode: &str) {
 }
 
 #[test]
-fn a_closed_directory_costs_no_other_its_events() {
+fn unreadable_directory_does_not_stop_events_elsewhere() {
     let place = tempfile::tempdir().unwrap();
     rights(place.path(), 0o000);
-    let test = "a_closed_directory_costs_no_other_its_events";
+    let test = "unreadable_directory_does_not_stop_events_elsewhere";
     let who = as_nobody(test, place.path());
     rights(place.path(), 0o700);
     let Some(who) = who else { return };
@@ -418,8 +418,8 @@ fn serve_with(test: &str, limit: &str, farm: &Farm) -> Option<Broker> {
 }
 
 #[test]
-fn without_watches_left_only_what_has_none_is_looked_through() {
-    let test = "without_watches_left_only_what_has_none_is_looked_through";
+fn only_directories_without_watches_are_polled() {
+    let test = "only_directories_without_watches_are_polled";
     let farm = Farm::with(&["--rescan", "1h"]);
     for number in 0..10 {
         std::fs::create_dir(farm.root().join(number.to_string())).unwrap();
@@ -449,8 +449,8 @@ fn without_watches_left_only_what_has_none_is_looked_through() {
 }
 
 #[test]
-fn without_events_everything_is_looked_through_and_it_is_said_what_to_do() {
-    let test = "without_events_everything_is_looked_through_and_it_is_said_what_to_do";
+fn missing_events_lead_to_polling_and_advice() {
+    let test = "missing_events_lead_to_polling_and_advice";
     let farm = Farm::new();
     let limit = "0 > /proc/sys/user/max_inotify_instances";
     let Some(_broker) = serve_with(test, limit, &farm) else {
@@ -490,7 +490,7 @@ fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
 }
 
 #[test]
-fn names_that_are_no_text_have_a_result_each() {
+fn non_utf8_names_get_separate_results() {
     let cli = Cli::new();
     std::fs::create_dir(cli.path().join("maps")).unwrap();
     put_both(&cli.path().join("maps"));
@@ -525,7 +525,7 @@ fn names_that_are_no_text_have_a_result_each() {
 }
 
 #[test]
-fn names_that_are_no_text_have_a_verdict_each_and_keep_it() {
+fn non_utf8_names_keep_separate_verdicts() {
     let (mut farm, gate, _) = farm_with_gate();
     farm.arguments
         .extend(["--report".to_owned(), "text".to_owned()]);
@@ -583,7 +583,7 @@ const SCENARIO: &str = "<OpenSCENARIO>\n<FileHeader revMajor=\"1\" revMinor=\"2\
     <Storyboard><Init><Actions/></Init><StopTrigger/></Storyboard>\n</OpenSCENARIO>\n";
 
 #[test]
-fn a_scenario_with_such_a_path_finds_its_map() {
+fn scenario_with_a_non_utf8_path_finds_its_map() {
     let farm = Farm::new();
     let directory = farm.root().join(name(b"m\xFCnchen"));
     std::fs::create_dir(&directory).unwrap();
@@ -621,7 +621,7 @@ fn has_only_lines_of_ours(what: &str, text: &str) {
 }
 
 #[test]
-fn names_that_would_be_lines_are_none_in_what_check_prints() {
+fn control_characters_in_names_add_no_output_lines() {
     let cli = Cli::new();
     std::fs::create_dir(cli.path().join("in")).unwrap();
     for (bytes, _) in STEERING {
@@ -642,7 +642,7 @@ fn names_that_would_be_lines_are_none_in_what_check_prints() {
 }
 
 #[test]
-fn names_and_words_of_others_are_no_lines_of_a_broker() {
+fn foreign_text_adds_no_lines_to_broker_output() {
     let farm = Farm::new();
     let broker = farm.serve_ready();
     farm.let_in("speaks_in_lines", "");
@@ -682,7 +682,7 @@ fn names_and_words_of_others_are_no_lines_of_a_broker() {
 }
 
 #[test]
-fn words_of_others_are_no_lines_of_a_text_report() {
+fn foreign_text_adds_no_lines_to_a_text_report() {
     let mut farm = Farm::new();
     farm.arguments.extend(["--report".into(), "text".into()]);
     let broker = farm.serve_ready();
@@ -700,7 +700,7 @@ fn words_of_others_are_no_lines_of_a_text_report() {
 }
 
 #[test]
-fn what_is_printed_and_lost_is_no_success() {
+fn lost_output_is_not_a_success() {
     let cli = Cli::new();
     cli.write("in/a.xodr", Content::Good(1).bytes());
     let run = |stdout: std::process::Stdio| {

@@ -87,7 +87,7 @@ fn is_sound(farm: &Farm) {
 }
 
 #[test]
-fn all_that_is_accepted_is_published_with_what_it_needs() {
+fn accepted_files_are_published_with_their_dependencies() {
     let all = files_below(&sample_farm());
     let names: Vec<String> = all
         .iter()
@@ -108,7 +108,7 @@ fn all_that_is_accepted_is_published_with_what_it_needs() {
 
 /// There are no symbolic links behind the gate, so the same path leads to another map there.
 #[test]
-fn scenario_whose_map_is_reached_by_the_parent_of_a_link_is_held_back() {
+fn scenario_using_the_parent_of_a_link_is_withheld() {
     let farm = farm_of(&[], &[]);
     let far = farm.base().join("far");
     std::fs::create_dir_all(far.join("deep")).unwrap();
@@ -133,7 +133,7 @@ fn scenario_whose_map_is_reached_by_the_parent_of_a_link_is_held_back() {
 
 /// Scripts wait for the verdict and then run the file behind the gate.
 #[test]
-fn accepted_file_lies_behind_the_gate_when_the_answer_comes() {
+fn accepted_file_is_published_before_the_answer() {
     let farm = farm_of(&[], &[]);
     let _broker = farm.serve_ready();
     for number in 0..50 {
@@ -146,7 +146,7 @@ fn accepted_file_lies_behind_the_gate_when_the_answer_comes() {
 }
 
 #[test]
-fn a_map_goes_with_what_it_includes_and_comes_back_with_it() {
+fn map_is_withdrawn_and_published_again_with_its_include() {
     let farm = farm_of(&[ISLAND, ISLAND_ROADS], &[]);
     let _broker = farm.serve_ready();
     publishes(&farm, &[ISLAND, ISLAND_ROADS]);
@@ -161,7 +161,7 @@ fn a_map_goes_with_what_it_includes_and_comes_back_with_it() {
 }
 
 #[test]
-fn part_of_a_map_that_is_removed_from_the_gate_comes_back() {
+fn removed_part_of_a_published_map_is_restored() {
     let farm = farm_of(&[ISLAND, ISLAND_ROADS], &[]);
     let _broker = farm.serve_ready();
     publishes(&farm, &[ISLAND, ISLAND_ROADS]);
@@ -173,7 +173,7 @@ fn part_of_a_map_that_is_removed_from_the_gate_comes_back() {
 }
 
 #[test]
-fn a_scenario_goes_with_its_map_and_comes_back_with_it() {
+fn scenario_is_withdrawn_and_published_again_with_its_map() {
     let farm = farm_of(&[MAP, SCENARIO, CATALOG], &[]);
     let _broker = farm.serve_ready();
     publishes(&farm, &[CATALOG, MAP, SCENARIO]);
@@ -209,7 +209,7 @@ fn a_scenario_goes_with_its_map_and_comes_back_with_it() {
 }
 
 #[test]
-fn scenario_that_is_judged_by_itself_is_held_back_with_its_map() {
+fn scenario_with_own_verdict_is_withheld_with_its_map() {
     let farm = farm_of(&[MAP, SCENARIO, CATALOG], &["--own-verdict"]);
     let _broker = farm.serve_ready();
     publishes(&farm, &[CATALOG, MAP, SCENARIO]);
@@ -228,7 +228,7 @@ fn scenario_that_is_judged_by_itself_is_held_back_with_its_map() {
 }
 
 #[test]
-fn a_map_outside_is_named_and_by_option_refused() {
+fn map_outside_is_named_and_optionally_refused() {
     for refused in [false, true] {
         let arguments: &[&str] = if refused {
             &["--gate-outside", "refuse"]
@@ -263,7 +263,7 @@ fn stopped(farm: &Farm, mut broker: Broker, total: usize) {
 }
 
 #[test]
-fn a_start_clears_the_gate_of_what_nobody_claims() {
+fn start_removes_stale_files_from_the_gate() {
     let farm = farm_of(&[MAP, SCENARIO, CATALOG], &[]);
     let broker = farm.serve_ready();
     publishes(&farm, &[CATALOG, MAP, SCENARIO]);
@@ -286,7 +286,7 @@ fn a_start_clears_the_gate_of_what_nobody_claims() {
 }
 
 #[test]
-fn lost_acceptance_is_published_by_a_start_only_if_all_that_must_judge_have_judged() {
+fn start_publishes_again_only_with_every_required_bundle() {
     let farm = farm_of(&[MAP], &["--absence-limit", "1h"]);
     let broker = farm.serve_ready();
     publishes(&farm, &[MAP]);
@@ -309,7 +309,7 @@ fn lost_acceptance_is_published_by_a_start_only_if_all_that_must_judge_have_judg
 }
 
 #[test]
-fn other_bytes_of_the_same_size_are_not_taken_for_published_by_a_start() {
+fn start_replaces_changed_bytes_of_the_same_size() {
     let farm = farm_of(&[MAP], &[]);
     let (source, copy) = (farm.root().join(MAP), gate(&farm).join(MAP));
     let whole = std::fs::read(&source).unwrap();
@@ -344,7 +344,7 @@ fn refused(command: &mut Command) -> String {
 }
 
 #[test]
-fn a_directory_with_files_of_others_is_no_gate() {
+fn directory_with_other_files_is_refused_as_gate() {
     let farm = farm_of(&[MAP], &[]);
     std::fs::create_dir(gate(&farm)).unwrap();
     let precious = gate(&farm).join("precious.txt");
@@ -361,7 +361,7 @@ fn a_directory_with_files_of_others_is_no_gate() {
 }
 
 #[test]
-fn results_and_gate_are_apart() {
+fn results_and_gate_must_be_separate() {
     for (gate, out) in [("out", "out"), ("out/gate", "out"), ("gate", "gate/out")] {
         let farm = Farm::new();
         let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
@@ -389,7 +389,7 @@ fn another(farm: &Farm, shared: &[(&str, &Path)]) -> Command {
 }
 
 #[test]
-fn gate_results_and_state_are_held_by_one_broker() {
+fn gate_results_and_state_belong_to_one_broker() {
     let farm = farm_of(&[MAP], &[]);
     let broker = farm.serve_ready();
     publishes(&farm, &[MAP]);
@@ -424,7 +424,7 @@ fn results(out: &Path) -> Vec<String> {
 }
 
 #[test]
-fn earlier_results_of_a_run_do_not_look_current() {
+fn earlier_results_do_not_look_current() {
     let cli = Cli::new();
     for name in ["in/a.xodr", "in/b.xodr", "else/c.xodr"] {
         cli.write(name, Content::Good(1).bytes());
@@ -523,7 +523,7 @@ fn all_of(name: &str) -> [String; 3] {
 }
 
 #[test]
-fn a_result_that_the_journal_does_not_know_goes_with_its_file() {
+fn unrecorded_result_is_removed_with_its_file() {
     let farm = farm_of(&[], &["--report", "json"]);
     put(&farm, "old.xodr", &Content::Good(1).bytes());
     let broker = farm.serve_ready();
@@ -546,7 +546,7 @@ fn a_result_that_the_journal_does_not_know_goes_with_its_file() {
 }
 
 #[test]
-fn a_verdict_that_the_journal_does_not_know_is_given_anew() {
+fn unrecorded_verdict_is_given_again() {
     let farm = farm_of(&[], &[]);
     put(&farm, "a.xodr", &Content::Good(1).bytes());
     let broker = farm.serve_ready();
@@ -566,7 +566,7 @@ fn a_verdict_that_the_journal_does_not_know_is_given_anew() {
 }
 
 #[test]
-fn nothing_stays_when_the_journal_was_moved_away() {
+fn outputs_are_removed_when_the_journal_is_missing() {
     let farm = farm_of(&[MAP, CATALOG], &["--report", "json"]);
     let broker = farm.serve_ready();
     let json = farm.out().join(format!("{MAP}.json"));

@@ -82,7 +82,7 @@ const OF_OTHERS: [&str; 5] = [
 ];
 
 #[test]
-fn files_in_hidden_directories_are_neither_judged_nor_published() {
+fn files_in_hidden_directories_are_ignored() {
     let farm = farm();
     // Some files are there at the start, and some come later.
     for (number, directory) in (0..).zip(OF_OTHERS) {
@@ -164,7 +164,7 @@ fn swap(volume: &Path, generation: &str, content: &Content) {
 }
 
 #[test]
-fn file_of_a_kubernetes_volume_is_judged_once_for_each_generation() {
+fn kubernetes_file_is_judged_once_for_each_generation() {
     let farm = farm();
     let volume = farm.root().join("cm");
     swap(&volume, "..2026_11_27", &Content::Good(1));
@@ -208,7 +208,7 @@ fn scenario_on_a_hidden_map(farm: &Farm) {
 }
 
 #[test]
-fn map_in_a_hidden_directory_is_read_and_published_with_its_scenario() {
+fn hidden_map_is_read_and_published_with_its_scenario() {
     let farm = farm();
     scenario_on_a_hidden_map(&farm);
     let _broker = farm.serve_ready();
@@ -249,7 +249,7 @@ fn results_of_hidden_directories_are_withdrawn_at_the_start() {
 }
 
 #[test]
-fn check_looks_into_a_hidden_directory_only_when_it_is_named() {
+fn check_scans_a_hidden_directory_only_when_named() {
     let cli = Cli::new();
     cli.write("maps/a.xodr", Content::Good(1).bytes());
     cli.write("maps/.work/b.xodr", Content::Good(2).bytes());
@@ -276,7 +276,7 @@ fn check_looks_into_a_hidden_directory_only_when_it_is_named() {
 }
 
 #[test]
-fn link_to_a_hidden_directory_is_said_to_lead_where_nobody_looks() {
+fn link_to_a_hidden_directory_is_reported_as_unwatched() {
     let farm = farm();
     put(&farm, ".releases/7/a.xodr", &Content::Good(1));
     put(&farm, "b.xodr", &Content::Good(2));

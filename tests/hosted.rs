@@ -104,7 +104,7 @@ impl Table {
 }
 
 #[test]
-fn a_manifest_of_asams_framework_is_all_that_is_needed() {
+fn manifest_of_the_asam_framework_is_sufficient() {
     let table = Table::with(FINDS, "guest", &serde_json::Value::Null);
     let said = table.check(&["a.xodr", "--bundles-d", "bundles.d"]);
     assert_eq!(said.code, Some(1), "{}", said.whole(&table.cli));
@@ -126,7 +126,7 @@ fn a_manifest_of_asams_framework_is_all_that_is_needed() {
 }
 
 #[test]
-fn one_with_the_name_of_a_bundle_of_ours_joins_beside_it() {
+fn module_named_like_a_standard_bundle_joins_beside_it() {
     let table = Table::with(FINDS, "xodrBundle", &serde_json::Value::Null);
     let said = table.check(&["a.xodr", "--bundles-d", "bundles.d"]);
     assert_eq!(said.code, Some(1), "{}", said.whole(&table.cli));
@@ -141,7 +141,7 @@ fn one_with_the_name_of_a_bundle_of_ours_joins_beside_it() {
 }
 
 #[test]
-fn a_configuration_names_it_and_its_parameters_reach_it() {
+fn configured_parameters_reach_the_module() {
     let script = r#"[ "$(value limit)" = "a & b" ] || exit 4
         grep -q 'checkerId="one"' "$config" || exit 5
         polite"#
@@ -160,7 +160,7 @@ fn a_configuration_names_it_and_its_parameters_reach_it() {
 }
 
 #[test]
-fn a_configuration_alone_brings_what_is_on_the_path() {
+fn configuration_alone_starts_a_program_on_the_path() {
     let script = r#"[ "$1 $2" = "-c $config" ] || exit 4
         polite"#;
     let table = Table::with(script, "unused", &serde_json::Value::Null);
@@ -180,7 +180,7 @@ fn a_configuration_alone_brings_what_is_on_the_path() {
 }
 
 #[test]
-fn a_module_that_fails_leaves_the_file_undetermined_and_says_why() {
+fn failing_module_leaves_the_file_undetermined() {
     let table = Table::with(
         "echo what a pity >&2; exit 9",
         "guest",
@@ -200,7 +200,7 @@ fn a_module_that_fails_leaves_the_file_undetermined_and_says_why() {
 }
 
 #[test]
-fn it_writes_nowhere_else_and_reaches_nobody() {
+fn module_cannot_write_or_signal_outside_its_directory() {
     if qcbus_confine::kernel_level() == 0 {
         support::inside::skip(
             "it_writes_nowhere_else",
@@ -224,7 +224,7 @@ fn it_writes_nowhere_else_and_reaches_nobody() {
 }
 
 #[test]
-fn what_a_manifest_says_of_its_run_counts() {
+fn run_settings_in_a_manifest_are_applied() {
     let script = r#"[ "$MINE" = "a b" ] || exit 4
         [ "$PWD" = "/" ] || exit 5
         grep -q 'application="inner"' "$config" || exit 6
@@ -289,7 +289,7 @@ fn add(farm: &Farm, name: &str, program: &Path) -> (Option<i32>, String) {
 }
 
 #[test]
-fn command_is_taken_apart_as_a_shell_does_it() {
+fn command_is_split_as_by_a_shell() {
     let (farm, program, _broker) = farm_with(FINDS);
     let spaced = farm.base().join("a dir");
     std::fs::create_dir(&spaced).unwrap();
@@ -318,7 +318,7 @@ fn command_is_taken_apart_as_a_shell_does_it() {
 }
 
 #[test]
-fn it_is_added_looked_at_upgraded_and_removed_as_any_bundle() {
+fn module_is_added_upgraded_and_removed_like_any_bundle() {
     let (farm, program, _broker) = farm_with(FINDS);
     let (code, text) = add(&farm, "guest", &program);
     assert_eq!(code, Some(0), "{text}");
@@ -363,7 +363,7 @@ fn it_is_added_looked_at_upgraded_and_removed_as_any_bundle() {
 }
 
 #[test]
-fn program_that_was_not_learned_judges_nothing() {
+fn unlearned_program_judges_no_file() {
     let (farm, program, _broker) = farm_with(FINDS);
     let (code, text) = add(&farm, "guest", &program);
     assert_eq!(code, Some(0), "{text}");
@@ -392,7 +392,7 @@ fn program_that_was_not_learned_judges_nothing() {
 }
 
 #[test]
-fn what_is_of_no_use_is_taken_out_again() {
+fn unusable_module_is_removed_after_adding() {
     let (farm, program, _broker) = farm_with("polite");
     std::fs::write(&program, "#!/bin/sh\nexit 0\n").unwrap();
     let (code, text) = add(&farm, "guest", &program);
@@ -418,7 +418,7 @@ fn rooms(tmp: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-fn whoever_is_killed_the_file_is_judged_and_nothing_is_left() {
+fn killed_adapter_or_runner_leaves_no_process_behind() {
     // A run takes for ever until the file GO exists. Some of its children have left its session.
     let script = r#"[ -e "GO" ] || { setsid sh -c "sleep 86399.MARK & sleep 86399.MARK" & sleep 86399.MARK; }
         polite"#;
@@ -461,7 +461,7 @@ fn whoever_is_killed_the_file_is_judged_and_nothing_is_left() {
 }
 
 #[test]
-fn a_scenario_comes_with_what_it_refers_to() {
+fn scenario_is_handed_over_with_its_references() {
     let script = r#"case "$input" in */scenarios/deep/a.xosc) ;; *) exit 4;; esac
         cmp "${input%/*}/../../maps/m.xodr" "REAL/maps/m.xodr" || exit 5
         polite"#;
@@ -496,7 +496,7 @@ fn a_scenario_comes_with_what_it_refers_to() {
 }
 
 #[test]
-fn a_one_shot_module_can_be_a_shadow() {
+fn shadow_can_be_a_one_shot_module() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     let program = farm.base().join("qc_guest");
@@ -530,7 +530,7 @@ fn a_one_shot_module_can_be_a_shadow() {
 
 /// A module that reads only plain files must not reject a good file because it is packed.
 #[test]
-fn a_packed_map_is_handed_over_unpacked_and_its_findings_name_it() {
+fn packed_map_is_handed_over_unpacked() {
     let script = r#"grep -q "<OpenDRIVE" "$input" || exit 3
         { begin; checker one completed "$(issue 2 "odd in $input")"; checker two completed; end; } > "$result""#;
     let table = Table::with(script, "guest", &serde_json::Value::Null);
@@ -558,7 +558,7 @@ mkdir more; echo "$(value lines)" > more/x.txt
 "#;
 
 #[test]
-fn a_report_module_is_run_after_every_result_and_takes_back_what_it_said() {
+fn report_module_follows_every_result_and_removal() {
     let mut farm = Farm::new();
     let config = farm.base().join("config.xml");
     let text = "<Config><CheckerBundle application=\"xodrBundle\"/><ReportModule application=\"guestReport\">\
@@ -597,7 +597,7 @@ fn a_report_module_is_run_after_every_result_and_takes_back_what_it_said() {
 }
 
 #[test]
-fn a_report_module_that_fails_is_told_and_holds_up_nobody() {
+fn failing_report_module_is_reported_and_delays_no_verdict() {
     let farm = Farm::new();
     let_report_in(&farm, "echo oh no >&2; exit 7");
     let _broker = farm.serve_ready();

@@ -175,8 +175,8 @@ fn differences(cli: &Cli, module: &Module, input: &Path) -> Vec<String> {
 }
 
 #[test]
-fn hosted_modules_say_what_they_say_by_themselves() {
-    let test = "hosted_modules_say_what_they_say_by_themselves";
+fn hosted_modules_agree_with_their_standalone_runs() {
+    let test = "hosted_modules_agree_with_their_standalone_runs";
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/cases/asam");
     if !cases.is_dir() {
         return skip(test, "there is no ../shared/cases/asam");

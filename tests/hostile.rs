@@ -68,12 +68,12 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn empty_file() {
+fn empty_file_is_rejected() {
     hostile("x.xodr", "", "the file is empty", (1, 1));
 }
 
 #[test]
-fn a_directory_named_like_a_file() {
+fn directory_with_a_map_name_is_searched_for_files() {
     let cli = Cli::new();
     cli.write("in/good.xodr", Content::Good(1).bytes());
     cli.write("in/x.xodr/inner.xodr", Content::NoHeader(2).bytes());
@@ -93,20 +93,20 @@ fn a_directory_named_like_a_file() {
 }
 
 #[test]
-fn two_hundred_megabytes_of_open_tags() {
+fn two_hundred_megabytes_of_open_tags_are_rejected() {
     let mut text = XML.to_owned();
     text.push_str(&"<a>".repeat((200 << 20) / 3));
     hostile("x.xodr", text, "1024", (2, 1 + 3 * 1024));
 }
 
 #[test]
-fn a_hundred_thousand_nested_elements() {
+fn deeply_nested_elements_are_rejected() {
     let (open, close) = ("<a>\n".repeat(100_000), "</a>".repeat(100_000));
     hostile("x.xosc", format!("{open}{close}"), "1024", (1025, 1));
 }
 
 #[test]
-fn entity_bomb() {
+fn entity_bomb_is_rejected() {
     let text = format!(
         "{XML}<!DOCTYPE bomb [<!ENTITY a \"ha\"><!ENTITY b \"&a;&a;&a;&a;&a;&a;&a;&a;\">\
          <!ENTITY c \"&b;&b;&b;&b;&b;&b;&b;&b;\">]>\n<OpenDRIVE>&c;</OpenDRIVE>\n"
@@ -115,7 +115,7 @@ fn entity_bomb() {
 }
 
 #[test]
-fn external_entity() {
+fn external_entity_is_rejected() {
     let text = format!(
         "{XML}<!DOCTYPE x [<!ENTITY secret SYSTEM \"file:///etc/passwd\">]>\n\
          <OpenDRIVE><header name=\"&secret;\"/></OpenDRIVE>\n"
@@ -128,7 +128,7 @@ fn external_entity() {
 }
 
 #[test]
-fn gzip_bomb() {
+fn gzip_bomb_is_rejected() {
     hostile(
         "x.xodrz",
         gzip(&vec![b' '; 16 << 20]),
@@ -138,26 +138,26 @@ fn gzip_bomb() {
 }
 
 #[test]
-fn truncated_gzip() {
+fn truncated_gzip_is_rejected() {
     let whole = gzip(&Content::Good(1).bytes());
     hostile("x.xodr.gz", &whole[..whole.len() / 2], "gzip", (1, 1));
 }
 
 #[test]
-fn wrong_encoding_declaration() {
+fn wrong_encoding_declaration_is_rejected() {
     // The file declares UTF-16 but is not encoded in it.
     let text = "<?xml version=\"1.0\" encoding=\"UTF-16\"?>\n<OpenDRIVE/>\n";
     hostile("x.xodr", text, "UTF-16", (1, 31));
 }
 
 #[test]
-fn unknown_encoding() {
+fn unknown_encoding_is_rejected() {
     let text = "<?xml version=\"1.0\" encoding=\"KLINGON\"?>\n<OpenDRIVE/>\n";
     hostile("x.xodr", text, "KLINGON", (1, 31));
 }
 
 #[test]
-fn invalid_utf_8() {
+fn invalid_utf_8_is_rejected() {
     let mut bytes = format!("{XML}<OpenDRIVE>\n<header name=\"M").into_bytes();
     bytes.push(0xfc);
     bytes.extend(b"hle\"/></OpenDRIVE>\n");
@@ -165,7 +165,7 @@ fn invalid_utf_8() {
 }
 
 #[test]
-fn nul_bytes() {
+fn nul_bytes_are_rejected() {
     hostile(
         "x.xodr",
         format!("{XML}<OpenDRIVE>\n  \0</OpenDRIVE>\n"),
@@ -175,12 +175,12 @@ fn nul_bytes() {
 }
 
 #[test]
-fn nothing_but_nul_bytes() {
+fn file_of_only_nul_bytes_is_rejected() {
     hostile("x.xodr", [0; 4096], "U+0000", (1, 1));
 }
 
 #[test]
-fn two_roots() {
+fn second_root_is_rejected() {
     hostile(
         "x.xodr",
         format!("{XML}<OpenDRIVE/>\n<OpenDRIVE/>\n"),
@@ -190,7 +190,7 @@ fn two_roots() {
 }
 
 #[test]
-fn text_after_the_root() {
+fn text_after_the_root_is_rejected() {
     hostile(
         "x.xodr",
         format!("{XML}<OpenDRIVE/>\nthe end"),
@@ -200,7 +200,7 @@ fn text_after_the_root() {
 }
 
 #[test]
-fn include_cycle() {
+fn include_cycle_is_rejected() {
     let cli = Cli::new();
     let include = |file: &str| format!("<OpenDRIVE>\n<include file=\"{file}\"/>\n</OpenDRIVE>\n");
     cli.write("in/x.xodr", include("one.xml"));
@@ -211,7 +211,7 @@ fn include_cycle() {
 }
 
 #[test]
-fn include_outside_the_root() {
+fn include_outside_the_root_is_rejected() {
     let cli = Cli::new();
     cli.write("secret.xml", "<OpenDRIVE><road id=\"secret\"/></OpenDRIVE>");
     cli.write(
@@ -222,7 +222,7 @@ fn include_outside_the_root() {
 }
 
 #[test]
-fn something_that_never_ends_its_answer() {
+fn pipe_is_refused_without_waiting() {
     // A pipe without a writer: opening it waits for ever.
     let cli = Cli::new();
     cli.write("in/good.xodr", Content::Good(1).bytes());
@@ -230,7 +230,7 @@ fn something_that_never_ends_its_answer() {
         .arg(cli.path().join("in/x.xodr"))
         .status();
     if !status.is_ok_and(|it| it.success()) {
-        return skip("something_that_never_ends_its_answer", "there is no mkfifo");
+        return skip("pipe_is_refused_without_waiting", "there is no mkfifo");
     }
     let said = cli.qcbus(&["check", "in", "-v", "--out", "out"]);
     assert_eq!(said.code, Some(3), "{}", said.whole(&cli));
@@ -241,14 +241,17 @@ fn something_that_never_ends_its_answer() {
 }
 
 #[test]
-fn unreadable_file() {
+fn unreadable_file_does_not_affect_other_files() {
     use std::os::unix::fs::PermissionsExt as _;
     let cli = Cli::new();
     let file = cli.write("in/x.xodr", Content::Good(2).bytes());
     cli.write("in/good.xodr", Content::Good(1).bytes());
     std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o000)).unwrap();
     if std::fs::read(&file).is_ok() {
-        return skip("unreadable_file", "this user may read everything");
+        return skip(
+            "unreadable_file_does_not_affect_other_files",
+            "this user may read everything",
+        );
     }
     let said = cli.qcbus(&["check", "in", "-v", "--out", "out"]);
     assert!(said.code.is_some_and(|it| it != 0), "{}", said.whole(&cli));
@@ -291,7 +294,7 @@ fn many_attributes() -> Vec<u8> {
 }
 
 #[test]
-fn a_broker_outlives_all_of_them_at_once() {
+fn broker_survives_all_hostile_files_at_once() {
     let farm = Farm::new();
     let mut broker = farm.serve_ready();
     let bundles = |farm: &Farm| -> Vec<u32> {
@@ -321,7 +324,7 @@ fn a_broker_outlives_all_of_them_at_once() {
 }
 
 #[test]
-fn files_removed_while_they_are_read() {
+fn files_removed_while_being_read_do_no_harm() {
     let farm = Farm::new();
     let mut broker = farm.serve_ready();
     // The map is large enough to be in work for a while.
@@ -380,7 +383,7 @@ fn long_name(length: usize) -> String {
 }
 
 #[test]
-fn a_name_too_long_for_a_result_holds_up_nobody() {
+fn too_long_name_is_undetermined_and_delays_no_other() {
     let farm = Farm::new();
     let mut broker = farm.serve_ready();
     let long = long_name(255);
@@ -416,7 +419,7 @@ fn a_name_too_long_for_a_result_holds_up_nobody() {
 }
 
 #[test]
-fn a_directory_where_the_result_belongs_holds_up_nobody() {
+fn directory_in_place_of_a_result_delays_no_other() {
     let farm = Farm::new();
     let in_the_way = farm.out().join("a.xodr.xqar");
     std::fs::create_dir_all(&in_the_way).unwrap();
@@ -434,7 +437,7 @@ fn a_directory_where_the_result_belongs_holds_up_nobody() {
 }
 
 #[test]
-fn a_check_ends_when_its_result_cannot_be_written() {
+fn check_ends_when_its_result_cannot_be_written() {
     let cli = Cli::new();
     let long = long_name(251);
     cli.write(&format!("in/{long}"), Content::Good(1).bytes());
@@ -453,7 +456,7 @@ fn a_check_ends_when_its_result_cannot_be_written() {
 }
 
 #[test]
-fn a_check_begins_nothing_where_no_result_can_be_written() {
+fn check_does_not_start_where_results_are_unwritable() {
     let cli = Cli::new();
     cli.write("file", "");
     cli.write("in/a.xodr", Content::Good(1).bytes());
@@ -461,7 +464,7 @@ fn a_check_begins_nothing_where_no_result_can_be_written() {
     assert_eq!(said.code, Some(2), "{}", said.whole(&cli));
     assert_eq!(
         cli.tidy(&said.stderr),
-        "error: cannot write results into [DESK]/file/x: [DESK]/file: Not a directory (os error \
+        "error: cannot write results into [DIR]/file/x: [DIR]/file: Not a directory (os error \
          20); choose another directory with --out\n"
     );
 }

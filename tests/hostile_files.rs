@@ -36,7 +36,7 @@ fn is_judged(farm: &Farm, name: &str, content: &Content) {
 }
 
 #[test]
-fn files_that_turn_into_pipes_hold_up_nobody() {
+fn files_that_become_pipes_delay_no_other() {
     const NAMES: usize = 16;
     const ROUNDS: usize = 150;
     let farm = Farm::new();
@@ -83,7 +83,7 @@ fn files_that_turn_into_pipes_hold_up_nobody() {
 
 /// A map disappears and becomes a pipe. That is not a missing map, and the author is told.
 #[test]
-fn a_map_that_becomes_a_pipe_is_not_said_to_be_missing() {
+fn map_that_becomes_a_pipe_is_not_reported_missing() {
     let farm = Farm::new();
     let mut broker = farm.serve_ready();
     std::fs::create_dir(farm.root().join("catalogs")).unwrap();
@@ -110,7 +110,7 @@ fn a_map_that_becomes_a_pipe_is_not_said_to_be_missing() {
 
 /// A client that waits for an impossible verdict gets the reason at once.
 #[test]
-fn who_waits_for_what_is_no_file_is_told_so() {
+fn waiting_for_a_special_file_gives_the_reason() {
     let farm = Farm::new();
     let mut broker = farm.serve_ready();
     let at = |name: &str| farm.root().join(name);
@@ -140,7 +140,7 @@ fn who_waits_for_what_is_no_file_is_told_so() {
 }
 
 #[test]
-fn maps_that_the_kernel_makes_up_hold_up_nobody() {
+fn kernel_files_as_maps_delay_no_other() {
     let farm = Farm::new();
     let mut broker = farm.serve_ready();
     let maps = ["/proc/kmsg", "/dev/zero", "/dev/tty", "/proc/self/maps"];
@@ -177,7 +177,7 @@ fn lease(file: &File) -> bool {
 }
 
 #[test]
-fn leases_hold_up_nobody() {
+fn leased_files_delay_no_other() {
     // The kernel requests the lease back by this signal, which would end the process.
     #[expect(unsafe_code, reason = "no other call keeps the default action away")]
     // SAFETY: no function is called when the signal arrives.
@@ -195,7 +195,7 @@ fn leases_hold_up_nobody() {
         if !lease(&file) {
             let why = std::io::Error::last_os_error();
             return skip(
-                "leases_hold_up_nobody",
+                "leased_files_delay_no_other",
                 &format!("no lease is given: {why}"),
             );
         }
@@ -231,7 +231,7 @@ fn leases_hold_up_nobody() {
 /// A process of the same user was stopped at the wrong moment, for instance in a debugger. It holds
 /// the lock that serializes the allocation of shared memory.
 #[test]
-fn a_stopped_process_keeps_no_bundle_of_others_from_joining() {
+fn stopped_process_does_not_keep_bundles_from_joining() {
     let farm = Farm::new();
     let runtime = farm.base().join("runtime");
     std::fs::create_dir_all(runtime.join("qcbus")).unwrap();
@@ -250,7 +250,7 @@ fn a_stopped_process_keeps_no_bundle_of_others_from_joining() {
 }
 
 #[test]
-fn few_descriptors_are_said_and_enough_for_every_file() {
+fn low_descriptor_limit_is_reported_and_sufficient() {
     let farm = Farm::new();
     let serve = farm.serve_command();
     let mut limited = Command::new("sh");
@@ -280,12 +280,12 @@ fn clock(farm: &Farm) -> Option<PathBuf> {
         Ok(built) => String::from_utf8_lossy(&built.stderr).into_owned(),
         Err(error) => error.to_string(),
     };
-    skip("a_clock_that_jumps_costs_no_verdict", &why);
+    skip("clock_jumps_cost_no_verdict", &why);
     None
 }
 
 #[test]
-fn a_clock_that_jumps_costs_no_verdict() {
+fn clock_jumps_cost_no_verdict() {
     const YEAR: i64 = 366 * 24 * 3600;
     let farm = Farm::new();
     let Some(library) = clock(&farm) else { return };

@@ -136,7 +136,7 @@ fn allowed(name: &str) -> Option<BTreeSet<&'static str>> {
 }
 
 #[test]
-fn nobody_links_what_they_may_not_know() {
+fn crates_link_only_allowed_crates() {
     let metadata = metadata();
     let ours: BTreeSet<&str> = metadata.packages.iter().map(|p| p.name.as_str()).collect();
     let mut wrong = Vec::new();
@@ -162,7 +162,7 @@ fn nobody_links_what_they_may_not_know() {
 }
 
 #[test]
-fn every_crate_of_the_table_is_there() {
+fn every_crate_is_in_the_table() {
     let metadata = metadata();
     let is_reporter = |name: &&str| name.starts_with(A_REPORTER);
     let names = metadata.packages.iter().map(|p| p.name.as_str());
@@ -172,7 +172,7 @@ fn every_crate_of_the_table_is_there() {
 }
 
 #[test]
-fn fenced_crates_are_linked_and_named_by_few() {
+fn sandboxed_crates_are_used_only_where_allowed() {
     let metadata = metadata();
     let mut wrong = Vec::new();
     for (sandboxed, friends) in SANDBOXED {
@@ -196,7 +196,7 @@ fn fenced_crates_are_linked_and_named_by_few() {
 }
 
 #[test]
-fn the_codec_is_the_one_file_that_names_its_encoding() {
+fn only_the_codec_names_its_encoding() {
     let named = sources(&root().join("idl/messages"))
         .into_iter()
         .filter(|(_, text)| code(text).any(|(_, line)| line.contains("bincode::")))
@@ -206,7 +206,7 @@ fn the_codec_is_the_one_file_that_names_its_encoding() {
 }
 
 #[test]
-fn the_lints_of_the_workspace_hold_for_every_crate() {
+fn every_crate_uses_the_workspace_lints() {
     for package in metadata().packages {
         let manifest = std::fs::read_to_string(&package.manifest_path).unwrap();
         assert!(
@@ -218,7 +218,7 @@ fn the_lints_of_the_workspace_hold_for_every_crate() {
 }
 
 #[test]
-fn no_file_is_longer_than_a_head_holds() {
+fn no_file_exceeds_the_line_limit() {
     let long: BTreeMap<PathBuf, usize> = sources(&root())
         .into_iter()
         .map(|(file, text)| (file, text.lines().count()))
@@ -228,7 +228,7 @@ fn no_file_is_longer_than_a_head_holds() {
 }
 
 #[test]
-fn no_test_is_switched_off() {
+fn no_test_is_ignored() {
     let off = ["#[ignore", ", ignore"].map(str::to_owned);
     let mut wrong = Vec::new();
     for (file, text) in sources(&root()) {
@@ -244,7 +244,7 @@ fn no_test_is_switched_off() {
 }
 
 #[test]
-fn no_file_knows_the_machine_it_was_written_on() {
+fn no_file_contains_a_local_path() {
     // The paths are split, so that this file does not match itself.
     let homes = [["/wo", "rk/"], ["/ro", "ot/"]].map(|halves| halves.concat());
     let mut wrong = Vec::new();

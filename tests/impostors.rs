@@ -70,7 +70,7 @@ fn hello(name: &str, pid: u32, launch: Option<u64>) -> Hello {
 }
 
 #[tokio::test]
-async fn the_bundle_of_another_instance_is_not_killed_for_a_lie() {
+async fn bundle_of_another_instance_is_not_killed() {
     let (here, elsewhere) = (Farm::new(), Farm::new());
     let _brokers = [here.serve_ready(), elsewhere.serve_ready()];
     let victim = bundle_of(&elsewhere);
@@ -123,7 +123,7 @@ impl Drop for Impostor {
 }
 
 #[test]
-fn nobody_takes_the_place_of_a_standard_bundle() {
+fn impostor_cannot_replace_a_standard_bundle() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     farm.write("bad.xodr", &Content::NoHeader(1).bytes());
@@ -149,7 +149,7 @@ fn nobody_takes_the_place_of_a_standard_bundle() {
 }
 
 #[test]
-fn a_child_joins_under_the_name_of_its_manifest_only() {
+fn child_joins_only_under_its_manifest_name() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     // This bundle comes from a manifest and claims to be a standard bundle.
@@ -161,7 +161,7 @@ fn a_child_joins_under_the_name_of_its_manifest_only() {
 }
 
 #[test]
-fn who_proves_nothing_does_not_judge() {
+fn process_without_proof_does_not_judge() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     let mut stranger = Impostor::start(&farm, "proves_nothing", "proves_nothing", &[]);

@@ -60,7 +60,7 @@ fn is_complete(farm: &Farm, name: &str, bundle: &str) -> bool {
 }
 
 #[test]
-fn a_standard_bundle_that_is_killed_in_a_job_does_it_again() {
+fn killed_standard_bundle_repeats_its_job() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     let first = peer(&farm, "xodrBundle", |it| it.state == "ready");
@@ -85,7 +85,7 @@ fn a_standard_bundle_that_is_killed_in_a_job_does_it_again() {
 }
 
 #[test]
-fn a_slow_bundle_is_killed_again_and_again_and_every_job_is_complete() {
+fn repeatedly_killed_bundle_completes_every_job() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     farm.let_in("slow", "--millis 300");
@@ -128,7 +128,7 @@ impl Drop for StartedManually {
 }
 
 #[test]
-fn a_bundle_that_nobody_starts_again_leaves_errors_behind_until_it_is_back() {
+fn bundle_not_restarted_leaves_errors_until_it_is_back() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     // The bundle never finishes a job, so it is killed in the middle of one.
@@ -217,7 +217,7 @@ fn has_gone(farm: &Farm, frozen: &PeerStatus) {
 }
 
 #[test]
-fn what_hung_when_its_broker_was_killed_is_killed_by_the_next() {
+fn hanging_stale_child_is_killed_by_the_next_broker() {
     let farm = Farm::new();
     let (frozen, launcher) = frozen(&farm);
     farm.send_away("hangs_after_hello");
@@ -231,7 +231,7 @@ fn what_hung_when_its_broker_was_killed_is_killed_by_the_next() {
 }
 
 #[test]
-fn what_hung_when_its_broker_was_killed_does_not_outlive_the_next() {
+fn hanging_stale_child_does_not_outlive_the_next_broker() {
     let farm = Farm::new();
     let (frozen, _) = frozen(&farm);
     let _broker = farm.serve_ready();
@@ -241,7 +241,7 @@ fn what_hung_when_its_broker_was_killed_does_not_outlive_the_next() {
 
 /// A cleanup after a crash removes the only directory that knew of the shared memory.
 #[test]
-fn shared_memory_that_nobody_knows_of_any_more_is_given_back() {
+fn forgotten_shared_memory_is_released() {
     let (farm, other) = (Farm::new(), Farm::new());
     let mut broker = farm.serve_ready();
     let _alive = other.serve_ready();

@@ -93,7 +93,7 @@ fn wait_for_state(farm: &Farm, bundle: &str, ready: bool) {
 }
 
 #[test]
-fn a_bundle_joins_by_hand_and_leaves_at_a_signal() {
+fn manually_started_bundle_joins_and_leaves_at_a_signal() {
     let farm = Farm::new();
     let broker = farm.serve_ready();
     let generation = farm.status().unwrap().generation;
@@ -116,7 +116,7 @@ fn a_bundle_joins_by_hand_and_leaves_at_a_signal() {
 }
 
 #[test]
-fn an_interrupt_is_a_good_bye_too() {
+fn interrupted_bundle_leaves_cleanly() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     let mut bundle = StartedManually::start(&farm, &["polite", "--name", "second"]);
@@ -129,7 +129,7 @@ fn an_interrupt_is_a_good_bye_too() {
 }
 
 #[test]
-fn bundle_add_and_remove_do_the_same_for_a_supervised_one() {
+fn bundle_add_and_remove_work_for_a_supervised_bundle() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     let zoo = zoo();
@@ -161,7 +161,7 @@ fn bundle_add_and_remove_do_the_same_for_a_supervised_one() {
 }
 
 #[test]
-fn a_bundle_that_joined_by_hand_and_is_gone_for_good_is_removed_by_name() {
+fn lost_manually_started_bundle_is_removed_by_name() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     let bundle = StartedManually::start(&farm, &["polite"]);
@@ -180,7 +180,7 @@ fn a_bundle_that_joined_by_hand_and_is_gone_for_good_is_removed_by_name() {
 }
 
 #[test]
-fn what_was_judged_before_a_bundle_came_is_judged_again_with_it() {
+fn earlier_files_are_judged_again_with_a_new_bundle() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     checkers_of(&farm, "polite", 1);

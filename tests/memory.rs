@@ -103,8 +103,8 @@ fn fill(mib: u64) {
 }
 
 #[test]
-fn a_map_that_never_fits_is_undetermined_at_once() {
-    with_memory("a_map_that_never_fits_is_undetermined_at_once", 32, || {
+fn map_that_never_fits_is_undetermined_at_once() {
+    with_memory("map_that_never_fits_is_undetermined_at_once", 32, || {
         let place = Place::new();
         place.write("large.xodr", &dense(10_000_000));
         place.write("small.xodr", &Content::Good(1).bytes());
@@ -120,8 +120,8 @@ fn a_map_that_never_fits_is_undetermined_at_once() {
 /// The image of this map was once refused. The reasons were an estimate of its size, and a quarter
 /// of the memory that was kept free.
 #[test]
-fn a_map_that_just_fits_is_checked() {
-    with_memory("a_map_that_just_fits_is_checked", 64, || {
+fn map_that_just_fits_is_checked() {
+    with_memory("map_that_just_fits_is_checked", 64, || {
         let place = Place::new();
         place.write("map.xodr", &dense(11_000_000));
         let (code, said) = place.run(&["check", "map.xodr", "-v", "--out", "out"]);
@@ -131,8 +131,8 @@ fn a_map_that_just_fits_is_checked() {
 }
 
 #[test]
-fn what_may_fit_later_is_waited_for_with_a_bound() {
-    with_memory("what_may_fit_later_is_waited_for_with_a_bound", 64, || {
+fn map_that_may_fit_later_waits_for_limited_time() {
+    with_memory("map_that_may_fit_later_waits_for_limited_time", 64, || {
         let place = Place::new();
         place.write("map.xodr", &dense(5_000_000));
         fill(40);
@@ -166,9 +166,9 @@ fn what_may_fit_later_is_waited_for_with_a_bound() {
 }
 
 #[test]
-fn many_checks_at_once_in_a_small_memory_all_end_with_a_verdict() {
+fn concurrent_checks_in_small_memory_all_get_a_verdict() {
     with_memory(
-        "many_checks_at_once_in_a_small_memory_all_end_with_a_verdict",
+        "concurrent_checks_in_small_memory_all_get_a_verdict",
         16,
         || {
             let place = Place::new();
@@ -201,9 +201,9 @@ fn ignores_hangups() -> bool {
 }
 
 #[test]
-fn a_check_that_is_ended_by_a_signal_says_what_it_did_not_look_at() {
+fn check_ended_by_a_signal_names_the_unchecked_files() {
     with_memory(
-        "a_check_that_is_ended_by_a_signal_says_what_it_did_not_look_at",
+        "check_ended_by_a_signal_names_the_unchecked_files",
         64,
         || {
             let place = Place::new();
@@ -246,7 +246,7 @@ fn a_check_that_is_ended_by_a_signal_says_what_it_did_not_look_at() {
 }
 
 #[test]
-fn the_page_for_operators_says_how_much_is_taken() {
+fn operator_page_states_the_memory_use() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reliability.md");
     let page = std::fs::read_to_string(page).unwrap();
     let page = page.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -275,7 +275,7 @@ fn the_page_for_operators_says_how_much_is_taken() {
 }
 
 #[test]
-fn a_low_limit_of_addresses_is_said_or_enough() {
+fn low_address_limit_is_reported_or_sufficient() {
     let place = Place::new();
     place.write("a.xodr", &Content::Good(1).bytes());
     let limited = |bytes: u64, arguments: &[&str]| {
@@ -317,7 +317,7 @@ fn a_low_limit_of_addresses_is_said_or_enough() {
 }
 
 #[test]
-fn a_killed_check_leaves_nothing_that_the_next_does_not_remove() {
+fn leftovers_of_a_killed_check_are_removed_later() {
     let place = Place::new();
     place.write("a.xodr", &Content::Good(1).bytes());
     let private = || {

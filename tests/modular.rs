@@ -47,7 +47,7 @@ fn files(cli: &Cli) -> Vec<PathBuf> {
 }
 
 #[test]
-fn what_is_packed_expands_to_the_same() {
+fn packed_scenario_expands_to_the_same_text() {
     let cli = cli();
     let said = cli.qcbus(&["expand", MAIN]);
     assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
@@ -79,7 +79,7 @@ fn what_is_packed_expands_to_the_same() {
 }
 
 #[test]
-fn nothing_is_written_but_what_was_asked_for() {
+fn expand_writes_only_the_requested_file() {
     let cli = cli();
     let before = files(&cli);
     let said = cli.qcbus(&["expand", MAIN, "-o", "plain.xosc"]);
@@ -112,7 +112,7 @@ fn nothing_is_written_but_what_was_asked_for() {
 }
 
 #[test]
-fn what_a_scenario_is_made_of_is_not_overwritten() {
+fn inputs_of_a_scenario_are_not_overwritten() {
     let cli = cli();
     cli.write(PACKED, sample(PACKED));
     for (file, output) in [(MAIN, MAIN), (MAIN, LIBRARY), (PACKED, PACKED)] {
@@ -128,7 +128,7 @@ fn what_a_scenario_is_made_of_is_not_overwritten() {
 }
 
 #[test]
-fn what_cannot_be_packed_leaves_nothing_behind() {
+fn failed_packing_leaves_nothing_behind() {
     let cli = cli();
     cli.write("other/moves.xosc", sample(LIBRARY));
     let before = files(&cli);
@@ -154,7 +154,7 @@ fn what_cannot_be_packed_leaves_nothing_behind() {
 }
 
 #[test]
-fn many_at_once_do_not_disturb_each_other() {
+fn concurrent_expansions_do_not_disturb_each_other() {
     let cli = cli();
     cli.write(PACKED, sample(PACKED));
     let start = |number: usize| {
@@ -204,7 +204,7 @@ fn becomes(farm: &Farm, name: &str, verdict: &str, part: &str) {
 }
 
 #[test]
-fn a_library_that_changes_has_its_users_judged_again() {
+fn scenarios_are_judged_again_when_their_library_changes() {
     let farm = farm();
     let _broker = farm.serve_ready();
     farm.write(LIBRARY, &sample(LIBRARY));
@@ -236,7 +236,7 @@ fn a_library_that_changes_has_its_users_judged_again() {
 }
 
 #[test]
-fn findings_name_the_file_that_has_the_fault() {
+fn findings_name_the_faulty_file() {
     let farm = farm();
     let _broker = farm.serve_ready();
     let faulty = text(LIBRARY).replace(
@@ -285,7 +285,7 @@ fn serve_with(farm: &Farm, search: &Path) -> support::broker::Broker {
 }
 
 #[test]
-fn a_library_on_the_search_path_counts_wherever_it_lies() {
+fn library_on_the_search_path_counts_outside_the_farm() {
     let farm = farm();
     let library = farm.base().join("library");
     std::fs::create_dir(&library).unwrap();
@@ -307,7 +307,7 @@ fn a_library_on_the_search_path_counts_wherever_it_lies() {
 }
 
 #[test]
-fn the_search_path_of_the_configuration_is_taken_up_by_a_reload() {
+fn reload_applies_the_configured_search_path() {
     let mut farm = farm();
     let library = farm.base().join("library");
     std::fs::create_dir(&library).unwrap();
@@ -337,7 +337,7 @@ fn the_search_path_of_the_configuration_is_taken_up_by_a_reload() {
 }
 
 #[test]
-fn a_scenario_that_cannot_be_expanded_is_not_accepted_whoever_is_asked() {
+fn scenario_that_cannot_be_expanded_is_never_accepted() {
     let cli = cli();
     let tied = "<ParameterReference key=\"AbsoluteTargetSpeed.value\" value=\"8\"/>";
     let two = format!("{tied}{}", tied.replace("\"8\"", "\"9\""));
@@ -353,7 +353,7 @@ fn a_scenario_that_cannot_be_expanded_is_not_accepted_whoever_is_asked() {
 }
 
 #[test]
-fn a_library_that_cannot_be_read_is_not_passed_over() {
+fn unreadable_library_is_not_skipped() {
     let cli = cli();
     std::fs::remove_file(cli.path().join(LIBRARY)).unwrap();
     std::fs::create_dir(cli.path().join(LIBRARY)).unwrap();
@@ -369,11 +369,11 @@ fn a_library_that_cannot_be_read_is_not_passed_over() {
 }
 
 #[test]
-fn a_scenario_that_is_lost_on_its_way_out_is_no_success() {
+fn lost_expansion_output_is_not_a_success() {
     let cli = cli();
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full");
     let Ok(full) = full else {
-        let test = "a_scenario_that_is_lost_on_its_way_out_is_no_success";
+        let test = "lost_expansion_output_is_not_a_success";
         return skip(test, "there is no /dev/full");
     };
     let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));

@@ -28,7 +28,7 @@ fn last_line(said: &Said) -> &str {
 }
 
 #[test]
-fn of_one_file_everything_is_shown_and_of_several_a_line_each() {
+fn single_file_is_shown_in_full_several_in_lines() {
     let cli = cli();
     let one = cli.qcbus(&["check", "in/bad.xodr"]);
     assert!(
@@ -61,7 +61,7 @@ fn of_one_file_everything_is_shown_and_of_several_a_line_each() {
 }
 
 #[test]
-fn a_line_for_programs_is_found_by_a_problem_matcher() {
+fn concise_lines_match_a_problem_matcher() {
     let cli = cli();
     let said = cli.qcbus(&["check", "in", "--output-format", "concise", "-q"]);
     for line in said.stdout.lines() {
@@ -87,7 +87,7 @@ fn a_line_for_programs_is_found_by_a_problem_matcher() {
 }
 
 #[test]
-fn paths_are_those_from_here() {
+fn paths_are_relative_to_the_current_directory() {
     let cli = cli();
     let absolute = cli.path().canonicalize().unwrap().join("in/bad.xodr");
     let said = cli.qcbus(&["check", &absolute.to_string_lossy(), "--format", "concise"]);
@@ -99,7 +99,7 @@ fn paths_are_those_from_here() {
 }
 
 #[test]
-fn several_formats_go_to_a_file_each() {
+fn several_formats_are_written_to_separate_files() {
     let cli = cli();
     let formats = "sarif=r/all.sarif,junit=r/all.xml,gitlab=r/all.json,json=r/lines.json,\
                    concise=r/all.txt,html=r/all.html,github";
@@ -130,7 +130,7 @@ fn several_formats_go_to_a_file_each() {
 }
 
 #[test]
-fn a_page_of_one_file_stands_alone() {
+fn page_of_a_single_file_needs_no_other_pages() {
     let cli = cli();
     let said = cli.qcbus(&["check", "in/bad.xodr", "--output-format", "html"]);
     assert_eq!(said.code, Some(1));
@@ -144,7 +144,7 @@ fn a_page_of_one_file_stands_alone() {
 }
 
 #[test]
-fn what_cannot_be_written_is_said_before_anything_is_checked() {
+fn unwritable_output_is_reported_before_any_check() {
     let cli = cli();
     cli.write("file", "");
     for (format, words) in [
@@ -163,7 +163,7 @@ fn what_cannot_be_written_is_said_before_anything_is_checked() {
 }
 
 #[test]
-fn what_is_left_out_is_said_and_the_result_says_so() {
+fn ignored_rules_are_named_in_output_and_result() {
     let cli = Cli::new();
     let (farm, file) = (sample_farm(), "faulty/dangling_links.xodr");
     let rule = "ids.only_ref_defined_ids";
@@ -185,7 +185,7 @@ fn what_is_left_out_is_said_and_the_result_says_so() {
 }
 
 #[test]
-fn to_select_asks_nobody_else() {
+fn select_runs_only_the_selected_rules() {
     let cli = cli();
     let said = cli.qcbus(&["check", "in/good.xodr", "--select", "ids"]);
     assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
@@ -197,14 +197,14 @@ fn to_select_asks_nobody_else() {
 }
 
 #[test]
-fn where_nobody_is_asked_nothing_is_accepted() {
+fn check_without_a_selected_rule_accepts_nothing() {
     let cli = cli();
     let said = cli.qcbus(&["check", "in/good.xodr", "--select", "xosc"]);
     assert_eq!(said.code, Some(3), "{}", said.whole(&cli));
 }
 
 #[test]
-fn what_something_rests_on_cannot_be_ignored_away() {
+fn preconditions_cannot_be_ignored() {
     let cli = cli();
     cli.write("torn.xodr", "<OpenDRIVE><road>");
     let said = cli.qcbus(&["check", "torn.xodr", "--ignore", "xml.valid_xml_document"]);
@@ -212,7 +212,7 @@ fn what_something_rests_on_cannot_be_ignored_away() {
 }
 
 #[test]
-fn a_name_that_fits_nothing_is_a_mistake() {
+fn unknown_rule_name_is_an_error() {
     let cli = cli();
     for flag in ["--select", "--ignore"] {
         let said = cli.qcbus(&["check", "in", flag, "ids,xml.fileheader_is_presnt"]);
@@ -227,7 +227,7 @@ fn a_name_that_fits_nothing_is_a_mistake() {
 }
 
 #[test]
-fn the_exit_code_is_what_somebody_wants_of_it() {
+fn exit_code_follows_the_options() {
     let cli = cli();
     let farm = sample_farm();
     let convoy = "modular/convoy.xosc";
@@ -251,7 +251,7 @@ fn the_exit_code_is_what_somebody_wants_of_it() {
 }
 
 #[test]
-fn quiet_loses_no_finding() {
+fn quiet_output_keeps_every_finding() {
     let cli = cli();
     let loud = cli.qcbus(&["check", "in", "--format", "concise"]);
     let quiet = cli.qcbus(&["check", "in", "--format", "concise", "-q"]);
@@ -262,7 +262,7 @@ fn quiet_loses_no_finding() {
 }
 
 #[test]
-fn verbose_says_what_was_skipped_and_why() {
+fn verbose_output_explains_skipped_checkers() {
     let cli = cli();
     let said = cli.qcbus(&["check", "in", "-v"]);
     for words in [
@@ -278,7 +278,7 @@ fn verbose_says_what_was_skipped_and_why() {
 }
 
 #[test]
-fn colours_are_there_when_they_are_wanted() {
+fn colours_follow_the_option() {
     let cli = cli();
     let coloured = |when: &str| {
         let said = cli.qcbus(&["check", "in", "--color", when]);
@@ -290,7 +290,7 @@ fn colours_are_there_when_they_are_wanted() {
 }
 
 #[test]
-fn two_inputs_of_one_name_have_a_result_each() {
+fn inputs_with_the_same_name_get_separate_results() {
     let cli = cli();
     cli.write("a/m.xodr", Content::Good(1).bytes());
     cli.write("b/m.xodr", Content::NoHeader(1).bytes());
@@ -306,7 +306,7 @@ fn two_inputs_of_one_name_have_a_result_each() {
 }
 
 #[test]
-fn of_many_files_the_end_says_what_to_mend_first() {
+fn summary_of_many_files_names_what_to_fix_first() {
     let cli = Cli::new();
     for number in 0..300 {
         let content = match number % 5 {
@@ -333,7 +333,7 @@ fn of_many_files_the_end_says_what_to_mend_first() {
 }
 
 #[test]
-fn a_report_is_made_of_results_that_are_there() {
+fn report_is_made_from_existing_results() {
     let cli = cli();
     cli.qcbus(&["check", "in"]);
     let (bad, good) = ("qcbus-out/in/bad.xodr.xqar", "qcbus-out/in/good.xodr.xqar");
@@ -376,7 +376,7 @@ fn a_report_is_made_of_results_that_are_there() {
 }
 
 #[test]
-fn rules_are_found_by_what_people_remember_of_them() {
+fn rules_are_found_by_partial_names() {
     let cli = Cli::new();
     let family = cli.qcbus(&["rule", "ids"]);
     assert_eq!(family.code, Some(2));
@@ -411,7 +411,7 @@ fn hook(cli: &Cli, further: &[&str]) -> Said {
 }
 
 #[test]
-fn excluded_file_is_passed_over_when_a_hook_names_it() {
+fn excluded_file_named_by_a_hook_is_skipped() {
     let cli = cli();
     cli.write(".qcignore", "vendor/\n");
     cli.write("vendor/bad.xodr", Content::NoHeader(2).bytes());
@@ -431,7 +431,7 @@ fn excluded_file_is_passed_over_when_a_hook_names_it() {
 }
 
 #[test]
-fn missing_report_is_said_when_every_named_file_is_excluded() {
+fn missing_report_is_explained_when_every_file_is_excluded() {
     let cli = cli();
     cli.write("in/.qcignore", "*\n");
     let said = hook(&cli, &["--output-format", "sarif=all.sarif", "in/bad.xodr"]);

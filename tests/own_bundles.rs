@@ -81,7 +81,7 @@ fn upgrade(farm: &Farm, more: &[&str]) -> (Option<i32>, String) {
 }
 
 #[test]
-fn what_is_said_to_be_ready_judges_the_next_file() {
+fn bundle_reported_as_ready_judges_the_next_file() {
     let (farm, program) = farm_with_mine("1.0.0");
     let _broker = farm.serve_ready();
     for round in 1..4 {
@@ -99,7 +99,7 @@ fn what_is_said_to_be_ready_judges_the_next_file() {
 }
 
 #[test]
-fn what_does_not_become_ready_is_taken_out_again_and_stops_nobody() {
+fn bundle_that_does_not_become_ready_is_removed_again() {
     let (farm, program) = farm_with_mine("1.0.0");
     let _broker = farm.serve_ready();
     let cases = [
@@ -126,7 +126,7 @@ fn what_does_not_become_ready_is_taken_out_again_and_stops_nobody() {
 }
 
 #[test]
-fn with_keep_it_stays_and_its_files_are_undetermined() {
+fn bundle_added_with_keep_stays_although_it_fails() {
     let (farm, program) = farm_with_mine("1.0.0");
     install(&program, "exit 3");
     let _broker = farm.serve_ready();
@@ -146,7 +146,7 @@ fn with_keep_it_stays_and_its_files_are_undetermined() {
 }
 
 #[test]
-fn an_upgrade_tells_what_was_and_what_is() {
+fn upgrade_reports_the_old_and_the_new_version() {
     let (farm, program) = farm_with_mine("1.0.0");
     let _broker = farm.serve_ready();
     let (code, text) = upgrade(&farm, &[]);
@@ -166,7 +166,7 @@ fn an_upgrade_tells_what_was_and_what_is() {
 }
 
 #[test]
-fn a_program_that_is_replaced_is_noticed_by_itself() {
+fn replaced_program_is_noticed_automatically() {
     let (farm, program) = farm_with_mine("1.0.0");
     let _broker = farm.serve_ready();
     assert_eq!(add(&farm, "mine", &program, &[]).0, Some(0));
@@ -186,7 +186,7 @@ fn a_program_that_is_replaced_is_noticed_by_itself() {
 }
 
 #[test]
-fn an_upgrade_to_a_broken_program_leaves_the_one_that_works() {
+fn upgrade_to_a_broken_program_keeps_the_working_one() {
     let (farm, program) = farm_with_mine("1.0.0");
     let _broker = farm.serve_ready();
     assert_eq!(add(&farm, "mine", &program, &[]).0, Some(0));
@@ -235,7 +235,7 @@ fn an_upgrade_to_a_broken_program_leaves_the_one_that_works() {
 }
 
 #[test]
-fn several_are_added_at_once() {
+fn several_bundles_are_added_at_once() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     let names = ["one", "two", "three"];
@@ -260,7 +260,7 @@ fn several_are_added_at_once() {
 }
 
 #[test]
-fn one_that_no_configuration_names_is_ready_and_not_asked() {
+fn unconfigured_bundle_is_ready_but_not_used() {
     let (mut farm, program) = farm_with_mine("1.0.0");
     let config = farm.base().join("config.xml");
     std::fs::write(
@@ -281,7 +281,7 @@ fn one_that_no_configuration_names_is_ready_and_not_asked() {
 }
 
 #[test]
-fn rules_of_every_bundle_that_runs_are_known() {
+fn rules_of_every_running_bundle_are_known() {
     let (farm, program) = farm_with_mine("1.0.0");
     let rule = |more: &[&str]| told(&farm.qcbus(&[&["rule"], more].concat()));
     let (code, text) = rule(&[POLITE[0]]);
@@ -317,7 +317,7 @@ fn rules_of_every_bundle_that_runs_are_known() {
 }
 
 #[test]
-fn a_script_in_python_is_run_by_the_interpreter_that_is_found_here() {
+fn python_script_is_run_by_the_interpreter_on_path() {
     let cli = Cli::new();
     let script = cli.write("rules.py", "pass\n");
     let said = cli.qcbus(&["bundle", "add", "mine", "rules.py", "--offline"]);
@@ -342,7 +342,7 @@ fn a_script_in_python_is_run_by_the_interpreter_that_is_found_here() {
 
 /// The test works like an outside user: outside of the workspace, as the command instructs.
 #[test]
-fn a_new_bundle_in_rust_is_built_tested_and_judges() {
+fn new_rust_bundle_is_built_tested_and_judges() {
     let farm = Farm::new();
     let outside = farm.base().join("outside");
     std::fs::create_dir(&outside).unwrap();

@@ -141,7 +141,7 @@ impl Inbox {
 }
 
 #[test]
-fn a_manifest_planted_in_the_inbox_is_not_run() {
+fn manifest_planted_in_the_inbox_is_not_run() {
     if !is_root() {
         return;
     }
@@ -160,7 +160,7 @@ fn a_manifest_planted_in_the_inbox_is_not_run() {
 }
 
 #[test]
-fn a_state_directory_that_others_can_replace_is_refused() {
+fn state_directory_replaceable_by_others_is_refused() {
     if !is_root() {
         return;
     }
@@ -180,7 +180,7 @@ fn a_state_directory_that_others_can_replace_is_refused() {
 }
 
 #[test]
-fn an_inbox_of_everybody_is_served_where_entries_stay_their_owners() {
+fn shared_inbox_with_the_sticky_bit_is_served() {
     if !is_root() {
         return;
     }
@@ -201,7 +201,7 @@ fn an_inbox_of_everybody_is_served_where_entries_stay_their_owners() {
 }
 
 #[test]
-fn a_configuration_or_program_of_somebody_else_is_refused() {
+fn configuration_or_program_of_another_user_is_refused() {
     if !is_root() {
         return;
     }
@@ -236,7 +236,7 @@ fn a_configuration_or_program_of_somebody_else_is_refused() {
 }
 
 #[test]
-fn what_is_planted_later_is_said_and_not_run() {
+fn manifest_planted_later_is_reported_and_not_run() {
     if !is_root() {
         return;
     }
@@ -281,7 +281,7 @@ fn what_is_planted_later_is_said_and_not_run() {
 }
 
 #[test]
-fn a_program_that_others_may_write_to_is_not_started_again() {
+fn program_writable_by_others_is_not_restarted() {
     let farm = Farm::with(&["--no-standard-bundles"]);
     let (program, trace) = (farm.base().join("program"), farm.base().join("trace"));
     std::fs::write(&program, "#!/bin/sh\nexit 1\n").unwrap();
@@ -324,7 +324,7 @@ fn mode_of(path: &Path) -> u32 {
 }
 
 #[test]
-fn a_runtime_directory_that_a_neighbour_has_planted_is_left_as_it_is() {
+fn planted_runtime_directory_is_left_unchanged() {
     if !is_root() {
         return;
     }
@@ -362,7 +362,7 @@ fn a_runtime_directory_that_a_neighbour_has_planted_is_left_as_it_is() {
 }
 
 #[test]
-fn a_user_without_rights_has_a_runtime_directory() {
+fn user_without_privileges_has_a_runtime_directory() {
     if !is_root() {
         return;
     }
@@ -376,7 +376,7 @@ fn a_user_without_rights_has_a_runtime_directory() {
 
 /// Many sites share a results directory in a group. The broker must report the consequences.
 #[test]
-fn results_that_others_may_write_to_are_said() {
+fn results_writable_by_others_are_reported() {
     let farm = Farm::new();
     std::fs::create_dir(farm.gate()).unwrap();
     mode(&farm.gate(), 0o777);

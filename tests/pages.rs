@@ -84,7 +84,7 @@ fn on_road(map: &RoadMap<'_>, id: &str, s: f64, t: f64) -> (usize, [f64; 2]) {
 }
 
 #[test]
-fn every_kind_of_fault_has_its_mark_at_the_right_metre() {
+fn every_fault_is_marked_at_its_map_position() {
     let cli = Cli::new();
     let file = "faulty/seen_from_above.xodr";
     let page = page_of(&cli, file);
@@ -126,7 +126,7 @@ fn every_kind_of_fault_has_its_mark_at_the_right_metre() {
 }
 
 #[test]
-fn every_finding_on_a_map_has_a_place_or_is_about_none() {
+fn every_finding_on_a_map_has_a_place() {
     let cli = Cli::new();
     let data = data_of(&page_of(&cli, "faulty/seen_from_above.xodr"));
     for finding in data["findings"].as_array().unwrap() {
@@ -137,7 +137,7 @@ fn every_finding_on_a_map_has_a_place_or_is_about_none() {
 }
 
 #[test]
-fn a_scenario_is_shown_on_its_map() {
+fn scenario_is_shown_on_its_map() {
     let cli = Cli::new();
     let page = page_of(&cli, "faulty/beside_the_road.xosc");
     let data = data_of(&page);
@@ -147,7 +147,7 @@ fn a_scenario_is_shown_on_its_map() {
 }
 
 #[test]
-fn a_file_without_a_road_has_a_page_all_the_same() {
+fn file_without_a_road_still_has_a_page() {
     let cli = Cli::new();
     for file in [
         "catalogs/vehicles.xosc",
@@ -162,7 +162,7 @@ fn a_file_without_a_road_has_a_page_all_the_same() {
 }
 
 #[test]
-fn the_page_of_a_run_leads_to_those_of_its_files() {
+fn page_of_a_run_links_to_its_file_pages() {
     let cli = Cli::new();
     let page = page_of(&cli, ".");
     let data = data_of(&page);

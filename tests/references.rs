@@ -300,7 +300,7 @@ fn assert_said(case: &Case, results: &Results, whole: &str) {
 }
 
 #[test]
-fn what_a_scenario_refers_to_counts() {
+fn references_of_a_scenario_affect_its_verdict() {
     let cli = cli();
     let cases = cases();
     for case in &cases {
@@ -326,7 +326,7 @@ fn code_of(verdict: &str) -> Option<i32> {
 }
 
 #[test]
-fn a_bundle_without_a_broker_says_the_same() {
+fn bundle_without_a_broker_gives_the_same_verdicts() {
     let cli = cli();
     // A broker holds few documents at a time on the bus. A bundle without a broker holds all in
     // memory.
@@ -343,7 +343,7 @@ fn a_bundle_without_a_broker_says_the_same() {
 }
 
 #[test]
-fn a_module_of_asams_framework_says_the_same() {
+fn framework_module_gives_the_same_remarks() {
     let cli = cli();
     let input = cli.write(
         "scenarios/missing.xosc",
@@ -364,7 +364,7 @@ fn a_module_of_asams_framework_says_the_same() {
 }
 
 #[test]
-fn a_map_that_may_not_be_read_is_no_acceptance() {
+fn unreadable_map_prevents_acceptance() {
     let cli = cli();
     let locked = cli.path().join("maps/quay_straight.xodr");
     std::fs::set_permissions(&locked, PermissionsExt::from_mode(0o000)).unwrap();
@@ -392,7 +392,7 @@ fn checked(cli: &Cli, out: &str, more: &[&str]) -> Said {
 }
 
 #[test]
-fn scenario_on_a_rejected_map_is_rejected_until_the_map_is_fixed() {
+fn scenario_is_rejected_until_its_map_is_fixed() {
     let cli = cli();
     let good = std::fs::read(cli.path().join("maps/quay_straight.xodr")).unwrap();
     cli.write("maps/quay_straight.xodr", rejected_map());
@@ -438,7 +438,7 @@ fn one_about_the_map(results: &Results) -> (String, Vec<(u64, u64)>) {
 }
 
 #[test]
-fn only_catalogs_that_entries_are_taken_from_count() {
+fn only_used_catalogs_affect_the_verdict() {
     let cli = cli();
     let catalog = std::fs::read_to_string(cli.path().join("catalogs/vehicles.xosc")).unwrap();
     let broken = catalog.replacen("<Vehicle ", "<Vehicle paved=\"yes\" ", 1);

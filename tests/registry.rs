@@ -108,7 +108,7 @@ fn nothing_is_accepted_without_mine(farm: &Farm) {
 }
 
 #[test]
-fn nothing_is_accepted_while_the_directory_of_manifests_is_away() {
+fn missing_manifest_directory_prevents_acceptance() {
     let farm = farm();
     let program = zoo();
     let command = format!("{} judges_strictly --name mine", program.display());
@@ -143,7 +143,7 @@ fn nothing_is_accepted_while_the_directory_of_manifests_is_away() {
 }
 
 #[test]
-fn nothing_is_accepted_after_the_program_of_a_bundle_has_gone() {
+fn missing_bundle_program_prevents_acceptance() {
     let farm = farm();
     let program = own_program(farm.base());
     manifest(
@@ -168,7 +168,7 @@ fn nothing_is_accepted_after_the_program_of_a_bundle_has_gone() {
 }
 
 #[test]
-fn nothing_is_accepted_while_a_bundle_is_stopped_and_the_broker_restarts() {
+fn stopped_bundle_prevents_acceptance_after_a_restart() {
     let farm = farm();
     let mut broker = farm.serve_ready();
     let mine = StartedManually::start(&farm, "judges_strictly");
@@ -186,7 +186,7 @@ fn nothing_is_accepted_while_a_bundle_is_stopped_and_the_broker_restarts() {
 }
 
 #[test]
-fn a_bundle_that_joined_by_hand_must_judge_until_somebody_removes_it() {
+fn manually_started_bundle_is_required_until_removed() {
     let farm = farm();
     let mut broker = farm.serve_ready();
     let mine = StartedManually::start(&farm, "judges_strictly");
@@ -204,7 +204,7 @@ fn a_bundle_that_joined_by_hand_must_judge_until_somebody_removes_it() {
 }
 
 #[test]
-fn a_bundle_that_leaves_of_its_own_will_need_not_judge_any_more() {
+fn bundle_that_left_voluntarily_is_no_longer_required() {
     let farm = farm();
     let _broker = farm.serve_ready();
     let mut mine = StartedManually::start(&farm, "polite");
@@ -228,7 +228,7 @@ fn a_bundle_that_leaves_of_its_own_will_need_not_judge_any_more() {
 }
 
 #[test]
-fn a_check_accepts_nothing_when_a_bundle_of_ones_own_does_not_judge() {
+fn check_accepts_nothing_when_an_own_bundle_fails() {
     let cli = Cli::new();
     cli.write("a.xodr", Content::Good(1).bytes());
     let manifests = cli.write("bundles.d/.keep", "");

@@ -87,7 +87,7 @@ fn removed_outputs_are_written_again() {
 }
 
 #[test]
-fn wait_answers_with_a_result_that_is_there() {
+fn wait_answers_with_an_existing_result() {
     let farm = farm();
     let _broker = serve(&farm);
     for output in outputs(&farm) {
@@ -130,7 +130,7 @@ fn changed_outputs_are_written_again() {
 }
 
 #[test]
-fn directories_of_results_that_go_come_back() {
+fn removed_result_directories_are_restored() {
     let farm = farm();
     let _broker = serve(&farm);
     std::fs::rename(farm.out().join("sub"), farm.base().join("elsewhere")).unwrap();
@@ -141,7 +141,7 @@ fn directories_of_results_that_go_come_back() {
 }
 
 #[test]
-fn replaced_directories_of_results_and_gate_are_filled_again() {
+fn replaced_result_and_gate_directories_are_filled_again() {
     let farm = farm();
     let _broker = serve(&farm);
     for directory in [farm.out(), farm.gate()] {
@@ -160,7 +160,7 @@ fn replaced_directories_of_results_and_gate_are_filled_again() {
 }
 
 #[test]
-fn directory_that_another_broker_has_taken_is_left_to_it() {
+fn directory_taken_by_another_broker_is_left_to_it() {
     let mut other = Farm::new();
     let gate = other.gate().to_string_lossy().into_owned();
     other.arguments.extend(["--gate".to_owned(), gate]);
@@ -181,7 +181,7 @@ fn directory_that_another_broker_has_taken_is_left_to_it() {
 }
 
 #[test]
-fn state_directory_that_goes_is_told() {
+fn removed_state_directory_is_reported() {
     let farm = farm();
     let _broker = serve(&farm);
     remove_whole(&farm.base().join("state"));
@@ -194,7 +194,7 @@ fn state_directory_that_goes_is_told() {
 }
 
 #[test]
-fn removed_outputs_of_a_file_that_is_touched_are_written_again() {
+fn removed_outputs_of_a_touched_file_are_written_again() {
     let farm = farm();
     let _broker = serve(&farm);
     for _ in 0..5 {

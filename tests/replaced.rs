@@ -128,19 +128,19 @@ fn it_is_said(farm: &Farm, program: &Path) {
 }
 
 #[test]
-fn children_stay_what_the_broker_is_after_a_rename() {
+fn children_match_the_broker_after_a_rename() {
     children_stay_what_the_broker_is(|program, newer| std::fs::rename(newer, program).unwrap());
 }
 
 #[test]
-fn children_stay_what_the_broker_is_after_a_removal() {
+fn children_match_the_broker_after_a_removal() {
     children_stay_what_the_broker_is(|program, _| std::fs::remove_file(program).unwrap());
 }
 
 #[test]
-fn children_stay_what_the_broker_is_behind_a_mount() {
+fn children_match_the_broker_behind_a_mount() {
     if !is_inside() {
-        let name = "children_stay_what_the_broker_is_behind_a_mount";
+        let name = "children_match_the_broker_behind_a_mount";
         let ended = run_inside(name, "true");
         assert!(ended.is_none_or(|it| it.success()));
         return;
@@ -153,7 +153,7 @@ fn children_stay_what_the_broker_is_behind_a_mount() {
 }
 
 #[test]
-fn program_is_another_when_the_link_to_it_leads_elsewhere() {
+fn changed_link_to_the_program_is_reported() {
     let farm = Farm::new();
     let [program, newer, link, aside] =
         ["qcbus-1", "qcbus-2", "qcbus", "aside"].map(|it| farm.base().join(it));

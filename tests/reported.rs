@@ -76,7 +76,7 @@ fn wait_names_the_reporter_whose_report_is_missing() {
 }
 
 #[test]
-fn failed_report_is_written_as_soon_as_it_can_be() {
+fn failed_report_is_written_as_soon_as_possible() {
     let farm = Farm::with(&["--report", "text"]);
     let _broker = farm.serve_ready();
     obstruct(&farm, "a.xodr");

@@ -47,7 +47,7 @@ fn is_found(cli: &Cli, file: &str, checker: &str) -> bool {
 }
 
 #[test]
-fn a_scenario_alone_is_rejected_for_its_map_until_that_is_mended() {
+fn single_scenario_is_rejected_until_its_map_is_fixed() {
     let cli = place(&Content::NoHeader(1));
     let said = check(&cli, &[]);
     assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
@@ -74,7 +74,7 @@ fn a_scenario_alone_is_rejected_for_its_map_until_that_is_mended() {
 
 /// A broker that watches only scenarios must report unchecked files.
 #[test]
-fn a_broker_says_which_map_it_does_not_watch() {
+fn broker_reports_a_map_it_does_not_watch() {
     let farm = Farm::new();
     let scenario = Content::Scenario(1, "../elsewhere.xodr".to_owned());
     let map = farm.base().join("elsewhere.xodr");
@@ -111,7 +111,7 @@ fn served() -> (Farm, Broker) {
 }
 
 #[test]
-fn map_in_a_directory_that_becomes_a_link_is_named_as_not_watched() {
+fn map_in_a_linked_directory_is_reported_as_unwatched() {
     let (farm, _broker) = served();
     let elsewhere = farm.base().join("elsewhere");
     std::fs::rename(farm.root().join("maps"), &elsewhere).unwrap();
@@ -132,7 +132,7 @@ fn map_in_a_directory_that_becomes_a_link_is_named_as_not_watched() {
 
 /// The same path now leads to another map, and the verdict on that map counts.
 #[test]
-fn map_behind_a_link_that_leads_elsewhere_by_now_is_another_one() {
+fn changed_link_leads_to_another_map() {
     let (farm, _broker) = served();
     let root = farm.root();
     for directory in ["first/deep", "second/deep"] {
@@ -155,7 +155,7 @@ fn map_behind_a_link_that_leads_elsewhere_by_now_is_another_one() {
 
 /// A write to a file under an unwatched name causes no event.
 #[test]
-fn map_changed_under_another_name_is_judged_for_who_waits_for_its_scenario() {
+fn map_changed_under_another_name_is_judged_on_wait() {
     let (farm, _broker) = served();
     let other_name = farm.base().join("other name");
     std::fs::hard_link(farm.root().join(MAP), &other_name).unwrap();
@@ -165,7 +165,7 @@ fn map_changed_under_another_name_is_judged_for_who_waits_for_its_scenario() {
 }
 
 #[test]
-fn waiting_for_what_lies_in_a_directory_that_is_away_takes_no_result() {
+fn waiting_in_a_missing_directory_returns_no_result() {
     let (farm, _broker) = served();
     let aside = farm.base().join("aside");
     std::fs::rename(farm.root(), &aside).unwrap();
@@ -187,7 +187,7 @@ fn waiting_for_what_lies_in_a_directory_that_is_away_takes_no_result() {
 }
 
 #[test]
-fn directory_of_scenarios_is_checked_with_maps_elsewhere() {
+fn scenarios_are_checked_with_maps_elsewhere() {
     let cli = place(&Content::NoHeader(1));
     let said = cli.qcbus(&["check", "scenarios"]);
     assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
@@ -195,7 +195,7 @@ fn directory_of_scenarios_is_checked_with_maps_elsewhere() {
 }
 
 #[test]
-fn catalog_that_nobody_named_counts() {
+fn unnamed_catalog_affects_the_verdict() {
     let cli = place(&Content::Good(1));
     let catalog = Content::Catalog(1, Mark::Clean).bytes();
     let catalog = String::from_utf8(catalog).unwrap();
@@ -208,7 +208,7 @@ fn catalog_that_nobody_named_counts() {
 }
 
 #[test]
-fn map_that_is_excluded_does_not_count() {
+fn excluded_map_does_not_affect_the_verdict() {
     let cli = place(&Content::NoHeader(1));
     cli.write(".qcignore", "maps/\n");
     let said = check(&cli, &[]);
@@ -219,7 +219,7 @@ fn map_that_is_excluded_does_not_count() {
 }
 
 #[test]
-fn the_one_result_of_a_configuration_is_that_of_its_file() {
+fn single_result_of_a_configuration_covers_its_input() {
     let cli = place(&Content::NoHeader(1));
     let config = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Config>\n\
@@ -243,7 +243,7 @@ fn the_one_result_of_a_configuration_is_that_of_its_file() {
 
 /// The broker and the bundles hold few documents at a time, and one scenario may need all of them.
 #[test]
-fn scenario_with_many_catalogs_does_not_hold_up_what_it_waits_for() {
+fn scenario_with_many_catalogs_does_not_block_them() {
     let cli = place(&Content::Good(1));
     for number in 2..70 {
         let catalog = Content::Catalog(number, Mark::Clean).bytes();

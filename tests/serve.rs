@@ -158,21 +158,21 @@ fn the_status_agrees(farm: &Farm, names: &[&Path]) {
 }
 
 #[test]
-fn the_sample_farm_is_copied_in() {
+fn sample_farm_is_judged_when_copied_in() {
     copied_in_and_compared(&load(&sample_farm(), |file| {
         file.extension().is_some_and(|it| it != "md")
     }));
 }
 
 #[test]
-fn two_hundred_real_files_are_copied_in() {
+fn two_hundred_real_files_are_judged_when_copied_in() {
     let real = Path::new(concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/../../../shared/cases/real"
     ));
     if !real.is_dir() {
         return skip(
-            "two_hundred_real_files_are_copied_in",
+            "two_hundred_real_files_are_judged_when_copied_in",
             "../shared/cases/real is not here",
         );
     }
@@ -192,7 +192,7 @@ fn sha256(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn a_file_that_is_renamed_in_is_judged() {
+fn file_renamed_into_the_farm_is_judged() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     let outside = farm.base().join("outside.xodr");
@@ -215,7 +215,7 @@ fn a_file_that_is_renamed_in_is_judged() {
 }
 
 #[test]
-fn the_newest_bytes_win() {
+fn verdict_follows_the_newest_bytes() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     for round in 0..30 {
@@ -243,7 +243,7 @@ fn the_newest_bytes_win() {
 }
 
 #[test]
-fn a_deleted_file_takes_its_result_along() {
+fn results_of_a_deleted_file_are_removed() {
     let farm = Farm::with(&["--report", "text", "--report", "json"]);
     let _broker = farm.serve_ready();
     farm.write("a.xodr", &Content::Good(1).bytes());
@@ -267,7 +267,7 @@ fn a_deleted_file_takes_its_result_along() {
 /// unchanged. A report of the last broker must not be taken for this broker's job of the same
 /// number.
 #[test]
-fn a_new_verdict_reaches_reporters_whatever_became_of_the_runtime_directory() {
+fn verdict_is_reported_after_the_runtime_directory_is_lost() {
     let mut farm = Farm::with(&["--report", "text", "--absence-limit", "1s"]);
     let config = farm.base().join("config.xml");
     let demand = |names: &[&str]| {
@@ -298,7 +298,7 @@ fn a_new_verdict_reaches_reporters_whatever_became_of_the_runtime_directory() {
 }
 
 #[test]
-fn a_file_to_come_is_awaited_through_a_link() {
+fn future_file_is_awaited_through_a_link() {
     let farm = Farm::new();
     let broker = farm.serve_ready();
     let link = farm.root().with_file_name("link");
@@ -328,7 +328,7 @@ fn is_unwatched(farm: &Farm, name: &str) -> bool {
 }
 
 #[test]
-fn what_is_ignored_gets_no_verdict() {
+fn ignored_files_get_no_verdict() {
     let farm = Farm::new();
     std::fs::create_dir(farm.root().join("drafts")).unwrap();
     farm.write(
@@ -368,7 +368,7 @@ fn what_is_ignored_gets_no_verdict() {
 }
 
 #[test]
-fn a_network_file_system_is_polled() {
+fn requested_polling_finds_new_files() {
     let farm = Farm::with(&["--poll", "100ms"]);
     let _broker = farm.serve_ready();
     assert_eq!(
@@ -438,14 +438,14 @@ fn follows_its_map(farm: &Farm, reference: &str, map: &Path) {
 }
 
 #[test]
-fn a_scenario_is_judged_again_when_its_map_appears_or_changes() {
+fn scenario_is_judged_again_when_its_map_changes() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     follows_its_map(&farm, "map.xodr", &farm.root().join("map.xodr"));
 }
 
 #[test]
-fn a_map_may_lie_outside_the_watched_directory() {
+fn map_outside_the_watched_directory_is_followed() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     std::fs::create_dir(farm.base().join("library")).unwrap();
@@ -459,7 +459,7 @@ fn a_map_may_lie_outside_the_watched_directory() {
 }
 
 #[test]
-fn a_map_is_judged_again_when_an_included_file_appears_or_changes() {
+fn map_is_judged_again_when_an_included_file_changes() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     let whole = String::from_utf8(Content::Good(1).bytes()).unwrap();
@@ -557,7 +557,7 @@ fn served(farm: &Farm, directories: &[&Path], there: &[&str], gone: &[&str]) {
 }
 
 #[test]
-fn results_move_with_the_directories_that_are_watched() {
+fn results_move_with_the_watched_directories() {
     let farm = Farm::new();
     let second = farm.base().join("second");
     std::fs::create_dir(&second).unwrap();
@@ -573,7 +573,7 @@ fn results_move_with_the_directories_that_are_watched() {
 }
 
 #[test]
-fn what_has_gone_takes_no_other_files_result_with_it() {
+fn removed_directory_leaves_the_results_of_others() {
     let farm = Farm::new();
     let (one, other) = (farm.base().join("z1"), farm.base().join("a2"));
     std::fs::create_dir_all(one.join("sub")).unwrap();
@@ -594,7 +594,7 @@ fn what_has_gone_takes_no_other_files_result_with_it() {
 }
 
 #[test]
-fn a_second_broker_on_the_same_results_is_refused() {
+fn second_broker_on_the_same_results_is_refused() {
     let farm = Farm::new();
     farm.write("a.xodr", &Content::Good(1).bytes());
     let other = farm.base().join("other");

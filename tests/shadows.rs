@@ -64,7 +64,7 @@ fn names(results: &xqar::Results) -> Vec<String> {
 }
 
 #[test]
-fn what_it_would_change_is_told_and_nothing_is_changed_until_it_judges() {
+fn shadow_reports_its_effect_and_changes_no_verdict() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     farm.write("before.xodr", &Content::Marked(1).bytes());
@@ -131,7 +131,7 @@ fn told_status(farm: &Farm) -> (Option<i32>, String) {
 }
 
 #[test]
-fn the_worst_of_them_hold_up_nobody_and_are_told_to_have_failed() {
+fn failing_shadows_are_reported_and_delay_no_verdict() {
     let farm = Farm::with(&[
         "--silence-limit",
         "4s",
@@ -182,7 +182,7 @@ fn the_worst_of_them_hold_up_nobody_and_are_told_to_have_failed() {
 }
 
 #[test]
-fn a_configuration_that_names_a_shadow_does_not_miss_it() {
+fn shadow_named_by_a_configuration_is_not_missing() {
     let mut farm = Farm::new();
     let config = farm.base().join("config.xml");
     std::fs::write(
@@ -209,7 +209,7 @@ fn a_configuration_that_names_a_shadow_does_not_miss_it() {
 }
 
 #[test]
-fn a_run_has_no_shadows_and_says_so() {
+fn check_skips_shadows_and_reports_this() {
     let farm = Farm::new();
     farm.let_in_as_shadow(STRICT, "");
     farm.write("a.xodr", &Content::Marked(1).bytes());
@@ -231,7 +231,7 @@ fn a_run_has_no_shadows_and_says_so() {
 }
 
 #[test]
-fn after_a_restart_everything_is_tried_again() {
+fn every_file_is_tried_again_after_a_restart() {
     let farm = Farm::new();
     let broker = farm.serve_ready();
     farm.write("a.xodr", &Content::Marked(1).bytes());

@@ -94,7 +94,7 @@ fn old_map_that_was_judged() -> (Farm, Broker, String) {
 }
 
 #[test]
-fn an_old_map_is_judged_again_when_its_include_changes_goes_and_comes_back() {
+fn old_map_is_judged_again_when_its_include_changes() {
     let (farm, _broker, view) = old_map_that_was_judged();
     verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
     put_old(&farm, "view.xml", b"<road><planView></road>");
@@ -155,7 +155,7 @@ const CATALOG: &str = "<OpenSCENARIO>\n<FileHeader revMajor=\"1\" revMinor=\"2\"
     </OpenSCENARIO>\n";
 
 #[test]
-fn an_old_scenario_is_judged_again_when_its_map_or_catalogs_appear_or_change() {
+fn old_scenario_is_judged_again_when_its_references_change() {
     let farm = farm_with_gate();
     put_old(&farm, "s.xosc", SCENARIO.as_bytes());
     rest(&farm);
@@ -210,7 +210,7 @@ fn good_and_bad() -> (Vec<u8>, Vec<u8>) {
 }
 
 #[test]
-fn a_file_that_is_rewritten_with_its_size_and_time_kept_is_judged_again() {
+fn rewritten_file_with_unchanged_time_is_judged_again() {
     let farm = farm_with_gate();
     let (good, bad) = good_and_bad();
     put_old(&farm, "a.xodr", &good);
@@ -228,7 +228,7 @@ fn a_file_that_is_rewritten_with_its_size_and_time_kept_is_judged_again() {
 }
 
 #[test]
-fn another_link_or_other_rights_cost_no_new_verdict() {
+fn new_link_or_permissions_cause_no_new_verdict() {
     let (farm, _broker, _) = old_map_that_was_judged();
     for name in ["a.xodr", "view.xml"] {
         let path = farm.root().join(name);
@@ -268,7 +268,7 @@ fn files_from_before_1970_are_judged() {
 }
 
 #[test]
-fn what_is_there_and_cannot_be_read_does_not_keep_a_file_from_its_verdict() {
+fn unreadable_dependency_does_not_prevent_a_verdict() {
     let farm = farm_with_gate();
     for name in ["map.xodr", "view.xml"] {
         std::fs::create_dir(farm.root().join(name)).unwrap();
@@ -305,7 +305,7 @@ fn inodes(farm: &Farm, name: &str) -> Vec<u64> {
 }
 
 #[test]
-fn a_file_of_tomorrow_keeps_its_verdict_over_a_restart() {
+fn file_with_a_future_time_keeps_its_verdict() {
     let mut farm = farm_with_gate();
     farm.arguments.extend(["--report".into(), "text".into()]);
     farm.write("tomorrow.xodr", &Content::Good(1).bytes());
@@ -351,7 +351,7 @@ fn times_read(farm: &Farm, name: &str) -> usize {
 }
 
 #[test]
-fn a_file_of_tomorrow_comes_to_rest() {
+fn file_with_a_future_time_comes_to_rest() {
     let farm = farm_with_gate();
     let path = farm.root().join("tomorrow.xodr");
     farm.write("tomorrow.xodr", &Content::Good(1).bytes());

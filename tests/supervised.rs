@@ -56,7 +56,7 @@ fn bundles(farm: &Farm) -> Vec<i32> {
 }
 
 #[test]
-fn hangup_reloads_and_broker_and_bundles_go_on() {
+fn hangup_reloads_without_ending_broker_or_bundles() {
     let farm = Farm::new();
     let mut broker = serve_as_a_job(&farm);
     until_it_answers(&farm);
@@ -138,7 +138,7 @@ fn open_farm() -> (Farm, PathBuf) {
 }
 
 #[test]
-fn another_user_is_told_whose_broker_it_is() {
+fn other_user_learns_the_owner_of_the_broker() {
     let (farm, program) = open_farm();
     let _broker = farm.serve();
     until_it_answers(&farm);
@@ -158,7 +158,7 @@ fn another_user_is_told_whose_broker_it_is() {
 }
 
 #[test]
-fn user_without_a_broker_is_told_of_one_of_another_user() {
+fn user_without_broker_learns_of_another_users_broker() {
     let (farm, program) = open_farm();
     // The name distinguishes this broker from those of other tests.
     let name = format!("test-{}", std::process::id());
@@ -215,7 +215,7 @@ fn health_is_an_exit_code_with_reasons() {
 }
 
 #[test]
-fn watched_directory_that_is_away_is_no_health() {
+fn missing_watched_directory_is_unhealthy() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     let aside = farm.base().join("aside");
@@ -226,7 +226,7 @@ fn watched_directory_that_is_away_is_no_health() {
 }
 
 #[test]
-fn configuration_that_is_not_in_force_is_no_health() {
+fn configuration_not_in_force_is_unhealthy() {
     let mut farm = Farm::new();
     let config = farm.base().join("config.xml");
     let good = "<Config><CheckerBundle application=\"xodrBundle\"/></Config>";
@@ -246,7 +246,7 @@ fn configuration_that_is_not_in_force_is_no_health() {
 }
 
 #[test]
-fn demanded_bundle_that_is_missing_is_no_health() {
+fn missing_required_bundle_is_unhealthy() {
     let mut farm = Farm::new();
     let config = farm.base().join("config.xml");
     let names = |second: &str| {
@@ -267,7 +267,7 @@ fn demanded_bundle_that_is_missing_is_no_health() {
 }
 
 #[test]
-fn broker_that_stands_still_is_no_health() {
+fn stopped_broker_is_unhealthy() {
     let farm = Farm::new();
     let broker = farm.serve_ready();
     broker.signal(Signal::STOP);
@@ -277,7 +277,7 @@ fn broker_that_stands_still_is_no_health() {
 }
 
 #[test]
-fn missing_report_is_no_health() {
+fn missing_report_is_unhealthy() {
     let farm = Farm::with(&["--report", "text"]);
     let _broker = farm.serve_ready();
     let obstacle = farm.out().join("a.xodr.txt/obstacle");
@@ -289,7 +289,7 @@ fn missing_report_is_no_health() {
 }
 
 #[test]
-fn doctor_looks_at_the_running_broker() {
+fn doctor_inspects_the_running_broker() {
     let mut farm = Farm::new();
     let state = farm.base().join("state");
     let gate = farm.gate();
@@ -321,7 +321,7 @@ fn doctor_looks_at_the_running_broker() {
 }
 
 #[test]
-fn doctor_asks_the_broker_where_modules_have_their_directories() {
+fn doctor_asks_the_broker_for_its_temporary_directory() {
     let farm = Farm::new();
     // No user can create this directory, not even root.
     let blocked = farm.base().join("file/tmp");

@@ -72,7 +72,7 @@ fn client(farm: &Farm, name: &str) -> Child {
 }
 
 #[test]
-fn upload_that_pauses_is_judged_once_when_it_is_closed() {
+fn paused_upload_is_judged_once_when_closed() {
     let farm = farm(&[]);
     let _broker = farm.serve_ready();
     let (mut file, rest) = begin(&farm, "slow.xodr");
@@ -98,7 +98,7 @@ fn upload_that_pauses_is_judged_once_when_it_is_closed() {
 }
 
 #[test]
-fn upload_that_has_not_begun_to_arrive_is_not_judged_empty() {
+fn empty_upload_in_progress_is_not_judged() {
     let farm = farm(&[]);
     let _broker = farm.serve_ready();
     let file = File::create(farm.root().join("slow.xodr")).unwrap();
@@ -119,7 +119,7 @@ fn upload_that_has_not_begun_to_arrive_is_not_judged_empty() {
 }
 
 #[test]
-fn upload_whose_writer_is_killed_is_judged_as_it_is() {
+fn upload_of_a_killed_writer_is_judged_unchanged() {
     let farm = farm(&[]);
     let _broker = farm.serve_ready();
     let path = farm.root().join("slow.xodr");
@@ -137,7 +137,7 @@ fn upload_whose_writer_is_killed_is_judged_as_it_is() {
 }
 
 #[test]
-fn file_that_is_open_at_the_start_is_judged_once_when_it_is_closed() {
+fn file_open_at_the_start_is_judged_when_closed() {
     let farm = farm(&[]);
     let (mut file, rest) = begin(&farm, "slow.xodr");
     let _broker = farm.serve_ready();
@@ -151,7 +151,7 @@ fn file_that_is_open_at_the_start_is_judged_once_when_it_is_closed() {
 }
 
 #[test]
-fn accepted_file_is_not_behind_the_gate_while_it_is_written_to() {
+fn accepted_file_is_withdrawn_while_it_is_written_to() {
     let farm = farm(&[]);
     std::fs::create_dir(farm.root().join("catalogs")).unwrap();
     farm.write(CATALOG, &Content::Catalog(1, Mark::Clean).bytes());
@@ -179,7 +179,7 @@ fn accepted_file_is_not_behind_the_gate_while_it_is_written_to() {
 }
 
 #[test]
-fn time_to_rest_counts_after_a_close_and_not_after_a_rename() {
+fn settle_time_counts_after_close_but_not_rename() {
     let farm = farm(&["--settle", "1h"]);
     let _broker = farm.serve_ready();
     farm.write("closed.xodr", &Content::Good(1).bytes());
@@ -198,7 +198,7 @@ fn time_to_rest_counts_after_a_close_and_not_after_a_rename() {
 }
 
 #[test]
-fn closed_file_is_judged_when_it_has_rested() {
+fn closed_file_is_judged_after_its_settle_time() {
     let farm = farm(&["--settle", "10ms"]);
     let _broker = farm.serve_ready();
     farm.write("closed.xodr", &Content::Good(1).bytes());
@@ -206,7 +206,7 @@ fn closed_file_is_judged_when_it_has_rested() {
 }
 
 #[test]
-fn check_takes_a_file_as_it_is() {
+fn check_accepts_a_file_open_for_writing() {
     let cli = Cli::new();
     let path = cli.write("a.xodr", Content::Good(1).bytes());
     let _writer = OpenOptions::new().append(true).open(&path).unwrap();

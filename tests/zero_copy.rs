@@ -183,7 +183,7 @@ fn four_bundles_read_one_image() {
 }
 
 #[test]
-fn who_writes_to_the_image_dies_alone() {
+fn process_writing_to_the_image_dies_alone() {
     let farm = Farm::new();
     let mut broker = farm.serve_ready();
     let _polite = StartedManually::start(&farm, &["polite"]);

@@ -209,8 +209,8 @@ fn floods_with_huge_messages() {
 fn never_the_same() {
     let (farm, _broker) = beside("never_the_same", "");
     let status = farm.status().unwrap();
-    let restless = status.notices.iter().filter(|it| it.kind == "flapping");
-    assert!(restless.count() > 0, "{:#?}", status.notices);
+    let flapping = status.notices.iter().filter(|it| it.kind == "flapping");
+    assert!(flapping.count() > 0, "{:#?}", status.notices);
     // Each accepted change starts an epoch. Of hundreds of changes, only the forgiven ones and a
     // few later ones are accepted.
     let epochs = status.epoch & 0xffff_ffff;
@@ -255,7 +255,7 @@ fn allocates_forever() {
 }
 
 #[test]
-fn a_reporter_that_never_acknowledges() {
+fn reporter_that_never_acknowledges_is_reported() {
     let (farm, _broker) = beside("reporter_never_acknowledges", "");
     until_so("it is said", || {
         notices(&farm).contains("reporter_never_acknowledges: it does not acknowledge results")
@@ -275,7 +275,7 @@ fn another_protocol_is_refused_with_both_versions() {
 }
 
 #[test]
-fn a_slow_bundle_loses_nothing() {
+fn slow_bundle_loses_no_file() {
     let farm = Farm::with(&["--silence-limit", "20s"]);
     let _broker = farm.serve_ready();
     farm.let_in("slow", "--millis 20");
@@ -297,7 +297,7 @@ fn a_slow_bundle_loses_nothing() {
 }
 
 #[test]
-fn only_the_poisonous_file_is_condemned() {
+fn only_the_harmful_file_is_undetermined() {
     let farm = Farm::with(&["--silence-limit", "20s"]);
     let _broker = farm.serve_ready();
     farm.let_in("dies_on_some_files", "");
@@ -337,7 +337,7 @@ fn only_the_poisonous_file_is_condemned() {
 }
 
 #[test]
-fn one_more_bundle_comes_is_replaced_and_goes() {
+fn additional_bundle_joins_is_replaced_and_leaves() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     let files = some_files(&farm);

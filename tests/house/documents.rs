@@ -42,7 +42,7 @@ const SETTLED_WORDS: &[(&str, &str)] = &[
 const MOST_ENTRIES: usize = 25;
 
 #[test]
-fn the_words_of_the_glossary_mean_one_thing() {
+fn glossary_terms_have_one_meaning() {
     let root = root();
     let text = std::fs::read_to_string(root.join("docs/architecture.md")).unwrap();
     let (_, glossary) = text.split_once("## Glossary").unwrap();
@@ -144,7 +144,7 @@ fn rules_named_in_documents_exist() {
 }
 
 #[test]
-fn code_shown_in_documents_is_that_of_the_file() {
+fn code_in_documents_matches_the_source() {
     let root = root();
     let mut shown = 0;
     for file in files(&root.join("docs")) {
@@ -167,7 +167,7 @@ fn code_shown_in_documents_is_that_of_the_file() {
 }
 
 #[test]
-fn the_farm_and_its_table_agree() {
+fn farm_files_match_their_table() {
     let farm = root().join("tests/farm");
     let table = std::fs::read_to_string(farm.join("README.md")).unwrap();
     let rows = table.lines().filter_map(|line| line.strip_prefix("| `"));

@@ -9,7 +9,7 @@ const LONGEST_FUNCTION: usize = 60;
 const LONG_FILE: usize = 400;
 
 #[test]
-fn functions_and_files_of_the_broker_are_short() {
+fn broker_functions_and_files_are_short() {
     let sources = sources(&root().join("runtime/broker"));
     let mut wrong = Vec::new();
     let mut long = Vec::new();
@@ -62,7 +62,7 @@ fn length(lines: &[&str]) -> usize {
 }
 
 #[test]
-fn the_length_of_a_function_is_measured() {
+fn length_of_a_function_is_measured() {
     let text = "impl A {\n    pub(super) fn one(\n        &self,\n    ) {\n        if x {\n        }\n    \
                 }\n\n    fn two(&self) {}\n}\n\nasync fn three<T>() -> T;\n// fn four()\nlet a: fn (u8);";
     let lines: Vec<&str> = text.lines().collect();

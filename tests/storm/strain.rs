@@ -77,7 +77,7 @@ impl Strain {
 }
 
 #[test]
-fn death_is_excused_by_a_slow_machine_and_by_no_other() {
+fn death_is_excused_only_by_a_slow_machine() {
     let strain = |times: u32| {
         let worked = |second| (Duration::from_secs(second), WORK * times);
         Strain((0..60).map(worked).collect())

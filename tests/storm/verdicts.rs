@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_acceptance_is_seen() {
+    fn wrong_acceptance_is_detected() {
         let clean = accepted(&Content::Part(2, Mark::Clean));
         assert!(!is_wrong(&clean));
         assert!(is_wrong(&accepted(&Content::Part(2, Mark::Marked))));
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_part_includes_and_what_a_catalog_lacks_spoils_a_scenario() {
+    fn faulty_part_or_catalog_makes_an_acceptance_wrong() {
         let (part, catalog) = (
             Content::Part(2, Mark::Clean),
             Content::Catalog(4, Mark::Clean),
@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bundle_that_was_removed_need_not_judge_until_it_is_demanded_again() {
+    fn removed_bundle_is_not_required_until_demanded_again() {
         let mut case = accepted(&Content::Part(2, Mark::Marked));
         case.told.bundles.truncate(1);
         let second = Duration::from_secs(1);
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_about_bytes_that_had_gone_is_seen() {
+    fn answer_about_outdated_bytes_is_detected() {
         let mut ledger = Ledger::new();
         let (old, new) = (Content::Good(1), Content::Good(2));
         ledger.note("a.xodr", Duration::ZERO, Some(&old));

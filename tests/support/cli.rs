@@ -103,7 +103,7 @@ impl Cli {
 
     /// Returns an output without the path of this directory, which differs between tests.
     pub fn tidy(&self, text: &str) -> String {
-        text.replace(&*self.path().to_string_lossy(), "[DESK]")
+        text.replace(&*self.path().to_string_lossy(), "[DIR]")
     }
 }
 

@@ -29,7 +29,7 @@ fn in_the_middle(bench: &Bench, content: &Content, trouble: impl FnOnce(&PeerSta
 }
 
 #[test]
-fn a_broker_that_is_killed_leaves_the_check_to_whoever_asked() {
+fn killed_broker_leaves_the_check_to_the_caller() {
     for content in [Content::Good(1), Content::NoHeader(2)] {
         let bench = Bench::new();
         let mut broker = bench.farm.serve_ready();
@@ -39,7 +39,7 @@ fn a_broker_that_is_killed_leaves_the_check_to_whoever_asked() {
 }
 
 #[test]
-fn a_broker_that_is_stopped_is_not_waited_for() {
+fn stopped_broker_is_not_waited_for() {
     let bench = Bench::new();
     let broker = bench.farm.serve_ready();
     let mut stopped = PeerStatus::default();
@@ -58,7 +58,7 @@ fn a_broker_that_is_stopped_is_not_waited_for() {
 }
 
 #[test]
-fn a_broker_that_is_to_stop_does_what_it_has_or_says_that_it_does_not() {
+fn draining_broker_finishes_or_declines_a_check() {
     let bench = Bench::new();
     let mut broker = bench.farm.serve_ready();
     std::thread::scope(|scope| {
@@ -86,7 +86,7 @@ fn many(bench: &Bench) -> Vec<String> {
 }
 
 #[test]
-fn a_broker_that_goes_at_any_moment_takes_nothing_along() {
+fn broker_ending_at_any_moment_changes_no_check() {
     let bench = Bench::new();
     let files = many(&bench);
     let mut words: Vec<&str> = files.iter().map(String::as_str).collect();
@@ -138,21 +138,21 @@ fn besieged(bench: &Bench, sent: Signal) {
 }
 
 #[test]
-fn a_bundle_that_dies_on_every_file_is_not_what_is_told() {
+fn bundle_dying_on_every_file_does_not_change_answers() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     besieged(&bench, Signal::KILL);
 }
 
 #[test]
-fn a_bundle_that_hangs_on_every_file_is_not_what_is_told() {
+fn bundle_hanging_on_every_file_does_not_change_answers() {
     let bench = Bench::with(&["--silence-limit", "1s"]);
     let _broker = bench.farm.serve_ready();
     besieged(&bench, Signal::STOP);
 }
 
 #[test]
-fn a_file_on_which_a_bundle_died_is_not_given_to_it_again() {
+fn file_that_killed_a_bundle_is_not_retried_there() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     let kill = |bundle: &PeerStatus| signal(bundle, Signal::KILL);
@@ -176,7 +176,7 @@ fn large() -> Vec<u8> {
 }
 
 #[test]
-fn a_file_on_which_a_bundle_was_killed_each_time_is_checked_by_another() {
+fn file_with_a_repeatedly_killed_bundle_is_still_checked() {
     let bench = Bench::with(&["--max-restarts", "100"]);
     let _broker = bench.farm.serve_ready();
     let file = bench.beside("map.xodr", large());
@@ -205,7 +205,7 @@ fn a_file_on_which_a_bundle_was_killed_each_time_is_checked_by_another() {
 }
 
 #[test]
-fn a_check_that_is_ended_by_a_signal_names_what_was_not_judged() {
+fn check_ended_by_a_signal_names_the_unjudged_files() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     let files = many(&bench);

@@ -33,7 +33,7 @@ fn history(bench: &Bench) -> i64 {
 }
 
 #[test]
-fn nothing_is_known_of_it_and_nothing_is_published() {
+fn on_demand_check_changes_no_state_and_publishes_nothing() {
     let mut bench = Bench::new();
     let gate = bench.farm.gate();
     let arguments = ["--gate", gate.to_str().unwrap(), "--report", "json"];
@@ -65,7 +65,7 @@ fn nothing_is_known_of_it_and_nothing_is_published() {
 }
 
 #[test]
-fn nothing_of_it_is_left_where_runs_have_their_directories() {
+fn on_demand_check_leaves_no_directory_behind() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     let file = bench.beside("map.xodr", Content::Good(1).bytes());
@@ -84,7 +84,7 @@ fn nothing_of_it_is_left_where_runs_have_their_directories() {
 }
 
 #[test]
-fn a_watched_file_that_is_asked_for_keeps_its_own_verdict() {
+fn watched_file_checked_on_demand_keeps_its_own_verdict() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     for round in 0..4 {
@@ -147,7 +147,7 @@ fn descriptors(broker: &Broker) -> usize {
 }
 
 #[test]
-fn whoever_asks_and_vanishes_leaves_nothing() {
+fn vanished_clients_leave_nothing_behind() {
     let bench = Bench::new();
     let broker = bench.farm.serve_ready();
     let file = bench.beside("map.xodr", Content::Good(1).bytes());

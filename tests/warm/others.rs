@@ -36,7 +36,7 @@ fn asked_of(serve: &[&str], check: &[&str]) -> Made {
 }
 
 #[test]
-fn other_limits_and_forms_are_checked_cold_and_the_same_warm() {
+fn other_limits_or_formats_are_checked_without_the_broker() {
     for words in [
         &["--max-depth", "3"][..],
         &["--max-file", "1"],
@@ -61,7 +61,7 @@ fn other_limits_and_forms_are_checked_cold_and_the_same_warm() {
 }
 
 #[test]
-fn what_is_narrowed_configured_or_added_is_checked_cold() {
+fn narrowed_or_configured_check_runs_without_the_broker() {
     let bench = Bench::new();
     let config = bench.beside("config.xml", CONFIG);
     let empty = bench.cli.path().join("bundles");
@@ -84,7 +84,7 @@ fn what_is_narrowed_configured_or_added_is_checked_cold() {
 }
 
 #[test]
-fn a_bundle_that_only_the_broker_has_is_not_asked() {
+fn bundle_known_only_to_the_broker_is_not_used() {
     let bench = Bench::new();
     bench.farm.let_in("judges_strictly", "");
     let _broker = bench.farm.serve_ready();
@@ -96,7 +96,7 @@ fn a_bundle_that_only_the_broker_has_is_not_asked() {
 }
 
 #[test]
-fn schemas_that_have_changed_since_the_broker_read_them_count_as_they_are_now() {
+fn changed_schemas_are_used_as_they_are_now() {
     let bench = Bench::new();
     let schemas = text(&bench.cli.path().join("own"));
     bench.beside("own/map.xsd", SCHEMA.replace("WHAT", "road"));
@@ -123,7 +123,7 @@ fn schemas_that_have_changed_since_the_broker_read_them_count_as_they_are_now() 
 }
 
 #[test]
-fn another_search_path_is_checked_cold() {
+fn other_search_path_is_checked_without_the_broker() {
     let bench = Bench::new();
     bench.beside("library/note.txt", "");
     let file = bench.beside("map.xodr", Content::Good(1).bytes());
@@ -142,7 +142,7 @@ fn another_search_path_is_checked_cold() {
 }
 
 #[test]
-fn another_copy_of_the_program_is_another_program() {
+fn copy_of_the_program_counts_as_another_program() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     let file = bench.beside("bad.xodr", Content::NoHeader(1).bytes());
@@ -156,8 +156,8 @@ fn another_copy_of_the_program_is_another_program() {
 }
 
 #[test]
-fn who_sees_other_files_is_not_answered() {
-    let name = "who_sees_other_files_is_not_answered";
+fn client_in_another_mount_namespace_is_not_answered() {
+    let name = "client_in_another_mount_namespace_is_not_answered";
     if let Some(why) = refused() {
         return skip(name, &why);
     }
@@ -204,11 +204,11 @@ fn hidden(bench: &Bench) -> [String; 2] {
 }
 
 #[test]
-fn who_has_other_rights_is_not_answered() {
+fn client_with_other_rights_is_not_answered() {
     let can_drop = with_less(&Command::new("true")).output();
     if !rustix::process::geteuid().is_root() || !can_drop.is_ok_and(|it| it.status.success()) {
         return skip(
-            "who_has_other_rights_is_not_answered",
+            "client_with_other_rights_is_not_answered",
             "nobody can drop rights here",
         );
     }
@@ -239,13 +239,13 @@ fn who_has_other_rights_is_not_answered() {
 }
 
 #[test]
-fn who_belongs_to_other_groups_is_not_answered() {
+fn client_in_other_groups_is_not_answered() {
     let groups = ["--groups", "12345"];
     let mut command = Command::new("setpriv");
     let can_change = command.args(groups).arg("true").output();
     if !can_change.is_ok_and(|it| it.status.success()) {
         return skip(
-            "who_belongs_to_other_groups_is_not_answered",
+            "client_in_other_groups_is_not_answered",
             "nobody can change groups here",
         );
     }

@@ -39,7 +39,7 @@ fn files() -> Vec<(&'static str, Vec<u8>)> {
 }
 
 #[test]
-fn what_a_scenario_rests_on_counts_warm_and_cold() {
+fn references_count_with_and_without_the_broker() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     for (name, bytes) in scenario() {
@@ -53,7 +53,7 @@ fn what_a_scenario_rests_on_counts_warm_and_cold() {
 }
 
 #[test]
-fn every_verdict_is_the_same_beside_the_farm_and_in_it() {
+fn verdicts_agree_inside_and_outside_the_farm() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     for (name, bytes) in files() {
@@ -73,7 +73,7 @@ fn every_verdict_is_the_same_beside_the_farm_and_in_it() {
 }
 
 #[test]
-fn the_sample_farm_is_judged_the_same() {
+fn sample_farm_gets_the_same_verdicts() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     let from = sample_farm();
@@ -92,7 +92,7 @@ fn the_sample_farm_is_judged_the_same() {
 }
 
 #[test]
-fn several_files_are_judged_the_same() {
+fn several_files_get_the_same_verdicts() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     let mut maps = Vec::new();
@@ -131,7 +131,7 @@ fn several_files_are_judged_the_same() {
 }
 
 #[test]
-fn every_way_of_printing_is_the_same() {
+fn every_output_format_is_the_same() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     let bad = bench.beside("bad.xodr", Content::NoHeader(1).bytes());
@@ -168,7 +168,7 @@ fn every_way_of_printing_is_the_same() {
 
 /// The broker sees its whole directory. A check of a file sees only what lies beside the file.
 #[test]
-fn includes_are_followed_as_far_as_without_the_broker() {
+fn includes_are_followed_as_without_the_broker() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     let including = Content::Including(1, "../part.xml".to_owned()).bytes();
@@ -201,7 +201,7 @@ fn includes_are_followed_as_far_as_without_the_broker() {
 }
 
 #[test]
-fn a_change_of_what_a_file_depends_on_is_seen_at_once() {
+fn changed_dependency_is_noticed_at_once() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     let mut files = Vec::new();
@@ -223,7 +223,7 @@ fn a_change_of_what_a_file_depends_on_is_seen_at_once() {
 }
 
 #[test]
-fn odd_names_and_links_are_the_same() {
+fn unusual_names_and_links_give_the_same_result() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     let bytes = Content::NoHeader(1).bytes();
@@ -252,7 +252,7 @@ fn odd_names_and_links_are_the_same() {
 }
 
 #[test]
-fn results_that_cannot_be_written_are_refused_alike() {
+fn unwritable_results_are_refused_alike() {
     let bench = Bench::new();
     let _broker = bench.farm.serve_ready();
     let file = bench.beside("map.xodr", Content::Good(1).bytes());

@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_begun_by_one_who_was_killed_is_dropped() {
+    fn unfinished_message_of_killed_sender_is_dropped() {
         let (one, other) = Channel::pair().unwrap();
         let mut packet = Vec::new();
         for word in [1_u64, 2, 100, 0] {

@@ -133,7 +133,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_report_module_gets_the_result_and_a_place_of_its_own() {
+    fn report_module_gets_result_path_and_own_output_path() {
         let own = [
             ("strReportFile".to_owned(), "/somewhere/mine.txt".to_owned()),
             ("strInputFile".to_owned(), "other.xqar".to_owned()),
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_in_force_is_handed_on_but_for_the_files() {
+    fn module_configuration_keeps_settings_and_replaces_paths() {
         let given = br#"<Config><Param name="InputFile" value="other"/><Param name="g" value="1"/>
             <CheckerBundle application="mine"><Param name="resultFile" value="there"/>
               <Param name="p" value="a &quot;b&quot; &lt;c&gt;&#10;"/>

@@ -128,7 +128,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_packed_file_is_handed_over_under_the_name_of_what_is_in_it() {
+    fn packed_file_gets_name_of_its_content() {
         let of = |path: &str| unpacked(Path::new(path));
         assert_eq!(of("/a/b.xodrz"), Some("/a/b.xodr".into()));
         assert_eq!(of("/a/B.XODRZ"), Some("/a/B.xodr".into()));

@@ -268,7 +268,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_leads_to_where_it_is_already_is_left_out() {
+    fn only_redundant_change_of_directory_is_removed() {
         let directory = Path::new("/var/a-b_1.c");
         let of = |command: &str| without_going_where_it_is(command, directory).to_owned();
         let rest = "qc_x -c $ASAM_QC_FRAMEWORK_CONFIG_FILE";

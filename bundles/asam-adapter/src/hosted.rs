@@ -209,7 +209,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_hosted_reads_back_what_it_says() {
+    fn hosted_arguments_parse_back_to_same_options() {
         let line = "--name a --exec x --application b --directory /d --env K=V=W --kind xodr --seconds 7 \
                     --memory-mb 8 --output-mb 9 --program /p --digest 0707070707070707070707070707070707070707070707070707070707070707 \
                     --program /q --scratch /s --cold --launch 3 --die-with-parent";
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_named() {
+    fn invalid_arguments_are_named_in_errors() {
         for wrong in [
             "",
             "--name a",

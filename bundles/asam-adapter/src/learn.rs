@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn of_much_that_was_printed_the_end_is_told() {
+    fn long_output_is_shortened_to_first_and_last_lines() {
         assert_eq!(shortened("why\none"), "why\none");
         let many: Vec<String> = (0..40).map(|it| it.to_string()).collect();
         assert_eq!(
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_of_another_standard_is_not_looked_at() {
+    fn kind_is_supported_only_if_some_checker_completes_cleanly() {
         let skipped = || {
             let reason = String::new();
             told(Ending::NotApplicable { reason }, None)

@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn files_lie_to_each_other_as_they_do_in_truth() {
+    fn staged_files_keep_relative_paths_and_report_changes() {
         let dir = tempfile::tempdir().unwrap();
         let files = [here("/a/b/c/x.xosc", 2), here("/a/maps/m.xodr", 3)];
         let staged = Staged::write(&files, b"xxmmm", dir.path()).unwrap();
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_on_disk_counts_only_as_it_was_seen() {
+    fn file_on_disk_is_staged_only_with_expected_digest() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.xodrz");
         std::fs::write(&path, "packed").unwrap();

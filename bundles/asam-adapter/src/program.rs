@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn program_with_other_bytes_is_named_and_the_same_bytes_are_not() {
+    fn only_program_with_changed_bytes_is_named() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("module.py");
         std::fs::write(&path, "one").unwrap();

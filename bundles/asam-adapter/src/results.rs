@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn paths_lead_back_wherever_they_stand() {
+    fn scratch_paths_in_result_are_mapped_to_real_paths() {
         let text = result(
             "<Param name=\"InputFile\" value=\"/scratch/1/input/maps/a.xodr\"/>",
             "<Checker checkerId=\"c\" status=\"completed\" description=\"\" summary=\"\">\
@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_can_rely_on_is_an_error_that_says_why() {
+    fn unusable_module_result_is_error_with_reason() {
         let failing = |ran: &Ran, text: &str| read("b", ran, text.as_bytes()).unwrap_err();
         let whole = result("", "");
         let none = Ran {
@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn skipped_for_what_others_found_is_no_answer_and_skipped_for_the_version_is() {
+    fn precondition_skip_is_blocked_and_version_skip_inapplicable() {
         let checker = |id: &str, status: &str, summary: &str, issue: &str| {
             format!(
                 "<Checker checkerId=\"{id}\" {status} description=\"\" summary=\"{summary}\">{issue}</Checker>"

@@ -152,7 +152,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_dead_offices_have_left_goes_and_what_the_living_have_stays() {
+    fn only_scratch_of_dead_runners_is_removed() {
         let base = tempfile::tempdir().unwrap();
         let root = base.path().join("scratch");
         let living = Scratch::open(&root).unwrap();

@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_come_by_name_and_nothing_else_does() {
+    fn regular_files_are_read_in_name_order_without_links() {
         let dir = tempfile::tempdir().unwrap();
         let put = |name: &str, text: &str| {
             let path = dir.path().join(name);

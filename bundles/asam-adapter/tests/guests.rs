@@ -145,7 +145,7 @@ fn processes_with(mark: &str) -> Vec<i32> {
 }
 
 #[test]
-fn a_polite_guest_is_believed() {
+fn result_of_well_behaved_module_is_accepted() {
     let guest = Guest::doing("polite");
     assert_eq!(guest.judge(&[]), (Some(0), String::new()));
     let guest = Guest::doing(
@@ -162,7 +162,7 @@ fn a_polite_guest_is_believed() {
 }
 
 #[test]
-fn it_sees_the_very_bytes_and_its_own_places_alone() {
+fn module_gets_original_bytes_and_private_directories() {
     let guest = Guest::doing(
         r#"cmp "$input" "REAL" || exit 4
         [ "$PWD" = "$ASAM_QC_FRAMEWORK_WORKING_DIR" ] || exit 5
@@ -186,37 +186,37 @@ fn it_sees_the_very_bytes_and_its_own_places_alone() {
 }
 
 #[test]
-fn exit_code_0_without_a_result_is_no_look() {
+fn missing_result_despite_exit_code_0_is_failure() {
     Guest::doing("echo I am done; exit 0").is_open(&[], &["no result", "I am done"]);
 }
 
 #[test]
-fn half_a_result_is_none() {
+fn truncated_result_is_failure() {
     let half = r#"polite; head -c 250 "$result" > half; mv half "$result""#;
     Guest::doing(half).is_open(&[], &["cannot be read"]);
     Guest::doing(": > \"$result\"").is_open(&[], &["cannot be read"]);
 }
 
 #[test]
-fn a_result_about_another_file_is_none() {
+fn result_about_another_file_is_failure() {
     let other = r#"{ begin /somewhere/else.xodr; checker one completed; checker two completed; end; } > "$result""#;
     Guest::doing(other).is_open(&[], &["about another file", "/somewhere/else.xodr"]);
 }
 
 #[test]
-fn a_result_from_before_is_none() {
+fn result_older_than_its_run_is_failure() {
     Guest::doing("polite; touch -d 2001-01-01 \"$result\"").is_open(&[], &["older than its run"]);
 }
 
 #[test]
-fn what_is_no_file_is_no_result() {
+fn result_that_is_no_regular_file_is_failure() {
     Guest::doing("mkfifo \"$result\"").is_open(&[], &["no file"]);
     Guest::doing("polite; mv \"$result\" x; ln -s x \"$result\"").is_open(&[], &["no file"]);
     Guest::doing("mkdir \"$result\"").is_open(&[], &["no file"]);
 }
 
 #[test]
-fn a_crash_is_told_with_what_it_printed_last() {
+fn crash_is_reported_with_last_output() {
     Guest::doing("polite; exit 7").is_open(&[], &["exit code 7", "printed nothing"]);
     Guest::doing("polite; echo oh no >&2; kill -SEGV $$").is_open(&[], &["signal 11", "oh no"]);
     let many = "i=0; while [ $i -lt 2000 ]; do echo line $i; i=$((i+1)); done; exit 1";
@@ -224,7 +224,7 @@ fn a_crash_is_told_with_what_it_printed_last() {
 }
 
 #[test]
-fn who_never_ends_is_ended() {
+fn module_beyond_time_limit_is_killed() {
     Guest::doing("polite; while :; do :; done")
         .is_open(&["--seconds", "1"], &["not done after 1 s"]);
     Guest::doing("polite; kill -STOP $$").is_open(&["--seconds", "1"], &["not done after 1 s"]);
@@ -233,7 +233,7 @@ fn who_never_ends_is_ended() {
 }
 
 #[test]
-fn who_floods_is_ended() {
+fn module_beyond_output_limit_is_killed() {
     Guest::doing("polite; yes").is_open(&["--output-mb", "1"], &["printed more than 1 MB"]);
     Guest::doing("polite; yes >&2").is_open(&["--output-mb", "1"], &["printed more than 1 MB"]);
     let file = "polite; exec yes > \"$result\"";
@@ -241,7 +241,7 @@ fn who_floods_is_ended() {
 }
 
 #[test]
-fn who_takes_all_memory_is_ended() {
+fn module_beyond_memory_limit_is_killed() {
     // The script doubles a text until the memory limit is reached.
     let leak = "polite; x=xxxxxxxxxxxxxxxx; while :; do x=$x$x; done";
     Guest::doing(leak).is_open(
@@ -251,7 +251,7 @@ fn who_takes_all_memory_is_ended() {
 }
 
 #[test]
-fn what_it_has_started_ends_with_it() {
+fn descendants_of_module_end_with_it() {
     let children = r#"polite
         i=0; while [ $i -lt 20 ]; do setsid sh -c "sleep $MARK & sleep $MARK" </dev/null & i=$((i+1)); done
         setsid sh -c "trap '' TERM; (sleep $MARK &) ; sleep $MARK" & exit 0"#;
@@ -266,33 +266,33 @@ fn what_it_has_started_ends_with_it() {
 }
 
 #[test]
-fn who_has_hundreds_of_processes_is_ended() {
+fn module_with_too_many_processes_is_killed() {
     let many =
         r#"polite; i=0; while [ $i -lt 400 ]; do setsid sleep $MARK & i=$((i+1)); done; wait"#;
     Guest::doing(many).is_open(&["--seconds", "60"], &["more than 256 processes"]);
 }
 
 #[test]
-fn what_changes_its_document_has_judged_something_else() {
+fn result_of_module_that_changed_its_document_is_failure() {
     let change = r#"polite; chmod u+w "$input"; echo "<!-- -->" >> "$input""#;
     Guest::doing(change).is_open(&[], &["changed its copy of", "real.xodr"]);
     Guest::doing("polite; rm \"$input\"").is_open(&[], &["changed its copy of"]);
 }
 
 #[test]
-fn who_takes_its_directory_away_has_no_result() {
+fn module_that_removes_its_directory_has_no_result() {
     Guest::doing("polite; cd /; rm -rf \"${ASAM_QC_FRAMEWORK_WORKING_DIR%/work}\"; exit 0")
         .is_open(&[], &["the module `guest`"]);
 }
 
 #[test]
-fn what_it_leaves_goes_however_it_is_left() {
+fn scratch_directory_without_permissions_is_removed() {
     let lock = "polite; mkdir -p a/b/c; echo x > a/b/c/d; chmod 0 a/b/c a/b a; exit 0";
     assert_eq!(Guest::doing(lock).judge(&[]), (Some(0), String::new()));
 }
 
 #[test]
-fn a_checker_that_is_missing_is_open_and_the_other_is_not() {
+fn missing_checker_is_open_and_others_are_not() {
     let guest = Guest::doing(r#"{ begin; checker two completed; end; } > "$result""#);
     let (code, said) = guest.judge(&[]);
     assert_eq!(code, Some(3), "{said}");
@@ -304,7 +304,7 @@ fn a_checker_that_is_missing_is_open_and_the_other_is_not() {
 }
 
 #[test]
-fn what_nobody_knew_of_is_not_lost() {
+fn findings_of_unknown_checker_are_kept() {
     let guest = Guest::doing(
         r#"{ begin; checker one completed; checker two completed; checker three completed "$(issue 1 "new and wrong")"; end; } > "$result""#,
     );
@@ -322,7 +322,7 @@ fn what_nobody_knew_of_is_not_lost() {
 }
 
 #[test]
-fn statuses_are_what_they_say() {
+fn error_status_fails_checker_and_skipped_status_does_not() {
     let guest =
         Guest::doing(r#"{ begin; checker one error; checker two skipped; end; } > "$result""#);
     let (code, said) = guest.judge(&[]);
@@ -335,7 +335,7 @@ fn statuses_are_what_they_say() {
 }
 
 #[test]
-fn a_module_that_tells_nothing_of_itself_is_of_no_use() {
+fn module_that_describes_no_checkers_is_refused() {
     let guest = Guest::doing("polite");
     for script in ["exit 0", "exit 3", "kill -9 $$"] {
         std::fs::write(
@@ -385,7 +385,7 @@ fn kill(pid: i32) {
 }
 
 #[test]
-fn who_is_killed_leaves_no_process_and_the_next_no_directory() {
+fn killed_process_leaves_no_module_process_or_directory() {
     if !Path::new("/proc/thread-self/children").exists() {
         eprintln!("skipped: this kernel does not list the children of a process");
         return;

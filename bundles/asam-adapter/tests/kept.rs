@@ -75,7 +75,7 @@ fn says(deed: &str, more: &[&str]) -> Option<String> {
 }
 
 #[test]
-fn a_module_is_kept_warm_unless_that_is_not_wanted() {
+fn module_runs_on_fork_server_unless_disabled() {
     let Some(warm) = says("pass", &[]) else {
         return;
     };
@@ -85,7 +85,7 @@ fn a_module_is_kept_warm_unless_that_is_not_wanted() {
 }
 
 #[test]
-fn a_run_that_takes_its_interpreter_along_is_done_once_more() {
+fn run_that_kills_its_fork_server_is_repeated_plainly() {
     let deed = "if warm: os.kill(os.getppid(), signal.SIGKILL); signal.pause()";
     let Some(said) = says(deed, &[]) else { return };
     assert!(said.contains("plain, job 1 of this process"), "{said}");
@@ -98,7 +98,7 @@ fn a_run_that_takes_its_interpreter_along_is_done_once_more() {
 }
 
 #[test]
-fn a_warm_run_is_held_to_its_limits() {
+fn fork_server_run_is_held_to_its_limits() {
     for (deed, why) in [
         ("while True: pass", "not done after 2 s"),
         ("os._exit(3)", "exit code 3"),

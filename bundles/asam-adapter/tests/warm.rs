@@ -48,7 +48,7 @@ def main():
 ";
 
 #[test]
-fn what_a_program_sees_is_the_same() {
+fn program_sees_same_environment_on_fork_server() {
     let Some(shop) = Workshop::new() else { return };
     shop.console("looks", LOOKS);
     let seen = shop.same("looks -c $ASAM_QC_FRAMEWORK_CONFIG_FILE \"${QCBUS_X}\" 'x y'");
@@ -77,7 +77,7 @@ fn what_a_program_sees_is_the_same() {
 }
 
 #[test]
-fn every_form_of_a_first_line_is_understood() {
+fn every_shebang_form_is_recognised() {
     let Some(shop) = Workshop::new() else { return };
     shop.module("form_main.py", "def main():\n    print('here')\n");
     let python = shop.python.display();
@@ -99,7 +99,7 @@ fn every_form_of_a_first_line_is_understood() {
 }
 
 #[test]
-fn every_end_is_the_same() {
+fn every_exit_is_the_same_on_fork_server() {
     let Some(shop) = Workshop::new() else { return };
     for (name, code, module) in ENDS {
         shop.console(name, module);
@@ -115,7 +115,7 @@ fn every_end_is_the_same() {
 }
 
 #[test]
-fn scripts_run_whole_for_each_job() {
+fn script_body_runs_again_for_each_job() {
     let Some(shop) = Workshop::new() else { return };
     let python = shop.python.display();
     for (name, body) in [
@@ -143,7 +143,7 @@ fn scripts_run_whole_for_each_job() {
 }
 
 #[test]
-fn a_job_sees_nothing_of_another() {
+fn jobs_do_not_see_state_of_earlier_jobs() {
     let Some(shop) = Workshop::new() else { return };
     let module = "import os, sys, random, tempfile\nseen = []\nmark = object()\ndef main():\n    \
         seen.append(os.getpid())\n    os.environ['LEFT'] = '1'\n    sys.path.append('/left')\n    os.umask(0o77)\n    \
@@ -170,7 +170,7 @@ fn a_job_sees_nothing_of_another() {
 }
 
 #[test]
-fn jobs_run_beside_each_other_and_can_be_killed() {
+fn jobs_run_in_parallel_and_can_be_killed() {
     let Some(shop) = Workshop::new() else { return };
     shop.console("sleeps", "import time\ndef main():\n    time.sleep(600)\n");
     let mut server = shop.start("sleeps").unwrap();
@@ -211,7 +211,7 @@ fn process(pid: u32) -> Pid {
 }
 
 #[test]
-fn limits_are_those_of_the_job() {
+fn job_process_gets_limits_of_its_job() {
     let Some(shop) = Workshop::new() else { return };
     shop.console("limits", "import resource as r\ndef main():\n    print([r.getrlimit(it) for it in (r.RLIMIT_DATA, r.RLIMIT_CPU, r.RLIMIT_FSIZE)])\n");
     let mut server = shop.start("limits").unwrap();
@@ -258,7 +258,7 @@ fn limits_are_those_of_the_job() {
 }
 
 #[test]
-fn what_cannot_be_the_same_is_run_plainly() {
+fn module_that_would_behave_differently_is_run_plainly() {
     let Some(shop) = Workshop::new() else { return };
     for (name, module, why) in REFUSED {
         shop.console(name, &format!("{module}\ndef main():\n    pass\n"));
@@ -271,7 +271,7 @@ fn what_cannot_be_the_same_is_run_plainly() {
 }
 
 #[test]
-fn what_is_not_recognised_is_said() {
+fn unsupported_command_is_refused_with_reason() {
     let Some(shop) = Workshop::new() else { return };
     let python = shop.python.display();
     shop.program("shell", "#!/bin/sh\necho hello\n");
@@ -355,7 +355,7 @@ fn what_is_not_recognised_is_said() {
 }
 
 #[test]
-fn jobs_that_are_otherwise_are_run_plainly() {
+fn job_with_different_environment_is_run_plainly() {
     let Some(shop) = Workshop::new() else { return };
     shop.module("other.py", "import json\nprint('ran')\n");
     let mut server = shop
@@ -395,7 +395,7 @@ fn jobs_that_are_otherwise_are_run_plainly() {
 }
 
 #[test]
-fn an_upgrade_is_noticed() {
+fn upgraded_module_makes_fork_server_outdated() {
     let Some(shop) = Workshop::new() else { return };
     shop.module("part.py", "VALUE = 'old'\n");
     shop.console(
@@ -441,7 +441,7 @@ fn an_upgrade_is_noticed() {
 }
 
 #[test]
-fn a_killed_server_leaves_its_jobs_to_the_subreaper() {
+fn killed_fork_server_leaves_its_jobs_to_subreaper() {
     let Some(shop) = Workshop::new() else { return };
     set_child_subreaper(Some(rustix::process::getpid())).unwrap();
     shop.console(
@@ -487,7 +487,7 @@ fn a_killed_server_leaves_its_jobs_to_the_subreaper() {
 /// Compares runs of ASAM's own modules and prints the time of each. `QCBUS_ASAM_VENV` names the
 /// environment; without it, `target/asam-venv`.
 #[test]
-fn asams_own_modules_give_the_same_results() {
+fn asam_modules_give_same_results_on_fork_server() {
     let venv = std::env::var_os("QCBUS_ASAM_VENV").map(PathBuf::from);
     let venv = venv
         .unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/asam-venv"));
@@ -557,7 +557,7 @@ fn compare(shop: &Workshop, program: &Path, config: &str) {
 }
 
 #[test]
-fn a_server_dies_with_whoever_started_it() {
+fn fork_server_ends_with_its_parent() {
     let Some(shop) = Workshop::new() else { return };
     shop.console("lives", "def main():\n    pass\n");
     let starts = || {
@@ -575,7 +575,7 @@ fn a_server_dies_with_whoever_started_it() {
 }
 
 #[test]
-fn an_import_is_not_waited_for_for_ever() {
+fn slow_import_times_out() {
     let Some(shop) = Workshop::new() else { return };
     shop.console(
         "slow",

@@ -102,7 +102,7 @@ fn expect(found: &[String], expected: &[(&str, &str)]) {
 }
 
 #[test]
-fn a_plain_archive_is_fine() {
+fn plain_archive_has_no_findings() {
     let members = vec![
         file("main.xosc", main(&[("library.xosc", "Drive")])),
         file("library.xosc", library()),
@@ -111,7 +111,7 @@ fn a_plain_archive_is_fine() {
 }
 
 #[test]
-fn marks_and_other_encodings_are_said_once_for_each_file() {
+fn byte_order_mark_is_reported_once_per_file() {
     let mark = |text: String| format!("\u{FEFF}{text}");
     let utf16: Vec<u8> = library()
         .replace("UTF-8", "UTF-16")
@@ -148,7 +148,7 @@ fn marks_and_other_encodings_are_said_once_for_each_file() {
 }
 
 #[test]
-fn what_is_no_archive_is_said_where_it_is_referred_to() {
+fn invalid_archive_is_reported_at_its_reference() {
     let root = file("main.xosc", main(&[("library.mosc", "Drive")]));
     let broken = file("library.mosc", "no archive");
     expect(
@@ -174,7 +174,7 @@ fn what_is_no_archive_is_said_where_it_is_referred_to() {
 }
 
 #[test]
-fn a_library_that_is_no_scenario_is_said_by_one_rule() {
+fn non_scenario_library_is_reported_by_single_rule() {
     let root = || file("main.xosc", main(&[("library.xosc", "Drive")]));
     for (test, text) in [("ill_formed", "<OpenSCENARIO>"), ("a_map", "<OpenDRIVE/>")] {
         expect(
@@ -193,14 +193,14 @@ fn a_library_that_is_no_scenario_is_said_by_one_rule() {
 }
 
 #[test]
-fn the_file_itself_is_left_to_the_bundle_for_scenarios() {
+fn ill_formed_main_scenario_is_left_to_scenario_bundle() {
     let text = main(&[("library.xosc", "Drive")]).replace("</Story>", "");
     let files = vec![file("main.xosc", text), file("library.xosc", library())];
     expect(&found("root_ill_formed", files), &[]);
 }
 
 #[test]
-fn why_a_file_is_not_had_is_said() {
+fn reason_for_missing_file_is_reported() {
     let name = "https://example.org/library.xosc";
     expect(
         &found("remote", vec![file("main.xosc", main(&[(name, "Drive")]))]),
@@ -220,7 +220,7 @@ fn why_a_file_is_not_had_is_said() {
 }
 
 #[test]
-fn members_of_one_name_are_said_once_for_the_archive() {
+fn duplicate_member_names_are_reported_once_per_archive() {
     let members = vec![
         file("main.xosc", main(&[("aa.xosc", "Drive")])),
         file("aa.xosc", library()),
@@ -239,7 +239,7 @@ fn members_of_one_name_are_said_once_for_the_archive() {
 }
 
 #[test]
-fn names_that_lead_out_are_no_unused_members_besides() {
+fn escaping_member_names_are_not_also_reported_as_unused() {
     for (test, name, what) in [
         ("up", "../x.xosc", "leads out of the archive"),
         (
@@ -265,7 +265,7 @@ fn names_that_lead_out_are_no_unused_members_besides() {
 }
 
 #[test]
-fn a_bare_doctype_counts_only_as_one() {
+fn bare_doctype_is_information_and_commented_out_is_ignored() {
     let with =
         |before: &str| library().replace("<OpenSCENARIO>", &format!("{before}<OpenSCENARIO>"));
     let bare = "<!DOCTYPE OpenSCENARIO>";
@@ -306,7 +306,7 @@ fn nested(inner: (String, Vec<u8>)) -> Files {
 }
 
 #[test]
-fn members_collide_when_they_differ() {
+fn same_named_members_with_different_content_collide() {
     expect(
         &found("alike", nested(file("library.xosc", library()))),
         &[],
@@ -325,7 +325,7 @@ fn members_collide_when_they_differ() {
 }
 
 #[test]
-fn what_an_inner_archive_finds_in_the_outer_one_is_used() {
+fn outer_member_used_by_inner_archive_counts_as_used() {
     let inner = vec![file("main.xosc", main(&[("library.xosc", "Drive")]))];
     let members = vec![
         file("main.xosc", main(&[("inner.mosc", "M0.Drive")])),
@@ -360,7 +360,7 @@ fn chain(length: usize) -> Files {
 }
 
 #[test]
-fn depth_is_counted_in_references() {
+fn reference_depth_is_counted_in_references() {
     expect(&found("depth_8", chain(8)), &[]);
     expect(
         &found("depth_9", chain(9)),
@@ -377,7 +377,7 @@ fn depth_is_counted_in_references() {
 }
 
 #[test]
-fn a_reference_upwards_cannot_be_packed() {
+fn upward_or_backslash_reference_cannot_be_packed() {
     let files = vec![
         file(
             "s/main.xosc",

@@ -159,7 +159,7 @@ fn expanded(loaded: &Loaded) -> Option<String> {
 }
 
 #[test]
-fn where_the_reference_tool_is_right_the_expansion_is_the_same() {
+fn expansion_equals_reference_tool_where_it_is_right() {
     let Some(cases) = cases() else { return };
     let mut seen = 0;
     for case in list(&cases) {
@@ -176,7 +176,7 @@ fn where_the_reference_tool_is_right_the_expansion_is_the_same() {
 }
 
 #[test]
-fn where_the_reference_tool_is_wrong_the_named_check_fires() {
+fn named_check_fires_where_reference_tool_is_wrong() {
     let Some(cases) = cases() else { return };
     let plan = Plan::by_default(&BUNDLE);
     let mut silent = Vec::new();
@@ -196,7 +196,7 @@ fn where_the_reference_tool_is_wrong_the_named_check_fires() {
 }
 
 #[test]
-fn every_check_of_the_list_is_a_rule() {
+fn every_listed_check_is_a_rule() {
     let uids: BTreeSet<String> = BUNDLE
         .rules
         .iter()

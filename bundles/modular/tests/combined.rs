@@ -69,7 +69,7 @@ fn speed(attributes: &str) -> String {
 }
 
 #[test]
-fn a_parameter_that_many_values_need_is_said_once() {
+fn parameter_missing_for_many_values_is_reported_once() {
     let library = file("", &offering("Drive", &speed(r#"value="$v""#)));
     let groups = taking("A", "lib.xosc", "Drive", &[]) + &taking("B", "lib.xosc", "Drive", &[]);
     let files = [
@@ -84,7 +84,7 @@ fn a_parameter_that_many_values_need_is_said_once() {
 }
 
 #[test]
-fn a_story_may_declare_what_a_group_needs() {
+fn story_declaration_resolves_parameter_of_group() {
     let library = file("", &offering("Drive", &speed(r#"value="$v""#)));
     let main = file(ENTITIES, &taking("A", "lib.xosc", "Drive", &[])).replace(
         r#"<Story name="S">"#,
@@ -96,7 +96,7 @@ fn a_story_may_declare_what_a_group_needs() {
 }
 
 #[test]
-fn text_that_is_no_parameter_needs_none() {
+fn dollar_text_that_is_no_parameter_is_ignored() {
     for value in ["$$", "$(find-pkg-share x)", "5$", "$"] {
         let library = file(
             "",
@@ -109,7 +109,7 @@ fn text_that_is_no_parameter_needs_none() {
 }
 
 #[test]
-fn entities_may_be_named_by_parameters() {
+fn entity_named_by_parameter_is_resolved() {
     let action = |name: &str| {
         format!(
             r#"<SynchronizeAction masterEntityRef="{name}" parameterAttributes="masterEntityRef"/>"#
@@ -137,7 +137,7 @@ fn entities_may_be_named_by_parameters() {
 }
 
 #[test]
-fn values_of_inner_scenarios_are_judged_where_they_are_written() {
+fn inner_scenario_values_are_checked_where_written() {
     let library = || {
         let offers = speed(r#"value="0" parameterAttributes="value""#);
         file("", &offering("Drive", &offers))
@@ -168,7 +168,7 @@ fn values_of_inner_scenarios_are_judged_where_they_are_written() {
 }
 
 #[test]
-fn catalogs_that_cannot_be_read_may_be_the_ones() {
+fn unreadable_catalog_location_hides_unresolved_reference() {
     let route = r#"<RoutingAction><AssignRouteAction><CatalogReference catalogName="r" entryName="e"/>
         </AssignRouteAction></RoutingAction>"#;
     let library = || file("", &offering("Drive", route));
@@ -183,7 +183,7 @@ fn catalogs_that_cannot_be_read_may_be_the_ones() {
 }
 
 #[test]
-fn a_group_that_is_not_found_hides_no_other() {
+fn missing_group_does_not_hide_findings_of_others() {
     let offers = speed(r#"value="0" parameterAttributes="value""#);
     let library = file("", &offering("Drive", &offers));
     let groups = taking("A", "gone.xosc", "Drive", &[])
@@ -207,7 +207,7 @@ fn often(count: usize, from: &str, keys: &[(&str, &str)]) -> String {
 }
 
 #[test]
-fn what_is_wrong_with_a_library_is_said_once() {
+fn library_fault_is_reported_once_for_all_references() {
     let good = || offering("Drive", &speed(r#"value="0" parameterAttributes="value""#));
     let nobody = good().replace(r#"<EntityRef entityRef="Veh"/>"#, "");
     let two = good().replace("</Actors>", r#"<EntityRef entityRef="Veh2"/></Actors>"#);
@@ -267,7 +267,7 @@ fn what_is_wrong_with_a_library_is_said_once() {
 }
 
 #[test]
-fn a_circle_is_said_once() {
+fn reference_cycle_is_reported_once() {
     let back = |from: &str| taking("Drive", from, "Drive", &[]) + &taking("B", from, "Drive", &[]);
     let files = [
         ("main.xosc", file(ENTITIES, &back("lib.xosc"))),
@@ -281,7 +281,7 @@ fn a_circle_is_said_once() {
 }
 
 #[test]
-fn two_values_of_one_key_are_told_in_two_halves() {
+fn two_values_for_same_key_are_ambiguous_and_duplicate() {
     let offers = speed(r#"value="0" parameterAttributes="value""#);
     let key = "AbsoluteTargetSpeed.value";
     let main = often(1, "lib.xosc", &[(key, "1"), (key, "2")]);
@@ -303,7 +303,7 @@ fn two_values_of_one_key_are_told_in_two_halves() {
 }
 
 #[test]
-fn what_is_there_and_not_offered_is_said_of_the_key() {
+fn key_for_unlisted_attribute_is_reported_with_reason() {
     let action = r#"<TeleportAction><Position><WorldPosition x="0" y="0" parameterAttributes="x"/></Position>
         </TeleportAction>"#;
     for (key, text) in [
@@ -339,7 +339,7 @@ fn what_is_there_and_not_offered_is_said_of_the_key() {
 }
 
 #[test]
-fn lists_that_cannot_be_read_are_told_from_those_that_lack_a_name() {
+fn malformed_parameter_attribute_list_is_reported_as_such() {
     let action = r#"<TeleportAction><Position><WorldPosition x="0" y="0" parameterAttributes=" x ; y"/></Position>
         </TeleportAction>"#;
     let files = [
@@ -356,7 +356,7 @@ fn lists_that_cannot_be_read_are_told_from_those_that_lack_a_name() {
 }
 
 #[test]
-fn what_cdata_has_stays() {
+fn less_than_sign_in_cdata_is_not_reported() {
     let script = |text: &str| {
         let action = format!(
             "<UserDefinedAction><CustomCommandAction type='t'>{text}</CustomCommandAction></UserDefinedAction>"

@@ -24,7 +24,7 @@ fn table() -> String {
 }
 
 #[test]
-fn the_readme_lists_every_rule() {
+fn readme_lists_every_rule() {
     let text = std::fs::read_to_string(README).unwrap();
     let (before, after) = text.split_once(BEGIN).unwrap();
     let rest = after.find("\n\n").map_or("", |end| &after[end + 1..]);

@@ -37,17 +37,17 @@ const LIBRARY: &str = include_str!("../../../tests/farm/modular/moves.xosc");
 const FURTHER: &str = include_str!("../../../tests/farm/faulty/misassembled.xosc");
 
 #[test]
-fn truncated_examples_break_no_rule() {
+fn no_rule_fails_on_truncated_examples() {
     ROBUST.assert_truncated_examples();
 }
 
 #[test]
-fn mutated_examples_break_no_rule() {
+fn no_rule_fails_on_mutated_examples() {
     ROBUST.assert_mutated_examples();
 }
 
 #[test]
-fn a_modular_scenario_broken_in_any_way_breaks_no_rule() {
+fn no_rule_fails_on_broken_modular_scenario() {
     let files = [
         ("convoy.xosc", MAIN),
         ("moves.xosc", LIBRARY),

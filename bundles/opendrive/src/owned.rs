@@ -61,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_outlives_those_who_made_it_and_may_be_shared_between_threads() {
+    fn map_outlives_its_creator_and_is_shared_between_threads() {
         let map = OwnedMap::of(image(
             "<OpenDRIVE><road id='1'/><road id='2'><signals><signal id='s'/></signals></road></OpenDRIVE>",
         ))
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_image_is_no_map() {
+    fn map_from_invalid_image_is_refused() {
         let map = OwnedMap::of(Image::new(*b"<OpenDRIVE/>"));
         assert!(map.is_err(), "{map:?}");
     }

@@ -239,7 +239,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_finite_or_absent() {
+    fn only_finite_numbers_are_parsed() {
         assert_eq!(parse_number(" 1.5e2\n"), Some(150.0));
         for text in [
             "", "INF", "inf", "NaN", "nan", "1e999", "1e31", "1,5", "infinity",

@@ -57,7 +57,7 @@ fn ordinary() -> impl Strategy<Value = Placed> {
 
 proptest! {
     #[test]
-    fn the_heading_is_the_direction_of_the_curve(curve in ordinary(), share in 0.01..0.99_f64) {
+    fn heading_is_direction_of_curve(curve in ordinary(), share in 0.01..0.99_f64) {
         let ds = share * curve.length;
         let (before, here, after) = (curve.point(ds - 1e-5), curve.pose(ds), curve.point(ds + 1e-5));
         let (before, here, after) = (before.unwrap(), here.unwrap(), after.unwrap());
@@ -66,7 +66,7 @@ proptest! {
     }
 
     #[test]
-    fn the_curvature_is_the_turn_per_metre(curve in ordinary(), share in 0.01..0.99_f64) {
+    fn curvature_is_turn_per_metre(curve in ordinary(), share in 0.01..0.99_f64) {
         let ds = share * curve.length;
         let (before, here, after) = (curve.pose(ds - 1e-4).unwrap(), curve.pose(ds).unwrap(), curve.pose(ds + 1e-4).unwrap());
         let metres = before.point().distance(after.point());
@@ -83,7 +83,7 @@ proptest! {
     }
 
     #[test]
-    fn a_spiral_of_equal_curvatures_is_an_arc(curvature in -0.5..0.5_f64, length in 0.1..200.0_f64, share in 0.0..1.0_f64) {
+    fn spiral_of_equal_curvatures_is_arc(curvature in -0.5..0.5_f64, length in 0.1..200.0_f64, share in 0.0..1.0_f64) {
         let spiral = placed(Curve::Spiral(Spiral::between(curvature, curvature, length).unwrap()), length);
         let arc = placed(Curve::Arc { curvature }, length);
         let (one, other) = (spiral.pose(share * length).unwrap(), arc.pose(share * length).unwrap());
@@ -92,7 +92,7 @@ proptest! {
     }
 
     #[test]
-    fn a_spiral_there_and_back_ends_where_it_began(from in -0.2..0.2_f64, to in -0.2..0.2_f64, length in 1.0..100.0_f64) {
+    fn spiral_forth_and_back_ends_at_its_start(from in -0.2..0.2_f64, to in -0.2..0.2_f64, length in 1.0..100.0_f64) {
         let there = placed(Curve::Spiral(Spiral::between(from, to, length).unwrap()), length);
         let end = there.pose(length).unwrap();
         let curve = Curve::Spiral(Spiral::between(-to, -from, length).unwrap());
@@ -102,7 +102,7 @@ proptest! {
     }
 
     #[test]
-    fn a_straight_parametric_curve_is_as_long_as_it_looks(bu in -3.0..3.0_f64, bv in -3.0..3.0_f64, length in 0.1..50.0_f64) {
+    fn straight_parametric_curve_has_expected_length(bu in -3.0..3.0_f64, bv in -3.0..3.0_f64, length in 0.1..50.0_f64) {
         prop_assume!(bu.hypot(bv) > 1e-3);
         let (u, v) = (Cubic::new(0.0, bu, 0.0, 0.0), Cubic::new(0.0, bv, 0.0, 0.0));
         let long = Curve::ParamPoly3(ParamPoly3 { u, v, range: ParamRange::ArcLength });
@@ -115,14 +115,14 @@ proptest! {
     }
 
     #[test]
-    fn a_poly3_is_as_long_as_asked(c in -0.05..0.05_f64, d in -0.001..0.001_f64, ds in 0.0..60.0_f64) {
+    fn poly3_parameter_gives_requested_arc_length(c in -0.05..0.05_f64, d in -0.001..0.001_f64, ds in 0.0..60.0_f64) {
         let curve = Poly3 { v: Cubic::new(0.0, 0.0, c, d) };
         let u = curve.parameter(ds).unwrap();
         prop_assert!((curve.arc_length(u).unwrap() - ds).abs() < 1e-8);
     }
 
     #[test]
-    fn hostile_numbers_end_in_nothing_or_in_something_finite(
+    fn extreme_numbers_give_finite_results_or_none(
         numbers in proptest::array::uniform12(hostile()), normalized in any::<bool>(),
     ) {
         let [a, b, c, d, e, f, g, h, x, hdg, length, ds] = numbers;
@@ -179,7 +179,7 @@ fn hostile() -> impl Strategy<Value = f64> {
 }
 
 #[test]
-fn once_round_a_circle() {
+fn full_circle_ends_at_its_start() {
     for radius in [0.5, 10.0, 1e6] {
         let length = TAU * radius;
         let circle = placed(
@@ -197,7 +197,7 @@ fn once_round_a_circle() {
 }
 
 #[test]
-fn a_parabola_has_its_textbook_length() {
+fn parabola_has_textbook_length() {
     // v = u²/2 from 0 to 1: (√2 + asinh 1) / 2.
     let curve = Poly3 {
         v: Cubic::new(0.0, 0.0, 0.5, 0.0),
@@ -207,7 +207,7 @@ fn a_parabola_has_its_textbook_length() {
 }
 
 #[test]
-fn a_vanishing_curvature_goes_straight_on() {
+fn vanishing_curvature_gives_straight_line() {
     let straight = placed(Curve::Line, 50.0).point(50.0).unwrap();
     for curvature in [0.0, 1e-300, 1e-18, -1e-15] {
         let arc = placed(Curve::Arc { curvature }, 50.0).point(50.0).unwrap();
@@ -219,7 +219,7 @@ fn a_vanishing_curvature_goes_straight_on() {
 }
 
 #[test]
-fn a_standing_curve_has_a_place_but_no_direction() {
+fn stationary_curve_has_point_but_no_pose() {
     let still = Cubic::constant(2.0);
     let curve = ParamPoly3 {
         u: still,

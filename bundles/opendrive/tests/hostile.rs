@@ -126,14 +126,14 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
     #[test]
-    fn everything_may_be_asked_of_anything(values in prop::collection::vec(numbers(), 140)) {
+    fn arbitrary_numbers_make_no_query_panic(values in prop::collection::vec(numbers(), 140)) {
         let roads = fill(TEMPLATE, values.into_iter());
         with_map(&roads, ask_everything);
     }
 }
 
 #[test]
-fn tame_numbers_are_answered() {
+fn ordinary_numbers_are_answered() {
     let answers = with_map(
         &fill(TEMPLATE, std::iter::repeat("1".to_owned())),
         ask_everything,
@@ -142,7 +142,7 @@ fn tame_numbers_are_answered() {
 }
 
 #[test]
-fn an_empty_map_is_empty() {
+fn empty_map_gives_no_answers() {
     assert_eq!(with_map("", ask_everything), 0);
     assert_eq!(
         with_map(
@@ -154,7 +154,7 @@ fn an_empty_map_is_empty() {
 }
 
 #[test]
-fn no_side_of_thousands_of_lanes_is_added_up() {
+fn side_with_thousands_of_lanes_has_no_borders() {
     let lanes: String = (1..=5000)
         .map(|id| {
             format!(r#"<lane id="-{id}"><width sOffset="0" a="1" b="0" c="0" d="0"/></lane>"#)

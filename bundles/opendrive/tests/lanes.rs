@@ -70,7 +70,7 @@ fn borders_add_up_from_the_lane_offset() {
 }
 
 #[test]
-fn a_step_is_seen_from_either_side() {
+fn step_in_lane_offset_is_seen_from_either_side() {
     with_map(ROAD, |map| {
         near(lane_t(map, 0, 1, Edge::Inner, Station::before(50.0)), 0.5);
         near(lane_t(map, 0, 1, Edge::Inner, 50.0), 1.0);
@@ -79,7 +79,7 @@ fn a_step_is_seen_from_either_side() {
 }
 
 #[test]
-fn border_records_count_where_no_lane_of_the_side_has_a_width() {
+fn border_records_count_on_side_without_widths() {
     with_map(ROAD, |map| {
         near(lane_t(map, 1, -2, Edge::Inner, 5.0), -2.0);
         near(lane_t(map, 1, -2, Edge::Outer, 5.0), -5.5);
@@ -107,7 +107,7 @@ fn spans_agree_with_single_borders() {
 }
 
 #[test]
-fn sections_know_their_ends() {
+fn section_lengths_end_at_next_section() {
     with_map(ROAD, |map| {
         let road = map.road("a-1").unwrap();
         let layer = road.permanent().unwrap();
@@ -130,7 +130,7 @@ fn sections_know_their_ends() {
 }
 
 #[test]
-fn a_section_for_one_side_leaves_the_other_alone() {
+fn single_side_section_leaves_other_side_unchanged() {
     let lane =
         |id: i64| format!(r#"<lane id="{id}"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>"#);
     let road = format!(
@@ -158,7 +158,7 @@ fn a_section_for_one_side_leaves_the_other_alone() {
 }
 
 #[test]
-fn a_temporary_section_ends_after_its_length() {
+fn temporary_section_ends_after_its_length() {
     let road = r#"<road id="1" length="90">
         <lanes><laneSection s="0"/></lanes>
         <lanes layer="temporary"><laneSection s="10" length="20"/><laneSection s="50"/></lanes></road>"#;
@@ -176,7 +176,7 @@ fn a_temporary_section_ends_after_its_length() {
 }
 
 #[test]
-fn lanes_lie_on_the_road_and_above_it() {
+fn lane_borders_include_elevation_and_lane_height() {
     with_map(ROAD, |map| {
         let lane = map.sections().next().unwrap().lane(2).unwrap();
         let inner = lane.border(Edge::Inner, 10.0).unwrap();
@@ -191,7 +191,7 @@ fn lanes_lie_on_the_road_and_above_it() {
 }
 
 #[test]
-fn links_become_joints_in_both_directions() {
+fn lane_links_become_joints_in_both_directions() {
     with_map(ROAD, |map| {
         let joints: Vec<_> = map.lane_joints().collect();
         assert_eq!(joints.len(), 2);
@@ -204,7 +204,7 @@ fn links_become_joints_in_both_directions() {
 }
 
 #[test]
-fn ids_that_tell_no_order_make_no_borders() {
+fn unordered_lane_ids_give_no_borders() {
     let road = |ids: [&str; 2]| {
         let lane = |id: &str| {
             format!(r#"<lane id="{id}"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>"#)
@@ -242,7 +242,7 @@ fn ids_that_tell_no_order_make_no_borders() {
 }
 
 #[test]
-fn superelevation_turns_the_lanes_but_not_those_kept_level() {
+fn superelevation_tilts_lanes_except_level_ones() {
     let road = r#"<road id="1" length="50">
       <planView><geometry s="0" x="0" y="0" hdg="0" length="50"><line/></geometry></planView>
       <lateralProfile><superelevation s="0" a="0.1" b="0" c="0" d="0"/></lateralProfile>
@@ -295,7 +295,7 @@ fn shapes_blend_linearly_along_s() {
 }
 
 #[test]
-fn outer_strips_start_at_the_edge_of_the_inner_one() {
+fn outer_strips_start_at_edge_of_inner_strip() {
     let road = |mode: &str| {
         format!(
             r#"<road id="1" length="50">
@@ -322,7 +322,7 @@ fn outer_strips_start_at_the_edge_of_the_inner_one() {
 }
 
 #[test]
-fn a_border_on_a_curve_has_its_own_heading() {
+fn border_on_curve_has_its_own_heading() {
     let road = r#"<road id="1" length="10">
       <planView><geometry s="0" x="0" y="0" hdg="0" length="10"><arc curvature="0.1"/></geometry></planView>
       <lanes><laneSection s="0"><left>

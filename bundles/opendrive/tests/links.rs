@@ -116,7 +116,7 @@ fn ids_are_strings_and_duplicates_are_kept() {
 }
 
 #[test]
-fn a_node_leads_back_to_its_road() {
+fn node_leads_back_to_its_road() {
     map(|map| {
         let width = map
             .road("out")
@@ -136,7 +136,7 @@ fn a_node_leads_back_to_its_road() {
 }
 
 #[test]
-fn a_map_may_be_shared_and_outlives_a_rule_that_panics() {
+fn map_is_shareable_and_survives_rule_panic() {
     fn shareable<T: Send + Sync + std::panic::RefUnwindSafe>(_: &T) {}
     map(|map| {
         shareable(map);

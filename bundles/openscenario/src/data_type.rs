@@ -237,7 +237,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn literals_are_those_of_the_schema() {
+    fn literals_match_schema_data_types() {
         for (data_type, good, bad) in [
             (
                 DataType::Double,

@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_calendar_has_is_refused() {
+    fn impossible_dates_are_refused() {
         for text in [
             "",
             "T",

@@ -39,7 +39,7 @@ fn fastest(scenario: &Scenario<'_>) -> Option<f64> {
 }
 
 #[test]
-fn an_entry_is_read_with_what_is_assigned() {
+fn catalog_entry_is_read_with_assigned_parameters() {
     for (assigned, expected) in [
         (String::new(), Some(70.0)),
         (assign("fast", "30"), Some(30.0)),
@@ -58,7 +58,7 @@ fn an_entry_is_read_with_what_is_assigned() {
 }
 
 #[test]
-fn an_entry_sees_none_of_the_scenarios_parameters() {
+fn catalog_entry_does_not_see_scenario_parameters() {
     let parameters = "<ParameterDeclarations><ParameterDeclaration name=\"outer\" parameterType=\"double\" \
                       value=\"5\"/></ParameterDeclarations>";
     let car = CAR.replace("$fast", "$outer");
@@ -85,7 +85,7 @@ fn resolution<T>(body: &str, catalogs: &[&str], look: impl FnOnce(&Resolution<'_
 }
 
 #[test]
-fn a_reference_that_leads_nowhere_says_why() {
+fn unresolved_catalog_reference_gives_reason() {
     let to = |catalog: &str, entry: &str| object(&reference(catalog, entry, ""));
     let is = |body: &str, expected: &str| {
         let found = resolution(body, &[CAR], |resolution| format!("{resolution:?}"));
@@ -113,7 +113,7 @@ fn a_reference_that_leads_nowhere_says_why() {
 const MOVES: &str = "<Maneuver name=\"brake\"><Event name=\"now\" priority=\"override\"><Action name=\"stop\"/></Event></Maneuver>";
 
 #[test]
-fn a_maneuver_from_a_catalog_belongs_to_the_storyboard() {
+fn maneuver_from_catalog_belongs_to_storyboard() {
     let body = format!(
         "{VEHICLES}<Entities/><Storyboard><Story name=\"s\"><Act name=\"a\"><ManeuverGroup name=\"g\">{}\
          </ManeuverGroup></Act></Story></Storyboard>",
@@ -144,7 +144,7 @@ fn a_maneuver_from_a_catalog_belongs_to_the_storyboard() {
 }
 
 #[test]
-fn paths_lead_from_parent_to_child_without_a_gap() {
+fn storyboard_reference_needs_path_without_gap() {
     let body = "<Entities/><Storyboard><Story name=\"s\"><Act name=\"a\"><ManeuverGroup name=\"g\"><Maneuver name=\"m\">\
                 <Event name=\"x\"/></Maneuver></ManeuverGroup></Act><Act name=\"b\"><ManeuverGroup name=\"g\"><Maneuver \
                 name=\"m\"><Event name=\"x\"/></Maneuver></ManeuverGroup></Act></Story></Storyboard>";
@@ -159,7 +159,7 @@ fn paths_lead_from_parent_to_child_without_a_gap() {
 }
 
 #[test]
-fn references_in_a_circle_come_to_an_end() {
+fn circular_catalog_references_terminate() {
     let locations = "<CatalogLocations><ControllerCatalog><Directory path=\"a\"/></ControllerCatalog></CatalogLocations>";
     let inner = reference("c0", "driver", "");
     let driver = format!(

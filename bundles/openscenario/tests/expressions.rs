@@ -55,7 +55,7 @@ fn fault(text: &str) -> (&'static str, usize) {
 
 /// Checks the expected values of the reference implementation's own tests.
 #[test]
-fn the_expressions_of_the_reference_tests() {
+fn reference_test_expressions_evaluate_as_expected() {
     for (text, kind) in [
         ("${2/0}", "evaluation"),
         ("${34/$doubleVal}", "evaluation"),
@@ -86,7 +86,7 @@ fn the_expressions_of_the_reference_tests() {
 }
 
 #[test]
-fn every_line_of_the_grammar() {
+fn every_grammar_production_is_evaluated() {
     use Value::{Boolean, Double, Integer};
     for (inner, expected) in [
         (" 7\t\r\n", Integer(7)),
@@ -152,7 +152,7 @@ fn every_line_of_the_grammar() {
 }
 
 #[test]
-fn what_is_not_of_the_language_is_named_where_it_stands() {
+fn foreign_syntax_is_reported_at_its_position() {
     for (text, kind, at) in [
         ("${2 ** 3}", "operator", 4),
         ("${7 // 2}", "operator", 4),
@@ -187,7 +187,7 @@ fn what_is_not_of_the_language_is_named_where_it_stands() {
 }
 
 #[test]
-fn what_cannot_be_read_or_computed_is_named_where_it_stands() {
+fn invalid_expression_is_reported_at_its_position() {
     for (text, kind, at) in [
         ("5", "evaluation", 0),
         (" $half", "evaluation", 1),
@@ -243,7 +243,7 @@ fn what_cannot_be_read_or_computed_is_named_where_it_stands() {
 }
 
 #[test]
-fn the_gravest_fault_is_told_and_no_other() {
+fn only_most_severe_fault_is_reported() {
     for (text, kind, at) in [
         // Syntax errors come first.
         ("${$none + 1 and 2/0 ^ 2}", "operator", 20),
@@ -273,7 +273,7 @@ fn the_gravest_fault_is_told_and_no_other() {
 }
 
 #[test]
-fn faults_teach() {
+fn faults_explain_the_correction() {
     for (text, expected) in [
         (
             "${3^2}",
@@ -322,7 +322,7 @@ fn faults_teach() {
 }
 
 #[test]
-fn the_version_decides_what_is_known() {
+fn version_decides_which_functions_are_known() {
     let text = "${sin(cos(0)) * sin(1) + sqrt(4) + max(1, 2)}";
     let newer = in_version(text, 2).unwrap().newer;
     let since = (1, 3);
@@ -337,7 +337,7 @@ fn the_version_decides_what_is_known() {
 }
 
 #[test]
-fn lost_digits_are_noted() {
+fn lost_precision_is_noted() {
     for (text, at) in [
         ("${9007199254740993 + 0.5}", Some(19)),
         ("${1 + sqrt(9007199254740993)}", Some(6)),
@@ -358,7 +358,7 @@ fn lost_digits_are_noted() {
 }
 
 #[test]
-fn names_are_found_in_faulty_expressions_too() {
+fn parameter_names_are_found_in_faulty_expressions() {
     assert_eq!(
         names("${$a * ($b_2+$a)}"),
         [("a", 2), ("b_2", 8), ("a", 13)]

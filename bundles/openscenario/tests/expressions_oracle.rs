@@ -19,7 +19,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(4000))]
 
     #[test]
-    fn expressions_are_worth_what_the_oracle_computes(tree in tree(), seed in 1_u64..) {
+    fn expression_values_match_the_oracle(tree in tree(), seed in 1_u64..) {
         let mut text = "${".to_owned();
         write(&tree, 0, &mut Dice(seed), &mut text);
         text.push('}');

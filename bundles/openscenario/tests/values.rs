@@ -41,7 +41,7 @@ fn speed(parameters: &[(&str, &str, &str)], value: &str) -> (Option<f64>, Vec<Va
 }
 
 #[test]
-fn literals_parameters_and_expressions_are_numbers() {
+fn literals_parameters_and_expressions_give_numbers() {
     let v = [
         ("v", "double", "12.5"),
         ("n", "int", "3"),
@@ -55,7 +55,7 @@ fn literals_parameters_and_expressions_are_numbers() {
 }
 
 #[test]
-fn a_fault_is_listed_once_and_nothing_follows_from_it() {
+fn fault_is_listed_once_without_follow_up_faults() {
     let broken = [
         ("a", "double", "abc"),
         ("b", "double", "${$a + 1}"),
@@ -93,7 +93,7 @@ fn each_fault_has_its_kind() {
 }
 
 #[test]
-fn a_declaration_uses_what_is_declared_before_it() {
+fn declaration_uses_only_earlier_declarations() {
     let early = [("a", "double", "${$b + 1}"), ("b", "double", "2")];
     assert_eq!(speed(&early, "$a"), (None, vec![ValueFaultKind::Order]));
     let itself = [("a", "double", "$a")];
@@ -104,7 +104,7 @@ fn a_declaration_uses_what_is_declared_before_it() {
 }
 
 #[test]
-fn the_innermost_declaration_holds_and_siblings_see_nothing() {
+fn innermost_declaration_wins_and_siblings_are_invisible() {
     let story = |name: &str, declared: &str| {
         format!(
             "<Story name=\"{name}\">{declared}<Act name=\"a\"><StartTrigger><ConditionGroup><Condition \
@@ -128,7 +128,7 @@ fn the_innermost_declaration_holds_and_siblings_see_nothing() {
 }
 
 #[test]
-fn words_are_those_of_the_version() {
+fn unknown_enumeration_word_is_fault() {
     let event = |priority: &str| {
         format!(
             "{}<Entities/><Storyboard><Story name=\"s\"><Act name=\"a\"><ManeuverGroup name=\"g\"><Maneuver \
@@ -155,7 +155,7 @@ fn words_are_those_of_the_version() {
 }
 
 #[test]
-fn text_keeps_what_only_looks_like_an_expression() {
+fn text_that_looks_like_expression_is_kept() {
     let body = "<Entities><ScenarioObject name=\"${Ego car}\"/><ScenarioObject name=\"costs 5$\"/></Entities>";
     with_scenario(body, |scenario| {
         let names: Vec<_> = scenario.entities().names().map(str::to_owned).collect();
@@ -166,7 +166,7 @@ fn text_keeps_what_only_looks_like_an_expression() {
 }
 
 #[test]
-fn names_of_declarations_are_never_replaced() {
+fn declaration_names_are_never_replaced() {
     let body = format!(
         "{}<Entities/><Storyboard/>",
         declare(&[("$old", "double", "1")])
@@ -178,7 +178,7 @@ fn names_of_declarations_are_never_replaced() {
 }
 
 #[test]
-fn a_chain_of_ten_thousand_declarations_needs_no_stack() {
+fn chain_of_ten_thousand_declarations_does_not_overflow() {
     let mut parameters = String::from(
         "<ParameterDeclarations><ParameterDeclaration name=\"p0\" parameterType=\"int\" value=\"1\"/>",
     );

@@ -32,7 +32,7 @@ mod tests {
     use super::closest;
 
     #[test]
-    fn slips_are_recognised() {
+    fn misspelled_names_are_recognised() {
         let names = ["laneSection", "laneOffset", "planView", "link", "type"];
         let meant = |name| closest(name, names.iter().copied());
         assert_eq!(meant("lanSection"), Some("laneSection"));

@@ -271,7 +271,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn versions_are_read_from_names() {
+    fn version_is_read_from_schema_path() {
         let of = |path: &str| version_of_path(Path::new(path)).map(|version| version.to_string());
         for (path, version) in [
             ("OpenDRIVE_1.4H.xsd", Some("1.4")),

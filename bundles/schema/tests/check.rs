@@ -45,7 +45,7 @@ fn said_of_map(header: &str) -> Result<(String, bool, usize), SkipReason> {
 }
 
 #[test]
-fn the_header_chooses_the_schema() {
+fn header_version_selects_schema() {
     for (minor, title) in [
         ("4", "OpenDRIVE 1.4"),
         ("6", "OpenDRIVE 1.6"),
@@ -97,7 +97,7 @@ fn versions_without_a_schema_are_skipped_with_a_reason() {
 }
 
 #[test]
-fn a_version_newer_than_all_schemas_gets_information_only() {
+fn version_newer_than_all_schemas_gives_information_only() {
     let text =
         map("revMajor=\"1\" revMinor=\"10\"", "").replace("<lanes>", "<futureLanes/><lanes>");
     let bytes = image("t.xodr", &text);
@@ -120,7 +120,7 @@ fn a_version_newer_than_all_schemas_gets_information_only() {
 }
 
 #[test]
-fn a_default_namespace_disturbs_nothing_and_is_told() {
+fn default_namespace_is_recorded_without_violations() {
     let text = map(
         "revMajor=\"1\" revMinor=\"7\"",
         " xmlns=\"http://www.opendrive.org\"",
@@ -143,7 +143,7 @@ fn scenario(group: &str) -> String {
 }
 
 #[test]
-fn tags_of_modular_scenarios_are_allowed_where_they_belong() {
+fn modular_scenario_elements_are_allowed_in_their_places() {
     let reference = "<ScenarioReference scenarioFileName=\"b.xosc\"><ManeuverGroupReference maneuverGroupName=\"m\">\
                      <ParameterReference key=\"value\" value=\"2\"/></ManeuverGroupReference></ScenarioReference>";
     let actors = "<Actors selectTriggeringEntities=\"false\"/>";
@@ -176,7 +176,7 @@ fn tags_of_modular_scenarios_are_allowed_where_they_belong() {
 }
 
 #[test]
-fn schemas_of_the_user_come_first() {
+fn user_schemas_come_before_shipped_ones() {
     let own = compiled(
         "<xs:schema xmlns:xs=\"http://www.w3.org/2001/XMLSchema\"><xs:element name=\"OpenDRIVE\" type=\"xs:anyType\"/></xs:schema>",
     )
@@ -226,7 +226,7 @@ fn many_findings_of_one_kind_are_counted() {
 }
 
 #[test]
-fn messages_say_where_a_late_child_belongs_and_what_a_short_attribute_meant() {
+fn message_gives_place_of_late_child_and_intended_attribute() {
     let schema = compiled(
         "<xs:schema xmlns:xs='http://www.w3.org/2001/XMLSchema'><xs:element name='a'><xs:complexType>\
          <xs:sequence><xs:element name='first' minOccurs='0'/><xs:element name='then' minOccurs='0'/>\
@@ -283,7 +283,7 @@ const ROAD: &str = "<road name=\"\" length=\"9\" id=\"1\" junction=\"-1\"><planV
     <geometry s=\"0\" x=\"0\" y=\"0\" hdg=\"0\" length=\"9\"><line/></geometry></planView>";
 
 #[test]
-fn words_for_the_numbers_of_the_first_schema_weigh_less_and_slips_do_not() {
+fn words_in_place_of_numbers_weigh_less_than_typos() {
     let map = |first: &str, second: &str| {
         format!(
             "{ROAD}<lanes><laneSection s=\"0\"><center><lane id=\"0\" type=\"none\" level=\"false\"/></center><right>\
@@ -308,7 +308,7 @@ fn words_for_the_numbers_of_the_first_schema_weigh_less_and_slips_do_not() {
 }
 
 #[test]
-fn what_a_later_version_of_opendrive_has_is_said_once() {
+fn features_of_later_version_are_reported_once() {
     let speed = |max: &str| {
         format!(
             "<road name=\"\" length=\"9\" id=\"1\" junction=\"-1\" rule=\"RHT\">\
@@ -336,7 +336,7 @@ fn what_a_later_version_of_opendrive_has_is_said_once() {
 }
 
 #[test]
-fn what_came_later_is_no_slip_of_the_pen() {
+fn features_of_later_version_are_not_reported_as_typos() {
     let outlines = "<outlines><outline id=\"0\"><cornerLocal u=\"0\" v=\"0\" z=\"0\" height=\"1\"/></outline></outlines>";
     let text = map("revMajor=\"1\" revMinor=\"4\"", "").replace(
         "</road>",
@@ -366,7 +366,7 @@ fn what_came_later_is_no_slip_of_the_pen() {
 }
 
 #[test]
-fn lights_of_openscenario_1_2_are_alternatives() {
+fn light_types_of_openscenario_1_2_are_alternatives() {
     let schema = support::table("xosc-1.2");
     let scenario = |light: &str| {
         format!(
@@ -395,7 +395,7 @@ fn lights_of_openscenario_1_2_are_alternatives() {
 }
 
 #[test]
-fn words_that_a_later_version_has_are_of_that_version() {
+fn words_of_later_version_are_attributed_to_that_version() {
     let junction = |kind: &str| {
         format!("<junction name=\"\" id=\"1\" type=\"{kind}\"><connection id=\"0\"/></junction>")
     };
@@ -418,7 +418,7 @@ fn words_that_a_later_version_has_are_of_that_version() {
 }
 
 #[test]
-fn what_is_said_can_be_understood() {
+fn violation_message_explains_attribute_conflict() {
     let object = |attributes: &str, repeat: &str| {
         let said = weighed(
             "8",

@@ -10,7 +10,7 @@ fn schema(body: &str) -> String {
 }
 
 #[test]
-fn what_is_not_understood_is_named_with_its_line() {
+fn unsupported_schema_construct_is_named_with_line() {
     for (body, expected) in [
         ("<xs:import namespace='x'/>", "test.xsd:2:1: <xs:import>"),
         (
@@ -66,7 +66,7 @@ fn what_is_not_understood_is_named_with_its_line() {
 }
 
 #[test]
-fn bounds_keep_a_small_schema_from_becoming_a_large_table() {
+fn schema_that_expands_beyond_limits_is_refused() {
     let doubling: String = (1..20)
         .map(|n| format!("<xs:group name='g{n}'><xs:sequence><xs:group ref='g{0}'/><xs:group ref='g{0}'/></xs:sequence></xs:group>", n - 1))
         .collect();
@@ -88,7 +88,7 @@ fn bounds_keep_a_small_schema_from_becoming_a_large_table() {
 }
 
 #[test]
-fn content_models_count_and_order() {
+fn content_model_checks_count_and_order() {
     let schema = compiled(&schema(
         "<xs:element name='a'><xs:complexType><xs:sequence>\
            <xs:element name='b' minOccurs='2' maxOccurs='3' type='xs:int'/>\
@@ -118,7 +118,7 @@ fn content_models_count_and_order() {
 }
 
 #[test]
-fn children_that_do_not_fit_are_told_apart() {
+fn misplaced_children_get_distinct_messages() {
     let schema = compiled(&schema(
         "<xs:element name='a'><xs:complexType><xs:sequence>\
            <xs:element name='b' minOccurs='0' maxOccurs='unbounded'/>\
@@ -172,7 +172,7 @@ fn children_that_do_not_fit_are_told_apart() {
 }
 
 #[test]
-fn violations_teach() {
+fn violation_messages_suggest_the_correction() {
     let table = support::table("xodr-1.7");
     let road = |inner: &str| {
         format!("<OpenDRIVE><header revMajor=\"1\" revMinor=\"7\"/>{inner}</OpenDRIVE>")
@@ -233,7 +233,7 @@ fn violations_teach() {
 }
 
 #[test]
-fn one_cause_gives_one_violation() {
+fn single_cause_gives_single_violation() {
     let table = support::table("xosc-1.3");
     let scenario = |bounds: &str| {
         format!(
@@ -256,7 +256,7 @@ fn one_cause_gives_one_violation() {
 }
 
 #[test]
-fn keys_and_references() {
+fn duplicate_key_is_reported() {
     let table = support::table("xodr-1.7");
     let text = |second: &str| {
         let road = |id: &str| {
@@ -281,7 +281,7 @@ fn keys_and_references() {
 }
 
 #[test]
-fn known_defects_of_published_schemas_say_so() {
+fn known_schema_defect_is_marked_in_violation() {
     let table = support::table("xodr-1.8");
     let notation = table.to_notation();
     for condition in qcbus_schema::known_conditions() {
@@ -307,7 +307,7 @@ fn known_defects_of_published_schemas_say_so() {
 
 /// Compiles bounded random XSDs. Each gets an answer, and none may panic.
 #[test]
-fn arbitrary_schemas_are_judged() {
+fn arbitrary_schemas_compile_or_are_refused() {
     use qcbus_schema::generate::Dice;
     let pieces = [
         "<xs:sequence>",

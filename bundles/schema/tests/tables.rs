@@ -28,7 +28,7 @@ fn all_tables_together_stay_below_ten_megabytes() {
 }
 
 #[test]
-fn a_broken_table_is_refused_with_its_line() {
+fn broken_table_is_refused_with_its_line() {
     let good = SHIPPED[0].notation;
     for (from, to, expected) in [
         ("qcbus-schema 1", "qcbus-schema 9", "line 1"),
@@ -43,7 +43,7 @@ fn a_broken_table_is_refused_with_its_line() {
 }
 
 #[test]
-fn cut_tables_never_panic() {
+fn truncated_tables_never_panic() {
     let text = SHIPPED[7].notation;
     for cut in (0..text.len()).step_by(97) {
         if let Some(part) = text.get(..cut) {

@@ -23,7 +23,7 @@ fn with_typing<T>(version: (u32, u32), look: impl FnOnce(Document<'_>, Option<Ty
 }
 
 #[test]
-fn classes_follow_the_way_from_the_root() {
+fn element_class_depends_on_path_from_root() {
     with_typing((1, 3), |document, typing| {
         let typing = typing.unwrap();
         let classes = |name: &str| -> Vec<_> {
@@ -39,7 +39,7 @@ fn classes_follow_the_way_from_the_root() {
 }
 
 #[test]
-fn attributes_have_types_or_words() {
+fn attribute_values_have_type_or_word_list() {
     with_typing((1, 2), |document, typing| {
         let typing = typing.unwrap();
         let value = |element: &str, attribute: &str| {
@@ -64,7 +64,7 @@ fn attributes_have_types_or_words() {
 }
 
 #[test]
-fn newer_versions_are_read_by_the_newest_schema_and_older_ones_by_none() {
+fn newer_version_uses_newest_schema_and_old_uses_none() {
     assert!(with_typing((1, 4), |_, typing| typing.is_some()));
     assert!(with_typing((0, 9), |_, typing| typing.is_none()));
 }

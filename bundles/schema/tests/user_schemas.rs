@@ -59,7 +59,7 @@ fn names(overrides: &[Override]) -> Vec<String> {
 }
 
 #[test]
-fn files_that_include_each_other_are_one_schema_and_the_others_are_not() {
+fn schemas_that_include_each_other_become_single_schema() {
     let main =
         xsd("<xs:include schemaLocation='./parts.xsd'/>\n<xs:element name='OpenDRIVE' type='t'/>");
     let parts = xsd("<xs:complexType name='t'/>");
@@ -82,7 +82,7 @@ fn files_that_include_each_other_are_one_schema_and_the_others_are_not() {
 }
 
 #[test]
-fn the_title_of_tables_names_their_version() {
+fn table_title_gives_its_version() {
     let shipped = SHIPPED
         .iter()
         .find(|one| one.version == Version { major: 1, minor: 4 });
@@ -92,7 +92,7 @@ fn the_title_of_tables_names_their_version() {
 }
 
 #[test]
-fn what_is_of_no_use_is_said_by_file_and_line() {
+fn unusable_user_schema_is_reported_by_file_and_line() {
     let (drive, broken) = (root("OpenDRIVE"), xsd("<xs:import namespace='x'/>"));
     let (other, missing) = (root("otx"), xsd("<xs:include schemaLocation='gone.xsd'/>"));
     for (files, expected) in [
@@ -129,7 +129,7 @@ fn what_is_of_no_use_is_said_by_file_and_line() {
 }
 
 #[test]
-fn the_schema_for_a_version_comes_before_the_one_for_all() {
+fn schema_for_version_comes_before_general_schema() {
     let any = xsd("<xs:element name='OpenDRIVE'><xs:complexType/></xs:element>");
     let files = [
         ("any.xsd", any.as_str()),
@@ -155,7 +155,7 @@ fn the_schema_for_a_version_comes_before_the_one_for_all() {
 }
 
 #[test]
-fn without_a_users_schema_the_result_names_the_shipped_one() {
+fn result_names_shipped_schema_without_user_schema() {
     let image = image(
         "a.xodr",
         "<OpenDRIVE><header revMajor='1' revMinor='8'/></OpenDRIVE>",

@@ -16,7 +16,7 @@ use qcbus_schema::Limits;
 use support::{image, open, table};
 
 #[test]
-fn recorded_verdicts_are_ours_too() {
+fn verdicts_match_recorded_reference_verdicts() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
     let recorded =
         std::fs::read_to_string(folder.join("verdicts.jsonl")).expect("the recorded verdicts");
@@ -62,7 +62,7 @@ fn spliced(base: &str, verdict: &serde_json::Value) -> String {
 }
 
 #[test]
-fn documents_of_ours_are_valid() {
+fn own_test_documents_are_valid() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/documents");
     let mut count = 0;
     for entry in std::fs::read_dir(folder).expect("documents") {

@@ -205,7 +205,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_model_is_built_once_for_each_image() {
+    fn model_is_built_once_for_each_image() {
         let models = CachedModels::default();
         let one = models.for_job().get::<First>((1, 1), &large(1)).unwrap();
         models.tidy();
@@ -220,7 +220,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn the_images_used_last_are_kept() {
+    fn most_recently_used_images_are_kept() {
         let models = CachedModels::default();
         let id = |number: u8| (1, u64::from(number));
         let of =
@@ -242,7 +242,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn what_is_small_or_enormous_is_kept_for_its_job_only() {
+    fn model_of_small_or_huge_image_is_not_cached() {
         for bytes in [1, WORTH_KEEPING - 1, MOST_BYTES + 1] {
             let models = CachedModels::default();
             let image = image(1, bytes);
@@ -257,7 +257,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn two_jobs_that_ask_at_once_build_one_model() {
+    fn concurrent_jobs_build_single_model() {
         let models = CachedModels::default();
         let image = large(1);
         let got: Vec<Arc<Slow>> = std::thread::scope(|scope| {
@@ -269,7 +269,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn without_a_model_there_is_nothing_to_keep() {
+    fn model_that_cannot_be_built_is_not_kept() {
         let models = CachedModels::default();
         let job = models.for_job();
         assert!(job.get::<First>((1, 1), &image(1, 0)).is_none());

@@ -223,7 +223,7 @@ mod tests {
     const STRICT: Param = Param::flag("strict", false, "be strict");
 
     #[test]
-    fn a_configured_value_wins_over_the_default() {
+    fn configured_value_wins_over_default() {
         let of = |name: &str| (name == "gap").then(|| " 2.5 ".to_owned());
         let values = Values::resolve(&[GAP, STRICT], of).unwrap();
         assert_eq!(values.number(&GAP), 2.5);
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_of_the_wrong_type_is_an_error_that_names_it() {
+    fn value_of_wrong_type_is_error_naming_parameter() {
         for wrong in ["", "1 m", "nan", "inf"] {
             let error = Values::resolve(&[GAP], |_| Some(wrong.to_owned())).unwrap_err();
             assert!(error.to_string().contains("`gap`"), "{error}");

@@ -138,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_hand_that_a_job_waits_for_is_lent_to_nobody() {
+    fn awaited_permit_is_not_lent() {
         let permits = Permits::idle(2);
         let first = permits.take();
         let lent = permits.spare().unwrap();
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn there_is_always_one_hand_and_never_too_many() {
+    fn permit_count_is_at_least_one_and_bounded() {
         assert_eq!(Permits::new(0).count(), 1);
         assert_eq!(Permits::new(usize::MAX).count(), Permits::MOST);
         assert!(Permits::new(1).spare().is_none(), "the only one is taken");

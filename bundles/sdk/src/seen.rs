@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn every_change_of_a_file_that_is_read_is_noticed() {
+    fn every_change_of_read_files_is_noticed() {
         let folder = tempfile::tempdir().unwrap();
         let dir = folder.path();
         let write = |name: &str, text: &str| std::fs::write(dir.join(name), text).unwrap();
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn what_changed_a_moment_ago_is_read_again() {
+    fn recently_changed_file_is_read_again() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("a.txt"), "1").unwrap();
         let changed = std::fs::metadata(folder.path().join("a.txt")).unwrap();

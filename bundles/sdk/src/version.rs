@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_are_open_closed_or_absent() {
+    fn version_range_ends_are_open_closed_or_absent() {
         assert!(range("1.7.0..").contains(Version::new(1, 7)));
         assert!(!range("1.7.0..").contains(Version::new(1, 6)));
         assert!(!range("1.4.0..1.8.0").contains(Version::new(1, 8)));
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_refused() {
+    fn malformed_version_range_is_refused() {
         for text in [
             "..",
             "..=",
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges_read_well() {
+    fn version_ranges_are_shown_in_words() {
         assert_eq!(range("1.7.0..").to_string(), "1.7 and later");
         assert_eq!(range("1.4.0..1.8.1").to_string(), "1.4 before 1.8.1");
     }

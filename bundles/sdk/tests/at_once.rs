@@ -67,7 +67,7 @@ static OVER: AtomicUsize = AtomicUsize::new(0);
 const JOBS: usize = 12;
 
 #[test]
-fn jobs_are_checked_side_by_side_and_a_slow_one_holds_up_nobody() {
+fn jobs_run_in_parallel_and_slow_job_blocks_none() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path().join("instance");
     let runtime = tokio::runtime::Builder::new_current_thread()

@@ -42,7 +42,7 @@ const DOC: DocId = DocId(1);
 const JOB: JobId = JobId(5);
 
 #[test]
-fn a_job_is_checked_and_the_bundle_leaves_when_drained() {
+fn bundle_checks_job_and_leaves_when_drained() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path().join("instance");
     let runtime = tokio::runtime::Builder::new_current_thread()

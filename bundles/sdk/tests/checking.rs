@@ -185,7 +185,7 @@ fn findings_are_located_and_in_document_order() {
 }
 
 #[test]
-fn timings_name_every_demanded_checker_and_sum_up() {
+fn timings_name_every_required_checker_and_sum_up() {
     let loaded = Loaded::from_bytes(Path::new("a.xodr"), MAP.as_bytes().to_vec()).unwrap();
     let (outcome, timings) =
         examine_timed(&Plan::by_default(&BUNDLE), &loaded, &Permits::new(2)).unwrap();
@@ -201,7 +201,7 @@ fn timings_name_every_demanded_checker_and_sum_up() {
 }
 
 #[test]
-fn a_panic_is_that_checkers_error_and_keeps_what_was_found() {
+fn panic_fails_its_checker_and_keeps_findings() {
     let outcome = of("panics");
     assert_eq!((outcome.status(), outcome.issues.len()), (Status::Error, 2));
     assert!(
@@ -217,14 +217,14 @@ fn a_panic_is_that_checkers_error_and_keeps_what_was_found() {
 }
 
 #[test]
-fn a_rule_that_gives_up_fails_its_checker_with_its_first_reason() {
+fn rule_that_gives_up_fails_checker_with_first_reason() {
     let outcome = of("gives_up");
     assert_eq!((outcome.status(), outcome.issues.len()), (Status::Error, 2));
     assert_eq!(outcome.reason(), "it raised KeyError: 'id'\nin line 3");
 }
 
 #[test]
-fn preconditions_hold_transitively_even_when_not_demanded() {
+fn preconditions_hold_transitively_even_when_not_selected() {
     let reasons = [of("after_errors"), of("after_skipped")].map(|outcome| {
         assert_eq!(
             (outcome.status(), outcome.issues.len()),
@@ -239,7 +239,7 @@ fn preconditions_hold_transitively_even_when_not_demanded() {
 }
 
 #[test]
-fn versions_gate_and_backports_lower() {
+fn version_gates_rule_and_backport_lowers_level() {
     assert_eq!(
         of("newer").reason(),
         "the rule applies to OpenDRIVE 1.8 and later; the file has version 1.4"
@@ -267,7 +267,7 @@ fn versions_gate_and_backports_lower() {
 }
 
 #[test]
-fn parameters_reach_the_rule_and_the_result() {
+fn parameters_reach_rule_and_result() {
     let outcome = of("with_param");
     assert_eq!(
         (outcome.status(), outcome.params[0].value.as_str()),
@@ -286,7 +286,7 @@ fn parameters_reach_the_rule_and_the_result() {
 }
 
 #[test]
-fn a_model_that_cannot_be_built_skips_its_rules() {
+fn model_that_cannot_be_built_skips_its_rules() {
     let outcome = of("on_no_model");
     assert_eq!(
         (outcome.status(), outcome.reason()),
@@ -295,7 +295,7 @@ fn a_model_that_cannot_be_built_skips_its_rules() {
 }
 
 #[test]
-fn beyond_the_limit_findings_are_counted_and_keep_their_level() {
+fn findings_beyond_limit_are_counted_with_their_level() {
     let limited = checked(
         |checker| checker.id == "finds_errors",
         |_, name| (name == "qcbus.max_issues").then(|| "1".to_owned()),
@@ -329,7 +329,7 @@ fn rules_are_found_by_id_uid_and_their_ends() {
 }
 
 #[test]
-fn what_is_in_the_way_of_a_demanded_checker_is_told() {
+fn blocking_checkers_of_selected_checker_are_reported() {
     let demanded = |id: &'static str| checked(move |checker| checker.id == id, |_, _| None);
     let ids = |all: &[CheckerOutcome]| all.iter().map(|it| it.id.to_string()).collect::<Vec<_>>();
     let all = demanded("after_skipped");

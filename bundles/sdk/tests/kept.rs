@@ -190,7 +190,7 @@ impl Broker {
 }
 
 #[test]
-fn a_map_is_modelled_once_for_all_jobs_until_it_changes() {
+fn jobs_share_map_model_until_map_changes() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path().join("instance");
     let runtime = tokio::runtime::Builder::new_current_thread()
@@ -239,7 +239,7 @@ async fn talk(host: Host) -> Broker {
 }
 
 #[test]
-fn without_a_broker_the_rules_of_one_check_share_a_model() {
+fn rules_of_standalone_check_share_model() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.xosc");
     let text =

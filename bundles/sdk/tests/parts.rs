@@ -109,7 +109,7 @@ fn texts(issues: &[Issue]) -> Vec<&str> {
 }
 
 #[test]
-fn rules_look_at_a_part_in_turn_and_then_at_the_whole() {
+fn rules_check_parts_in_turn_and_then_the_whole() {
     let (complete, heard) = heard(None);
     assert!(complete);
     let parts = [[0, 1].as_slice(), &[0, 1], &[0]].concat();
@@ -128,7 +128,7 @@ fn rules_look_at_a_part_in_turn_and_then_at_the_whole() {
 }
 
 #[test]
-fn who_panics_at_a_part_is_not_asked_again_and_keeps_what_was_found() {
+fn rule_that_panics_at_part_stops_and_keeps_findings() {
     let (_, heard) = heard(None);
     let (_, issues, outcome) = &heard.ended[1];
     assert_eq!(outcome.ending.status(), Status::Error);
@@ -141,7 +141,7 @@ fn who_panics_at_a_part_is_not_asked_again_and_keeps_what_was_found() {
 }
 
 #[test]
-fn preconditions_end_before_what_depends_on_them_begins() {
+fn preconditions_end_before_dependents_begin() {
     let (_, heard) = heard(None);
     let of = |wanted: usize| {
         let mut all = heard.ended.iter();
@@ -154,7 +154,7 @@ fn preconditions_end_before_what_depends_on_them_begins() {
 }
 
 #[test]
-fn a_check_can_be_cancelled_between_parts() {
+fn check_can_be_cancelled_between_parts() {
     let (complete, heard) = heard(Some(2));
     assert!(!complete);
     let begun = heard.begun.into_inner().unwrap();

@@ -204,7 +204,7 @@ fn heard(bundle: &'static Bundle, threads: usize, patience: Option<usize>) -> (b
 }
 
 #[test]
-fn what_is_found_is_the_same_whatever_the_number_of_threads() {
+fn findings_do_not_depend_on_number_of_threads() {
     let (_, alone) = heard(&BUNDLE, 1, None);
     let of = |id: &str| {
         let index = BUNDLE.rules.iter().position(|rule| rule.facts().id == id);
@@ -241,7 +241,7 @@ fn what_is_found_is_the_same_whatever_the_number_of_threads() {
 }
 
 #[test]
-fn a_check_is_cancelled_in_all_its_threads() {
+fn check_is_cancelled_in_all_threads() {
     for threads in [1, 4] {
         let (complete, heard) = heard(&BUNDLE, threads, Some(60));
         assert!(!complete);
@@ -266,7 +266,7 @@ static SLOWLY: Bundle = Bundle {
 };
 
 #[test]
-fn a_large_document_gets_the_hands_that_are_free() {
+fn large_document_gets_free_permits() {
     let (complete, _) = heard(&SLOWLY, 3, None);
     assert!(complete);
     let threads = THREADS.lock().unwrap().take().unwrap();

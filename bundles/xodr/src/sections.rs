@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_row_leads_to_a_chapter() {
+    fn every_rule_row_names_a_chapter() {
         for row in SECTIONS.lines() {
             let rule = row.split('\t').next().unwrap();
             let (name, page) = section(rule).unwrap_or_else(|| panic!("{rule}"));

@@ -203,6 +203,6 @@ const PARITY: Parity = Parity {
 };
 
 #[test]
-fn agrees_with_what_is_recorded() {
+fn results_agree_with_recorded_corpus() {
     PARITY.assert(Path::new(CASES), Path::new(PAGE));
 }

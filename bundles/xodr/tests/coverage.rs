@@ -68,13 +68,13 @@ fn table() -> String {
 }
 
 #[test]
-fn the_table_of_rules_is_true() {
+fn rule_table_in_readme_is_up_to_date() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
     agrees_or_says(&path, &table());
 }
 
 #[test]
-fn the_list_of_the_standard_is_whole() {
+fn rule_list_of_standard_is_complete() {
     let annex = annex();
     let uids: BTreeSet<&str> = annex.iter().map(|(uid, _)| *uid).collect();
     assert_eq!((annex.len(), uids.len()), (275, 275));

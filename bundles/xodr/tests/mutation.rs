@@ -250,7 +250,7 @@ fn page(entries: &[Entry], rows: &[Row]) -> String {
 }
 
 #[test]
-fn nothing_is_wrong_with_the_maps() {
+fn unedited_maps_have_no_findings() {
     let mut faults = String::new();
     for (name, text) in MAPS {
         let verdict = Verdict::of(text);
@@ -281,7 +281,7 @@ fn every_rule_has_edits_or_a_reason() {
 }
 
 #[test]
-fn every_edit_is_found_and_by_its_rule_only() {
+fn every_edit_is_found_only_by_its_rule() {
     let (entries, maps) = (edit::table(EDITS), maps());
     let wanted = std::env::var("QCBUS_MUTATE").unwrap_or_default();
     let (rows, faults) = rows(&entries, &maps, &wanted);

@@ -15,24 +15,24 @@ const ROBUST: Robust = Robust {
 };
 
 #[test]
-fn truncated_examples_break_no_rule() {
+fn no_rule_fails_on_truncated_examples() {
     ROBUST.assert_truncated_examples();
 }
 
 #[test]
-fn mutated_examples_break_no_rule() {
+fn no_rule_fails_on_mutated_examples() {
     ROBUST.assert_mutated_examples();
 }
 
 #[test]
-fn real_maps_broken_in_any_way_break_no_rule() {
+fn no_rule_fails_on_broken_real_maps() {
     let cases = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/cases");
     ROBUST.assert_files_below(Path::new(cases));
 }
 
 /// Tries each of these lengths for all roads, geometries, sections and repeats of an example.
 #[test]
-fn lengths_that_cannot_be_break_no_rule() {
+fn no_rule_fails_on_impossible_lengths() {
     let plan = Plan::by_default(&BUNDLE);
     for shown in evidence::documents(&BUNDLE) {
         for length in ["-1", "0", "-9223372036854775808"] {

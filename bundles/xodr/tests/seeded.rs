@@ -38,7 +38,7 @@ fn faults_are_found_and_harmless_variants_are_not_rejected() {
 }
 
 #[test]
-fn faults_of_another_hand_are_found_as_well() {
+fn held_out_faults_are_found() {
     let lists = [
         include_str!("held-out/faults.txt"),
         include_str!("held-out/harmless.txt"),
@@ -47,7 +47,7 @@ fn faults_of_another_hand_are_found_as_well() {
 }
 
 #[test]
-fn faults_that_nobody_had_seen_are_found() {
+fn unseen_fresh_faults_are_found() {
     let lists = [
         include_str!("fresh/faults.txt"),
         include_str!("fresh/harmless.txt"),

@@ -64,13 +64,13 @@ fn table() -> String {
 }
 
 #[test]
-fn the_table_of_rules_is_true() {
+fn rule_table_in_readme_is_up_to_date() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
     agrees_or_says(&path, &table());
 }
 
 #[test]
-fn every_rule_that_a_checker_answers_for_is_listed_once() {
+fn every_rule_of_a_checker_is_listed_once() {
     let listed = evidence::listed(RULES);
     let uids: BTreeSet<&str> = listed.iter().map(|(uid, _)| *uid).collect();
     assert_eq!(uids.len(), listed.len(), "a UID is listed twice");

@@ -142,7 +142,7 @@ fn declaration(kind: Kind, expression: &str) -> String {
 }
 
 #[test]
-fn a_faulty_value_is_said_once_by_the_rule_for_it() {
+fn faulty_value_is_reported_once_by_its_rule() {
     let plan = Plan::by_default(&BUNDLE);
     for minor in 1..=4 {
         for (expression, kind, rule) in FAULTY {
@@ -155,7 +155,7 @@ fn a_faulty_value_is_said_once_by_the_rule_for_it() {
 }
 
 #[test]
-fn a_faulty_attribute_is_said_once_by_the_schema_or_the_rule() {
+fn faulty_attribute_is_reported_once_by_schema_or_rule() {
     let plan = Plan::by_default(&BUNDLE);
     for minor in 1..=4 {
         for (expression, kind, rule) in FAULTY {
@@ -171,7 +171,7 @@ fn a_faulty_attribute_is_said_once_by_the_schema_or_the_rule() {
 }
 
 #[test]
-fn a_good_expression_is_not_said() {
+fn valid_expression_is_not_reported() {
     let plan = Plan::by_default(&BUNDLE);
     for minor in 1..=4 {
         let found = findings(

@@ -35,7 +35,7 @@ const EDITS: &str = include_str!("mutation/edits.txt");
 const LEAST: usize = 3;
 
 #[test]
-fn nothing_is_wrong_with_the_scenarios() {
+fn unedited_scenarios_have_no_findings() {
     let told: Vec<String> = in_parallel(&BASES, |bench: &mut Bench, base: &Base| {
         let said = bench.unedited(base).unwrap();
         let told = said.iter().map(|it| format!("{}: {it}\n", base.name));
@@ -68,7 +68,7 @@ fn every_rule_has_edits_or_a_reason() {
 }
 
 #[test]
-fn every_edit_is_found_and_by_its_rule_only() {
+fn every_edit_is_found_only_by_its_rule() {
     let entries = list::read(EDITS).unwrap();
     let wanted = std::env::var("QCBUS_MUTATE").unwrap_or_default();
     let asked = |entry: &&Entry| entry.rule.contains(&wanted);

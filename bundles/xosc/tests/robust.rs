@@ -44,17 +44,17 @@ const ROBUST: Robust = Robust {
 };
 
 #[test]
-fn truncated_examples_break_no_rule() {
+fn no_rule_fails_on_truncated_examples() {
     ROBUST.assert_truncated_examples();
 }
 
 #[test]
-fn mutated_examples_break_no_rule() {
+fn no_rule_fails_on_mutated_examples() {
     ROBUST.assert_mutated_examples();
 }
 
 #[test]
-fn real_scenarios_broken_in_any_way_break_no_rule() {
+fn no_rule_fails_on_broken_real_scenarios() {
     let cases = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/cases");
     ROBUST.assert_files_below(Path::new(cases));
 }
@@ -62,7 +62,7 @@ fn real_scenarios_broken_in_any_way_break_no_rule() {
 /// Breaks an expanded modular scenario. Its elements come from several files, in another order than
 /// they are written.
 #[test]
-fn an_expanded_scenario_broken_in_any_way_breaks_no_rule() {
+fn no_rule_fails_on_broken_expanded_scenario() {
     const MAIN: &str = include_str!("../../../tests/farm/modular/convoy.xosc");
     const LIBRARY: &str = include_str!("../../../tests/farm/modular/moves.xosc");
     let twists = [

@@ -435,7 +435,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn short_texts_are_read_as_long_ones_are() {
+    fn short_texts_are_validated_like_long_ones() {
         for len in 0..=SHORT + 8 {
             let text = vec![b'a'; len];
             assert_eq!(str_at(&text, 0, len as u32).map(str::len), Some(len));

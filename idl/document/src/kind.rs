@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn kinds_follow_the_suffix() {
+    fn file_kind_follows_suffix() {
         let of = |name: &str| FileKind::of_path(Path::new(name));
         assert_eq!(of("a/b.xodr"), Some(FileKind::Xodr));
         assert_eq!(of("b.XODR.GZ"), Some(FileKind::Xodr));
@@ -106,7 +106,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn the_rest_of_a_name_need_not_be_utf8() {
+    fn file_kind_ignores_invalid_utf8_before_suffix() {
         use std::os::unix::ffi::OsStrExt as _;
         let name = std::ffi::OsStr::from_bytes(b"a/stra\xDFe.XODR");
         assert_eq!(FileKind::of_path(Path::new(name)), Some(FileKind::Xodr));

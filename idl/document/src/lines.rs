@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_like_a_person() {
+    fn characters_and_line_feeds_are_counted() {
         let mut tally = Tally::default();
         tally.count("ab\nüß€".as_bytes());
         assert_eq!(
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn long_blocks_do_not_overflow_a_lane() {
+    fn long_blocks_do_not_overflow_counters() {
         let text = "é".repeat(40_000);
         let mut tally = Tally::default();
         tally.count(text.as_bytes());
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn checkpoints_start_afresh_with_every_file() {
+    fn checkpoints_restart_with_every_file() {
         let text = vec![b'\n'; 3 * LINE_STRIDE];
         let feeds = |starts: Vec<usize>| -> Vec<u32> {
             checkpoints(&text, starts.into_iter())

@@ -244,7 +244,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn doubles_are_spelt_as_xml_schema_says() {
+    fn doubles_follow_xml_schema_spelling() {
         for (text, number) in [
             ("1", 1.0),
             ("+1.5", 1.5),
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn integers_are_spelt_as_xml_schema_says() {
+    fn integers_follow_xml_schema_spelling() {
         for (text, number) in [
             ("0", 0),
             ("+7", 7),

@@ -30,7 +30,7 @@ fn road_network() -> Tree {
 }
 
 #[test]
-fn spoilt_images_are_refused_or_walked() {
+fn corrupted_image_is_refused_or_walked_safely() {
     let sound = road_network().image("maps/straight.xodr").unwrap();
     assert_eq!(fuzzing::read_image(&sound), Outcome::Sound);
     let (mut refused, mut contradictory, mut still_sound) = (0, 0, 0);
@@ -49,7 +49,7 @@ fn spoilt_images_are_refused_or_walked() {
 }
 
 #[test]
-fn any_order_of_events_is_refused_or_makes_a_sound_image() {
+fn any_event_order_is_refused_or_gives_sound_image() {
     let mut built = 0;
     for seed in 0..rounds(4_000) {
         let mut random = Random(seed);
@@ -75,7 +75,7 @@ fn every_prefix_of_an_image_is_refused() {
 }
 
 #[test]
-fn an_image_may_start_at_any_address_and_lie_in_a_longer_buffer() {
+fn image_is_read_at_any_address_in_longer_buffer() {
     let sound = road_network().image("maps/straight.xodr").unwrap();
     for shift in 1..9 {
         let mut buffer = vec![0xEE; shift];

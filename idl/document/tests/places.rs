@@ -24,7 +24,7 @@ fn xpaths(tree: &Tree, name: &str) -> Vec<String> {
 }
 
 #[test]
-fn an_id_names_an_element_only_if_no_equally_named_sibling_shares_it() {
+fn xpath_uses_id_only_if_unique_among_siblings() {
     let map = Tree::new("OpenDRIVE")
         .holding(road("5"))
         .holding(road("6"))
@@ -46,7 +46,7 @@ fn an_id_names_an_element_only_if_no_equally_named_sibling_shares_it() {
 }
 
 #[test]
-fn quotes_are_chosen_as_the_value_demands() {
+fn xpath_quotes_depend_on_the_value() {
     let map = Tree::new("OpenDRIVE")
         .holding(road("a'b"))
         .holding(road("a\"b"))
@@ -62,7 +62,7 @@ fn quotes_are_chosen_as_the_value_demands() {
 }
 
 #[test]
-fn names_name_elements_of_scenarios_but_not_of_roads() {
+fn name_identifies_elements_in_scenarios_but_not_maps() {
     let named = |name: &str| Tree::new("Event").with("name", name);
     let scenario = Tree::new("OpenSCENARIO")
         .holding(named("brake"))
@@ -110,7 +110,7 @@ fn positional_xpaths_number_every_step() {
 }
 
 #[test]
-fn xpaths_of_other_tools_are_followed() {
+fn xpaths_of_other_tools_are_evaluated() {
     let lanes = || {
         Tree::new("lanes")
             .holding(Tree::new("laneSection").with("s", "0"))
@@ -161,7 +161,7 @@ fn xpaths_of_other_tools_are_followed() {
 }
 
 #[test]
-fn an_xpath_is_followed_from_an_element() {
+fn xpath_is_evaluated_from_an_element() {
     let section = |s: &str| Tree::new("laneSection").with("s", s);
     let lanes = || {
         let lanes = Tree::new("lanes").holding(section("0"));
@@ -230,7 +230,7 @@ fn an_xpath_is_followed_from_an_element() {
 }
 
 #[test]
-fn what_is_not_understood_is_said_where_it_stands() {
+fn unsupported_xpath_is_reported_at_its_position() {
     with_document(&Tree::new("a"), |document| {
         for (xpath, said) in [
             ("", "evaluate the XPath '': expected '/' at character 1"),
@@ -298,7 +298,7 @@ fn three_files() -> Vec<u8> {
 }
 
 #[test]
-fn offsets_lead_to_the_file_that_holds_them() {
+fn offset_is_mapped_to_its_source_file() {
     let image = three_files();
     let document = Document::open(&image).unwrap();
     assert_eq!(document.validate(), Ok(()));
@@ -323,7 +323,7 @@ fn offsets_lead_to_the_file_that_holds_them() {
 }
 
 #[test]
-fn faults_say_whether_the_tree_is_whole() {
+fn fault_codes_mark_partial_trees_and_have_unique_names() {
     let image = three_files();
     assert!(!Document::open(&image).unwrap().is_well_formed());
     assert!(!FaultCode::EncodingTranscoded.makes_partial());
@@ -337,7 +337,7 @@ fn faults_say_whether_the_tree_is_whole() {
 }
 
 #[test]
-fn values_that_are_no_numbers_are_explained() {
+fn invalid_numbers_are_explained() {
     let tree = road(" 12 ")
         .with("length", "12,5")
         .with("s", "1e999")
@@ -378,7 +378,7 @@ fn values_that_are_no_numbers_are_explained() {
 }
 
 #[test]
-fn nothing_is_written_beyond_a_capacity() {
+fn builder_refuses_to_write_beyond_capacity() {
     let capacities = Capacities {
         text: 20,
         nodes: 1,

@@ -119,7 +119,7 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn an_image_shows_the_tree_that_it_was_built_from(tree in tree()) {
+    fn image_shows_tree_it_was_built_from(tree in tree()) {
         let image = tree.image("maps/any.xodr").unwrap();
         let document = Document::open(&image).unwrap();
         prop_assert_eq!(document.validate(), Ok(()));
@@ -135,7 +135,7 @@ proptest! {
     }
 
     #[test]
-    fn postings_list_what_a_walk_finds(tree in tree()) {
+    fn postings_list_same_elements_as_tree_walk(tree in tree()) {
         let image = tree.image("a").unwrap();
         let document = Document::open(&image).unwrap();
         let all: Vec<_> = std::iter::once(document.root().unwrap()).chain(document.root().unwrap().descendants()).collect();
@@ -150,7 +150,7 @@ proptest! {
     }
 
     #[test]
-    fn every_xpath_leads_back_to_its_element_alone(tree in tree()) {
+    fn every_xpath_evaluates_to_its_element_only(tree in tree()) {
         let image = tree.image("a").unwrap();
         let document = Document::open(&image).unwrap();
         let root = document.root().unwrap();
@@ -165,7 +165,7 @@ proptest! {
     }
 
     #[test]
-    fn any_xpath_is_followed_or_refused(xpath in "[/a-b@*'\"=\\[\\]() 0-9.:|]{0,20}") {
+    fn any_xpath_is_evaluated_or_refused(xpath in "[/a-b@*'\"=\\[\\]() 0-9.:|]{0,20}") {
         let image = Tree::new("a").holding(Tree::new("b")).image("a").unwrap();
         let document = Document::open(&image).unwrap();
         if let Err(error) = document.evaluate(&xpath) {
@@ -174,7 +174,7 @@ proptest! {
     }
 
     #[test]
-    fn positions_are_counted_as_a_person_counts(tree in tree(), pad in 0usize..9000) {
+    fn positions_match_naive_counting(tree in tree(), pad in 0usize..9000) {
         // The text is long enough for checkpoints at any position, also within characters.
         let tree = Tree::new("road").saying(&"ß\n€".repeat(pad / 6)).holding(tree);
         let (image, xml) = (tree.image("a").unwrap(), tree.xml());

@@ -22,7 +22,7 @@ fn small() -> Vec<u8> {
 }
 
 #[test]
-fn a_small_image_is_read_in_every_way() {
+fn corrupted_small_image_is_read_safely() {
     let sound = small();
     assert_eq!(fuzzing::read_image(&sound), Outcome::Sound);
     for seed in 0..SPOILT {

@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_edits() {
+    fn distance_counts_edits_without_case() {
         assert_eq!(distance("", "abc"), 3);
         assert_eq!(distance("kitten", "sitting"), 3);
         assert_eq!(distance("checkreId", "checkerId"), 1, "a swap is one edit");
@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn offers_what_was_meant_and_nothing_else() {
+    fn closest_name_is_offered_and_distant_one_is_not() {
         let names = ["CheckerBundle", "ReportModule", "Param"];
         assert_eq!(closest("CheckerBundel", names), Some("CheckerBundle"));
         assert_eq!(closest("param", names), Some("Param"));

@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_turned_back() {
+    fn written_location_is_parsed_back() {
         let told = Locations {
             elsewhere: Some(place()),
             ..described("road 5: no lanes at 3:4")
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn other_descriptions_are_no_places() {
+    fn other_descriptions_are_not_parsed_as_places() {
         let path = place().path;
         for text in [
             "",
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_domain_specific_info_reads_back() {
+    fn domain_specific_info_reads_back() {
         assert_eq!(OtherPlace::from_info(&place().to_info()), Some(place()));
         let other = DomainInfo {
             name: String::from("else"),

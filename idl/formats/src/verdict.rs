@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn the_verdict_follows_from_issues_and_statuses() {
+    fn verdict_follows_from_issues_and_statuses() {
         let of = |status, level| Verdict::of(&results(status, level, false));
         assert_eq!(of(Some(Status::Completed), None), Verdict::Accepted);
         assert_eq!(of(None, None), Verdict::Accepted);
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bundle_adds_what_it_found_or_failed_at_and_nothing_else() {
+    fn bundle_adds_only_its_errors_and_failures_to_verdict() {
         let adds = |status, level, blocked| {
             let results = results(status, level, blocked);
             Verdict::added_by(&results.bundles[0])
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn where_nobody_looked_nothing_is_accepted() {
+    fn file_without_completed_check_is_undetermined() {
         let skipped = results(Some(Status::Skipped), None, false);
         assert_eq!(Verdict::of(&skipped), Verdict::Undetermined);
         assert_eq!(Verdict::of(&Results::default()), Verdict::Undetermined);
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn a_checker_that_could_not_look_is_no_acceptance() {
+    fn blocked_checker_leaves_verdict_undetermined() {
         let blocked = results(Some(Status::Skipped), None, true);
         assert_eq!(Verdict::of(&blocked), Verdict::Undetermined);
     }

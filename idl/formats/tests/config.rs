@@ -46,7 +46,7 @@ fn told(oddities: &[Oddity]) -> String {
 }
 
 #[test]
-fn children_in_any_order_and_levels_by_number_or_missing() {
+fn children_in_any_order_and_missing_levels_are_read() {
     let Parsed { config, oddities } = parse(GOOD);
     assert_eq!(told(&oddities), "");
     assert_eq!(config.input_file(), Some("myTrack.xodr"));
@@ -69,7 +69,7 @@ fn children_in_any_order_and_levels_by_number_or_missing() {
 }
 
 #[test]
-fn selections_answer_every_case() {
+fn selection_distinguishes_every_case() {
     let config = parse(GOOD).config;
     let levels = Levels::ALL;
     let relevelled = Selected {
@@ -93,7 +93,7 @@ fn selections_answer_every_case() {
 }
 
 #[test]
-fn parameters_are_inherited_checker_bundle_global_default() {
+fn parameters_inherit_from_checker_bundle_global_and_default() {
     let config = parse(GOOD).config;
     let bundle = config.bundle("xodrBundle", "xodr");
     let defaults = [
@@ -124,7 +124,7 @@ fn parameters_are_inherited_checker_bundle_global_default() {
 }
 
 #[test]
-fn both_orders_of_levels_mean_the_interval() {
+fn both_orders_of_levels_mean_same_interval() {
     let text = |min, max| {
         format!(
             "<Config><CheckerBundle application='b'><Checker checkerId='c' minLevel='{min}' \
@@ -153,7 +153,7 @@ fn both_orders_of_levels_mean_the_interval() {
 }
 
 #[test]
-fn the_example_of_2023_is_refused_at_its_stray_quotation_mark() {
+fn example_of_2023_is_refused_at_stray_quotation_mark() {
     let broken = "<Config>\n  <Param name=\"XodrFile\" value=\"e\"myTrack.xodr\">\n  \
                   <CheckerBundle application=\"DemoCheckerBundle\">\n    <Checker \
                   checkerId=\"exampleChecker\" maxLevel=\"3\" minLevel=\"1\"/>\n  \
@@ -166,7 +166,7 @@ fn the_example_of_2023_is_refused_at_its_stray_quotation_mark() {
 }
 
 #[test]
-fn odd_things_are_told_with_their_place() {
+fn configuration_oddities_are_reported_with_position() {
     let text = r#"<Config version="1" >
   stray
   <CheckerBundel application="x"/>
@@ -195,7 +195,7 @@ fn odd_things_are_told_with_their_place() {
 }
 
 #[test]
-fn what_cannot_be_used_is_refused_with_place_and_hint() {
+fn unusable_configuration_is_refused_with_position_and_hint() {
     let cases = [
         "",
         "just text",
@@ -231,7 +231,7 @@ fn what_cannot_be_used_is_refused_with_place_and_hint() {
 }
 
 #[test]
-fn applications_mean_bundles_by_name_alias_and_published_name() {
+fn application_matches_name_alias_and_published_name() {
     for (application, name, alias, same) in [
         ("xodrBundle", "xodrBundle", "xodr", true),
         ("xodr", "xodrBundle", "xodr", true),
@@ -274,7 +274,7 @@ fn number(name: &str) -> KnownParam {
 /// Checks that an unreadable value is reported at the checker, in the bundle and beside the
 /// bundles. A checker cannot check anything if it cannot read its parameter.
 #[test]
-fn value_that_no_checker_can_read_is_told_at_every_place() {
+fn unreadable_value_is_reported_at_every_place() {
     let flag = KnownParam {
         name: "strict".into(),
         value: ParamType::Flag,
@@ -316,7 +316,7 @@ fn value_that_no_checker_can_read_is_told_at_every_place() {
 }
 
 #[test]
-fn what_nobody_knows_is_told() {
+fn unknown_names_in_configuration_are_reported() {
     let checker = |id: &str, params: &[&str]| KnownChecker {
         id: id.into(),
         params: params.iter().map(|name| number(name)).collect(),
@@ -364,7 +364,7 @@ fn what_nobody_knows_is_told() {
 }
 
 #[test]
-fn deep_nesting_overflows_nothing() {
+fn deep_nesting_is_refused_without_overflow() {
     for levels in [200, 100_000] {
         let text = format!("<Config>{}", "<Param name='a'>".repeat(levels));
         assert!(
@@ -377,14 +377,14 @@ fn deep_nesting_overflows_nothing() {
 }
 
 #[test]
-fn a_configuration_travels_encoded() {
+fn configuration_round_trips_as_json() {
     let config = parse(GOOD).config;
     let json = serde_json::to_string(&config).unwrap();
     assert_eq!(serde_json::from_str::<Config>(&json).unwrap(), config);
 }
 
 #[test]
-fn two_names_of_one_bundle_are_told() {
+fn two_names_for_same_bundle_are_reported() {
     let known = Known {
         bundles: vec![KnownBundle {
             name: "mineBundle".into(),
@@ -403,7 +403,7 @@ fn two_names_of_one_bundle_are_told() {
 }
 
 #[test]
-fn what_only_a_bundle_can_tell_is_said_to_be_unknown() {
+fn unverifiable_names_of_bundle_are_reported_as_unknown() {
     let checker = KnownChecker {
         id: "check_lanes".into(),
         params: vec![number("tolerance")],

@@ -40,7 +40,7 @@ fn load_from(files: &[(&str, &str)], path: &str) -> Result<Vec<Module>, String> 
 }
 
 #[test]
-fn a_framework_manifest_leads_to_its_modules() {
+fn framework_manifest_leads_to_its_modules() {
     let framework = r#"{"manifest_file_path": ["$HERE/a.json", "${HERE}/b.json"]}"#;
     let empty = r#"{"module": []}"#;
     let files = [
@@ -67,7 +67,7 @@ fn a_framework_manifest_leads_to_its_modules() {
 }
 
 #[test]
-fn variables_are_expanded_and_unknown_ones_left() {
+fn known_variables_are_expanded_and_unknown_ones_kept() {
     for (text, expanded) in [
         ("$HERE/x", "/etc/qc/x"),
         ("a${HERE}b", "a/etc/qcb"),
@@ -82,7 +82,7 @@ fn variables_are_expanded_and_unknown_ones_left() {
 }
 
 #[test]
-fn errors_name_file_and_key() {
+fn manifest_errors_name_file_and_key() {
     let module = |keys: &str| format!(r#"{{"module": [{{{keys}}}]}}"#);
     let bundle = r#""name": "a", "exec_type": "executable", "module_type": "checker_bundle""#;
     let cases = [
@@ -114,7 +114,7 @@ fn errors_name_file_and_key() {
 }
 
 #[test]
-fn a_byte_order_mark_does_no_harm() {
+fn byte_order_mark_in_manifest_is_accepted() {
     let text = format!("\u{FEFF}{MODULE}");
     assert_eq!(
         parse_modules(Path::new("m.json"), text.as_bytes())
@@ -125,7 +125,7 @@ fn a_byte_order_mark_does_no_harm() {
 }
 
 #[test]
-fn only_a_bundle_can_be_a_shadow() {
+fn only_checker_bundle_can_be_shadow() {
     let of = |module_type: &str, shadow: &str| {
         let text = format!(
             r#"{{"module": [{{"name": "a", "exec_type": "executable", "module_type": "{module_type}",
@@ -147,7 +147,7 @@ fn only_a_bundle_can_be_a_shadow() {
 }
 
 #[test]
-fn what_a_module_may_do_is_read_or_refused() {
+fn module_permissions_are_read_or_refused() {
     let of = |may: &str| {
         let text = format!(
             r#"{{"module": [{{"name": "a", "exec_type": "executable", "module_type": "checker_bundle",

@@ -93,7 +93,7 @@ fn pooled(input: PoolInput<'_>) -> Pooled {
 }
 
 #[test]
-fn without_a_configuration_everything_stays_as_given() {
+fn results_without_configuration_stay_unchanged() {
     let pooled = pooled(input(two_bundles()));
     insta::assert_snapshot!(outline(&pooled.results));
     assert_eq!(
@@ -111,7 +111,7 @@ fn without_a_configuration_everything_stays_as_given() {
 }
 
 #[test]
-fn a_configuration_orders_filters_relevels_and_misses() {
+fn configuration_orders_filters_relevels_and_adds_missing() {
     let config = config(
         r#"<Config><Param name="tolerance" value="2"/>
         <CheckerBundle application="gone"><Checker checkerId="x"/><Checker checkerId="y"/></CheckerBundle>
@@ -166,7 +166,7 @@ fn a_configuration_orders_filters_relevels_and_misses() {
 }
 
 #[test]
-fn a_new_level_counts_before_the_interval() {
+fn new_level_is_applied_before_level_interval() {
     let config = config(
         r#"<Config><CheckerBundle application="xodrBundle">
         <Checker checkerId="lanes" minLevel="2" maxLevel="2"><Param name="qcbus.level" value="warning"/></Checker>
@@ -196,7 +196,7 @@ fn a_new_level_counts_before_the_interval() {
 }
 
 #[test]
-fn a_bundle_by_itself_minds_its_own_business() {
+fn bundle_pooled_alone_ignores_configuration_of_others() {
     let config = config("<Config><CheckerBundle application='other'/></Config>");
     let mut bundles = two_bundles();
     bundles.pop();
@@ -212,7 +212,7 @@ fn a_bundle_by_itself_minds_its_own_business() {
 }
 
 #[test]
-fn checkers_that_break_their_word_are_in_error() {
+fn contradictory_checker_results_become_errors() {
     let mut silent = checker("silent", vec![issue(Level::Warning, "kept")]);
     silent.ending = None;
     let mut liar = checker("liar", vec![issue(Level::Warning, "kept as well")]);
@@ -260,7 +260,7 @@ fn remarks_are_never_filtered() {
 }
 
 #[test]
-fn every_xpath_gets_its_place_once() {
+fn every_xpath_is_resolved_to_position_once() {
     let file = Location::File {
         row: 3,
         column: 4,
@@ -302,7 +302,7 @@ fn every_xpath_gets_its_place_once() {
 }
 
 #[test]
-fn the_same_input_gives_the_same_bytes() {
+fn same_input_gives_same_bytes() {
     let config = config(
         "<Config><CheckerBundle application='xodr'><Checker checkerId='lanes' minLevel='1' \
          maxLevel='1'/></CheckerBundle></Config>",
@@ -341,7 +341,7 @@ fn resting(xml: Vec<Issue>) -> Vec<BundleOutcome> {
 }
 
 #[test]
-fn what_kept_a_demanded_checker_from_looking_is_told_whoever_demanded_it() {
+fn findings_of_blocking_checker_are_kept_despite_filter() {
     let config = config(ONLY_LANES);
     let input = PoolInput {
         config: Some(&config),
@@ -354,7 +354,7 @@ fn what_kept_a_demanded_checker_from_looking_is_told_whoever_demanded_it() {
 }
 
 #[test]
-fn a_demanded_checker_that_could_not_look_is_no_acceptance() {
+fn blocked_selected_checker_leaves_verdict_undetermined() {
     let config = config(ONLY_LANES);
     let input = PoolInput {
         config: Some(&config),
@@ -376,7 +376,7 @@ fn a_demanded_checker_that_could_not_look_is_no_acceptance() {
 }
 
 #[test]
-fn what_a_remark_leaves_open_keeps_the_verdict() {
+fn open_remark_leaves_verdict_undetermined() {
     let remark = |open: &str| Remark {
         checker: "qcbus_bundles".into(),
         description: "Somebody checks the file.".into(),
@@ -395,7 +395,7 @@ fn what_a_remark_leaves_open_keeps_the_verdict() {
 }
 
 #[test]
-fn how_little_was_asked_stands_in_the_result() {
+fn number_of_unasked_checkers_is_in_result() {
     let mut bundles = two_bundles();
     bundles[0].asked = Some(Asked {
         asked: 2,
@@ -414,7 +414,7 @@ fn how_little_was_asked_stands_in_the_result() {
 }
 
 #[test]
-fn a_bundle_that_was_never_seen_owes_every_answer() {
+fn bundle_never_seen_leaves_its_checkers_open() {
     let never = || {
         let mut bundle = bundle("mine", "", Vec::new());
         bundle.absent = Some("mine cannot be started: no such file".into());

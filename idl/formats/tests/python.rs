@@ -105,7 +105,7 @@ fn results() -> Vec<Results> {
 }
 
 #[test]
-fn asams_python_library_reads_what_is_written() {
+fn asam_python_library_reads_written_results() {
     let python = match interpreter() {
         Ok(python) => python,
         Err(why) => {

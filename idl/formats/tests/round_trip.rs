@@ -246,7 +246,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
 
     #[test]
-    fn the_current_form_is_lossless(results in results()) {
+    fn current_format_is_lossless(results in results()) {
         let written = write(&results, Dialect::Current);
         let back = read(written.as_bytes());
         prop_assert_eq!(back.as_ref(), Ok(&results), "{}", written);
@@ -254,14 +254,14 @@ proptest! {
     }
 
     #[test]
-    fn the_old_form_settles(results in results()) {
+    fn old_format_is_stable_when_written_again(results in results()) {
         let written = write(&results, Dialect::Qc4Openx);
         let back = read(written.as_bytes()).unwrap();
         prop_assert_eq!(write(&back, Dialect::Qc4Openx), written);
     }
 
     #[test]
-    fn any_text_and_any_names_can_be_read_again(
+    fn any_text_and_names_can_be_read_again(
         texts in vec(anything(), 4),
         content in vec(wild_element(), 0..3),
     ) {

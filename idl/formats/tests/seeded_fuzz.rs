@@ -62,12 +62,12 @@ fn run(seeds: &[String], body: fn(&[u8]), rounds: u64) {
 }
 
 #[test]
-fn configurations() {
+fn mutated_configurations_make_no_parser_panic() {
     run(&[CONFIG.to_owned()], fuzzing::config, 4000);
 }
 
 #[test]
-fn results() {
+fn mutated_results_make_no_parser_panic() {
     let full = common::full();
     let seeds = [
         write(&full, Dialect::Current),

@@ -8,17 +8,17 @@ use qcbus_formats::xqar::{
 };
 
 #[test]
-fn a_full_result_in_the_current_form() {
+fn full_result_is_written_in_current_format() {
     insta::assert_snapshot!(write(&full(), Dialect::Current));
 }
 
 #[test]
-fn a_full_result_in_the_form_of_2023() {
+fn full_result_is_written_in_format_of_2023() {
     insta::assert_snapshot!(write(&full(), Dialect::Qc4Openx));
 }
 
 #[test]
-fn the_current_form_reads_back_whole() {
+fn current_format_reads_back_completely() {
     let mut expected = full();
     // XML cannot contain this character.
     expected.bundles[0].checkers[0].issues[0].domain_info[0].content[0].children[0].text =
@@ -30,7 +30,7 @@ fn the_current_form_reads_back_whole() {
 }
 
 #[test]
-fn the_old_form_keeps_rules_and_road_positions() {
+fn old_format_keeps_rules_and_road_positions() {
     let back = read(write(&full(), Dialect::Qc4Openx).as_bytes()).unwrap();
     let (old, new) = (&back.bundles[0].checkers[0], &full().bundles[0].checkers[0]);
     assert_eq!(old.issues[0].rule_uid, new.issues[0].rule_uid);
@@ -62,7 +62,7 @@ const OLD: &str = r#"<?xml version="1.0" encoding="UTF-8" standalone="no" ?>
 "#;
 
 #[test]
-fn the_old_form_is_understood() {
+fn result_in_old_format_is_read() {
     let results = read(OLD.as_bytes()).unwrap();
     let bundle = &results.bundles[0];
     assert_eq!(
@@ -104,7 +104,7 @@ fn the_old_form_is_understood() {
 }
 
 #[test]
-fn pythons_order_and_encodings_are_understood() {
+fn python_attribute_order_and_encodings_are_read() {
     let text = r#"<?xml version='1.0' encoding='ISO-8859-1' standalone='no'?>
 <CheckerResults version="0.0.1"><CheckerBundle name="b" version="v1" summary="s"
  description="Stra&#223;e" build_date="2024-01-01"><Checker checkerId="c" description="d"
@@ -139,7 +139,7 @@ fn pythons_order_and_encodings_are_understood() {
 }
 
 #[test]
-fn what_readers_refuse_is_never_written() {
+fn content_that_readers_refuse_is_never_written() {
     let mut odd = issue(Level::Error, "\u{0}\u{1b}[31m\u{FFFF}\t\r\n");
     odd.locations = vec![Locations::default()];
     odd.rule_uid = "asam.net:xodr:1.0.0:not.listed".into();
@@ -180,7 +180,7 @@ fn what_readers_refuse_is_never_written() {
 }
 
 #[test]
-fn errors_say_where_and_what() {
+fn result_errors_name_position_and_cause() {
     let wrap = |inner: &str| {
         format!(
             "<CheckerResults>\n<CheckerBundle>\n <Checker>{inner}</Checker></CheckerBundle></CheckerResults>"
@@ -209,7 +209,7 @@ fn errors_say_where_and_what() {
 }
 
 #[test]
-fn deep_nesting_is_refused_and_overflows_nothing() {
+fn deep_nesting_is_refused_without_overflow() {
     let deep = |levels: usize| {
         let (open, close) = ("<a>".repeat(levels), "</a>".repeat(levels));
         format!(
@@ -226,7 +226,7 @@ fn deep_nesting_is_refused_and_overflows_nothing() {
 }
 
 #[test]
-fn decoding_a_deep_tree_is_refused_and_leaves_the_next_one_alone() {
+fn refused_deep_tree_does_not_affect_next_decoding() {
     let json = |levels: usize| {
         let open = r#"{"name":"a","attributes":[],"text":"","children":["#.repeat(levels);
         format!("{open}{}", "]}".repeat(levels))

@@ -71,7 +71,7 @@ mod tests {
     use crate::{DocId, FromPeer, JobId, PROTOCOL_VERSION, ToPeer};
 
     #[test]
-    fn a_message_comes_back_as_it_went() {
+    fn message_decodes_to_what_was_encoded() {
         let message = FromPeer::Heartbeat {
             job: Some(JobId(7)),
             checker: None,
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_moves_a_message_raises_the_version() {
+    fn moved_message_requires_new_protocol_version() {
         // A message inserted before the last one changes its number, so old peers misread it.
         let drain = encode(&ToPeer::Drain).unwrap();
         let leaving = encode(&FromPeer::Leaving).unwrap();
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hostile_length_is_refused_before_memory_is_reserved() {
+    fn hostile_length_is_refused_before_memory_is_reserved() {
         // The third variant, number 2, is `Job`; the bytes after it declare 2^60 documents.
         let mut bytes = vec![2, 0, 0, 0];
         bytes.extend([0; 8 + 8 + 32 + 4]);

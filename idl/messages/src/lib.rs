@@ -39,7 +39,7 @@ mod tests {
     use super::build::day_of;
 
     #[test]
-    fn days_are_counted_as_the_calendar_does() {
+    fn days_are_counted_by_calendar() {
         let days = [
             (0, "1970-01-01"),
             (-1, "1969-12-31"),

@@ -155,7 +155,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_member_is_called_by_its_archive_and_its_whole_name() {
+    fn archive_member_is_named_by_archive_and_full_name() {
         for (path, name) in [
             ("/a/b.xosc", "b.xosc"),
             ("/a/x.mosc!lib/b.xosc", "x.mosc!lib/b.xosc"),
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn utf8_is_written_as_it_is_and_the_rest_by_its_bytes() {
+    fn path_text_keeps_utf8_and_escapes_other_bytes() {
         let cases: [(&[u8], &str); 9] = [
             (b"/farm/a.xodr", "/farm/a.xodr"),
             (
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn text_of_other_origin_is_a_path_too() {
+    fn malformed_escapes_are_taken_as_plain_path() {
         for text in ["bytes:%", "bytes:%F", "bytes:%+1", "bytes:%ß", "%FF"] {
             assert_eq!(from_text(text), PathBuf::from(text));
         }
@@ -204,18 +204,18 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_path_comes_back_from_its_text(bytes in mostly_text()) {
+        fn every_path_round_trips_through_text(bytes in mostly_text()) {
             prop_assert_eq!(from_text(&to_text(&path(&bytes))), path(&bytes));
         }
 
         #[test]
-        fn two_paths_never_share_a_text(one in mostly_text(), other in mostly_text()) {
+        fn different_paths_have_different_texts(one in mostly_text(), other in mostly_text()) {
             let same = to_text(&path(&one)) == to_text(&path(&other));
             prop_assert_eq!(same, path(&one).as_os_str() == path(&other).as_os_str());
         }
 
         #[test]
-        fn every_text_is_some_path(text in "(bytes:)?[%A-F0-9a-zß/]{0,12}") {
+        fn every_text_converts_to_stable_path(text in "(bytes:)?[%A-F0-9a-zß/]{0,12}") {
             let path = from_text(&text);
             prop_assert_eq!(from_text(&to_text(&path)), path);
         }

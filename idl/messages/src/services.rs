@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_never_overflows_a_buffer() {
+    fn frame_window_is_smaller_than_buffer() {
         for (_, services) in tables() {
             for stream in [services.to_peer, services.from_peer] {
                 assert!(FRAME_WINDOW < stream.buffer);
@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn active_documents_fit_buffer_history_and_hands() {
+    fn active_documents_fit_buffer_history_and_borrows() {
         for (limits, services) in tables() {
             for (topic, active) in [
                 (services.document_small, limits.small_active),
@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_distinct() {
+    fn topic_names_are_distinct() {
         for (_, services) in tables() {
             let names = services.topics().map(|topic| topic.name);
             let distinct: std::collections::BTreeSet<_> = names.iter().collect();

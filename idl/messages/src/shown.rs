@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_moves_is_written_out_and_the_rest_stays() {
+    fn control_characters_are_escaped_and_other_text_is_kept() {
         let cases = [
             ("straße \\ 100 %", "straße \\ 100 %", "straße \\ 100 %"),
             ("a\nb: accepted", "a\\nb: accepted", "a\nb: accepted"),
@@ -77,7 +77,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn nothing_shown_moves(text in any::<String>()) {
+        fn shown_text_has_no_control_characters(text in any::<String>()) {
             prop_assert!(!line(&text).chars().any(moves));
             prop_assert!(!lines(&text).chars().any(|c| moves(c) && c != '\n' && c != '\t'));
         }

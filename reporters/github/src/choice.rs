@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn rare_rules_and_files_are_not_drowned() {
+    fn rare_rules_and_files_get_annotations() {
         let mut all: Vec<Entry> = (0..500).map(|row| entry("a", "often", row)).collect();
         all.push(entry("a", "rare", 1));
         all.push(entry("b", "often", 1));
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn what_fits_is_taken_as_it_is() {
+    fn entries_within_limit_are_all_chosen() {
         let all: Vec<Entry> = (0..10).map(|row| entry("a", "often", row)).collect();
         let all: Vec<&Entry> = all.iter().collect();
         let choice = Chosen::of(&all);

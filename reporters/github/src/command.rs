@@ -149,14 +149,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_the_host_reserves_is_escaped() {
+    fn characters_reserved_by_host_are_escaped() {
         assert_eq!(data("50 %\r\na: b, c"), "50 %25%0D%0Aa: b, c");
         assert_eq!(property("50 %\r\na: b, c"), "50 %25%0D%0Aa%3A b%2C c");
         assert_eq!(unescaped(&data("%25\r\n%0A%")), "%25\r\n%0A%");
     }
 
     #[test]
-    fn a_path_in_the_log_leads_back() {
+    fn path_in_log_is_unescaped_to_original() {
         assert_eq!(place_path("maps/a b,c.xodr"), "maps/a b,c.xodr");
         assert_eq!(place_path("::error::"), "%3A%3Aerror%3A%3A");
         assert_eq!(place_path("##[group]#"), "%23#[group]#");
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn two_hashes_never_meet() {
+    fn adjacent_hashes_are_separated() {
         assert_eq!(tame("a ##[group]x", 99), "a # #[group]x");
         assert_eq!(tame("###", 99), "# # #");
         assert_eq!(tame("#\u{ad}#[error]", 99), "# \u{ad}#[error]");

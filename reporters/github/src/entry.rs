@@ -73,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_reads_back() {
+    fn entry_line_parses_back() {
         let known = entry();
         let line = "a%3A error%3A b%3A3:3:18446744073709551615: warning: 1: error: 2 [3 [b/c]]";
         assert_eq!(known.to_string(), line);
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn other_lines_are_none() {
+    fn foreign_lines_are_not_parsed_as_entries() {
         for line in [
             "",
             "a: error: b",

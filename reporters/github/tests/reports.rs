@@ -16,7 +16,7 @@ use qcbus_report_github::{Annotations, LONGEST_TEXT, REPORTER};
 use qcbus_reporter_sdk::{NoSources, ReportFormat as _, Setting};
 
 #[test]
-fn a_report_of_several_files() {
+fn report_of_several_files_matches_snapshot() {
     let mut elsewhere = issue(Level::Error, "ids.exist", "road 7 is not available", 3);
     elsewhere.locations[0].elsewhere = Some(OtherPlace {
         path: "/farm/maps/town.xodr".into(),
@@ -64,7 +64,7 @@ fn a_report_of_several_files() {
 }
 
 #[test]
-fn an_undetermined_verdict_is_an_error_of_its_file() {
+fn undetermined_verdict_is_error_of_its_file() {
     let nobody = result("maps/none.xodr", Vec::new());
     assert_eq!(nobody.verdict, Verdict::Undetermined);
     let commands = runner::run(&report(&[nobody]));
@@ -75,7 +75,7 @@ fn an_undetermined_verdict_is_an_error_of_its_file() {
 }
 
 #[test]
-fn annotations_say_exactly_what_is_meant() {
+fn annotations_keep_special_characters() {
     let text = "50 %, not %0A: see a::b";
     let path = "maps/a,b:c%3A##[group]=.xodr";
     let found = completed(vec![issue(Level::Warning, "odd.rule", text, 3)]);
@@ -97,7 +97,7 @@ fn annotations_say_exactly_what_is_meant() {
 }
 
 #[test]
-fn numbers_that_no_host_takes_stay_in_the_log() {
+fn oversized_line_number_stays_only_in_log() {
     let found = completed(vec![issue(Level::Error, "a", "x", u64::MAX)]);
     let text = report(&[result("a.xodr", vec![found])]);
     assert!(text.contains("a.xodr:18446744073709551615:5: error: x"));
@@ -131,7 +131,7 @@ const HOSTILE: &[&str] = &[
 ];
 
 #[test]
-fn text_of_others_is_no_command_wherever_it_stands() {
+fn hostile_text_never_becomes_command() {
     for hostile in HOSTILE {
         for other in HOSTILE {
             let mut found = issue(Level::Error, "x", hostile, 3);
@@ -167,7 +167,7 @@ fn text_of_others_is_no_command_wherever_it_stands() {
 }
 
 #[test]
-fn ten_thousand_findings_are_all_in_the_log_and_the_cut_is_said() {
+fn ten_thousand_findings_are_logged_and_limit_is_stated() {
     let long = "ä ".repeat(LONGEST_TEXT);
     let of = |level, count: u64, text: &str| {
         let rows = 1..=count;
@@ -204,7 +204,7 @@ fn ten_thousand_findings_are_all_in_the_log_and_the_cut_is_said() {
 }
 
 #[test]
-fn every_file_has_an_annotation_as_long_as_there_is_room() {
+fn each_file_is_annotated_while_room_remains() {
     let files: Vec<_> = (0..30)
         .map(|number| {
             let rows = 1..=50;
@@ -223,12 +223,12 @@ fn every_file_has_an_annotation_as_long_as_there_is_room() {
 }
 
 #[test]
-fn a_report_of_no_file_is_empty() {
+fn report_of_no_file_is_empty() {
     assert_eq!(report(&[]), "");
 }
 
 #[test]
-fn what_is_not_ours_and_what_is_torn_is_dropped() {
+fn foreign_and_torn_sections_are_dropped() {
     let whole = result("a.xodr", vec![completed(Vec::new())]);
     let found = completed(vec![issue(Level::Error, "x", "y", 1)]);
     let torn = result("b.xodr", vec![found]);
@@ -240,7 +240,7 @@ fn what_is_not_ours_and_what_is_torn_is_dropped() {
 }
 
 #[test]
-fn a_daemon_that_is_started_again_keeps_what_it_wrote() {
+fn restarted_daemon_keeps_earlier_report() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("github.txt");
     let make = |keep| {

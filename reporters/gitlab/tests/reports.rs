@@ -124,7 +124,7 @@ fn entries(text: &str) -> Vec<Value> {
 }
 
 #[test]
-fn a_whole_report() {
+fn report_of_every_verdict_matches_snapshot() {
     let accepted = found("maps/fine.xodr", Vec::new());
     insta::assert_snapshot!(whole(&[
         rejected("maps/a b.xodr"),
@@ -134,13 +134,13 @@ fn a_whole_report() {
 }
 
 #[test]
-fn a_report_of_nothing_is_an_empty_array() {
+fn report_without_findings_is_empty_array() {
     assert_eq!(whole(&[]), "[]\n");
     assert_eq!(whole(&[found("fine.xodr", Vec::new())]), "[]\n");
 }
 
 #[test]
-fn nobody_takes_silence_for_success() {
+fn undetermined_file_has_blocker_entry() {
     let mut blocked = checker("check_a", Status::Skipped, Vec::new());
     blocked.summary = "The file cannot be read.".into();
     blocked.metadata.push(Metadata {
@@ -198,12 +198,12 @@ fn many(path: &str, count: u64) -> ResultMessage {
 }
 
 #[test]
-fn ten_thousand_findings_are_all_there() {
+fn ten_thousand_findings_are_all_reported() {
     assert_eq!(entries(&whole(&[many("a.xodr", 10_000)])).len(), 10_000);
 }
 
 #[test]
-fn thirty_thousand_findings_lose_the_least_severe_and_say_it() {
+fn findings_beyond_limit_drop_least_severe_with_notice() {
     let text = whole(&[many("a.xodr", 15_000), many("b.xodr", 15_000)]);
     let all = entries(&text);
     assert_eq!(all.len(), MOST_ENTRIES + 1);
@@ -224,7 +224,7 @@ fn thirty_thousand_findings_lose_the_least_severe_and_say_it() {
 }
 
 #[test]
-fn fingerprints_outlive_edits_and_tell_findings_apart() {
+fn fingerprints_survive_edits_and_distinguish_findings() {
     let of = |row, road: &str, text: &str| {
         let issues = ["-1", "-2", "-2"].map(|lane| {
             let xpath = format!("/OpenDRIVE/road{road}/lane[@id='{lane}']");
@@ -254,7 +254,7 @@ fn hostile_text_stays_text() {
 }
 
 #[test]
-fn a_report_comes_apart_into_what_it_was_made_of() {
+fn report_splits_into_its_sections() {
     let mut same_name = rejected("maps/a b.xodr");
     same_name.input = "/other/maps/a b.xodr".into();
     let mut results = vec![

@@ -157,7 +157,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_data_of_a_page_is_found_again() {
+    fn data_of_page_is_extracted_again() {
         let data = "{\"hostile\": \"</script><script>alert(1)</script>\"}";
         let page = Page {
             title: "</title><b>&",
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn scripts_and_style_end_where_they_should() {
+    fn embedded_scripts_and_style_contain_no_end_tags() {
         for text in [SHARED, OF_RESULT, OF_RUN].concat() {
             assert!(!text.to_lowercase().contains("</script"));
             assert!(!text.contains("<!--"));

@@ -41,7 +41,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_is_overwritten_and_the_order_stays() {
+    fn duplicate_keys_are_kept_in_original_order() {
         let ordered: Ordered<u8> = ["b", "a", "b"]
             .map(|k| (k.to_owned(), 1))
             .into_iter()

@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_xml_reserves_is_escaped() {
+    fn xml_special_characters_are_escaped() {
         let info = DomainInfo {
             name: "a\"b".into(),
             content: vec![InfoElement {

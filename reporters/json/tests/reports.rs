@@ -110,12 +110,12 @@ fn result(path: &str) -> ResultMessage {
 }
 
 #[test]
-fn a_whole_report() {
+fn whole_json_report_matches_snapshot() {
     insta::assert_snapshot!(render(&result("maps/harbour.xodr"), 2).unwrap());
 }
 
 #[test]
-fn without_indent_it_is_one_line_of_the_same() {
+fn report_without_indent_is_single_line_of_same_content() {
     let result = result("maps/harbour.xodr");
     let line = render(&result, 0).unwrap();
     assert_eq!(line.matches('\n').count(), 1);
@@ -124,7 +124,7 @@ fn without_indent_it_is_one_line_of_the_same() {
 }
 
 #[test]
-fn bundles_and_checkers_of_one_name_are_all_there() {
+fn bundles_and_checkers_of_same_name_are_all_listed() {
     let mut twice = result("a.xodr");
     let checkers = &mut twice.results.bundles[0].checkers;
     checkers.push(checkers[0].clone());
@@ -138,7 +138,7 @@ fn bundles_and_checkers_of_one_name_are_all_there() {
 }
 
 #[test]
-fn a_checker_without_a_status_is_null() {
+fn checker_without_status_is_null() {
     let mut result = result("a.xodr");
     result.results.bundles[0].checkers[0].status = None;
     let json: Value = serde_json::from_str(&render(&result, 2).unwrap()).unwrap();
@@ -148,7 +148,7 @@ fn a_checker_without_a_status_is_null() {
 }
 
 #[test]
-fn one_file_holds_the_newest_report_of_each_checked_file() {
+fn shared_file_holds_newest_report_of_each_checked_file() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("all.json");
     let output = param("OutputFile", &path.to_string_lossy());
@@ -169,7 +169,7 @@ fn one_file_holds_the_newest_report_of_each_checked_file() {
 }
 
 #[test]
-fn a_senseless_indent_is_refused_with_what_is_allowed() {
+fn invalid_indent_is_refused_with_allowed_range() {
     let mut result = result("a.xodr");
     result.params.push(param("Indent", "-1"));
     let error = new_reporter(false).report(&result, &NoSources);

@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_what_is_meant() {
+    fn text_is_unchanged_by_xml_sanitizing() {
         // quick-junit removes escape sequences and control characters. None may be left for it
         // here.
         let all: String = ('\0'..=char::MAX).collect();
@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_is_never_empty() {
+    fn empty_name_gets_replacement_text() {
         assert_eq!(name(" \u{3000}", "(no id)"), "(no id)");
         assert_eq!(name("a\nb", "(no id)"), "a\\nb");
     }

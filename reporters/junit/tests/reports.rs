@@ -23,14 +23,14 @@ fn set(name: &str, value: &str) -> Param {
 }
 
 #[test]
-fn a_case_of_every_ending() {
+fn test_case_of_every_ending_matches_snapshot() {
     let ended = result("maps/harbour.xodr", endings());
     let text = report(&[ended]);
     insta::assert_snapshot!(text);
 }
 
 #[test]
-fn checkers_that_do_not_apply_are_listed_on_demand() {
+fn inapplicable_checkers_are_listed_on_request() {
     let mut ended = result("a.xodr", endings());
     let counted = report(&[ended.clone()]);
     assert!(!counted.contains("check_1_7"));
@@ -47,7 +47,7 @@ fn checkers_that_do_not_apply_are_listed_on_demand() {
 }
 
 #[test]
-fn a_file_that_nobody_has_judged_is_red() {
+fn file_without_completed_checks_is_red() {
     let only_blocked = result("a.xodr", vec![blocked("check_lanes"), blocked("check_x")]);
     let nobody = result("b.xodr", Vec::new());
     assert_eq!(only_blocked.verdict, Verdict::Undetermined);
@@ -59,7 +59,7 @@ fn a_file_that_nobody_has_judged_is_red() {
 }
 
 #[test]
-fn an_accepted_file_is_green_and_an_error_of_one_that_was_skipped_is_not() {
+fn accepted_file_passes_and_error_of_skipped_checker_fails() {
     let warned = vec![issue(Level::Warning, "odd", 2)];
     let passes = checker("check_a", Some(Status::Completed), "", warned.clone());
     let accepted = report(&[result("a.xodr", vec![passes.clone()])]);
@@ -73,7 +73,7 @@ fn an_accepted_file_is_green_and_an_error_of_one_that_was_skipped_is_not() {
 }
 
 #[test]
-fn places_are_said_as_far_as_they_are_known() {
+fn places_are_reported_as_far_as_known() {
     let mut elsewhere = issue(Level::Error, "in a map", 3);
     elsewhere.locations[0].elsewhere = Some(OtherPlace {
         path: "/farm/maps/town.xodr".into(),
@@ -127,7 +127,7 @@ fn hostile_text_stays_text() {
 }
 
 #[test]
-fn ten_thousand_findings_are_bounded_and_the_errors_come_first() {
+fn ten_thousand_findings_are_bounded_with_errors_first() {
     let long = "ä ".repeat(LONGEST_FINDING);
     let mut issues: Vec<_> = (1..10_000)
         .map(|row| issue(Level::Warning, &long, row))
@@ -150,13 +150,13 @@ fn ten_thousand_findings_are_bounded_and_the_errors_come_first() {
 }
 
 #[test]
-fn a_report_of_no_file_is_a_report() {
+fn report_of_no_file_is_valid() {
     let none = report(&[]);
     assert!(none.contains(r#"<testsuites name="qcbus" tests="0" failures="0" errors="0">"#));
 }
 
 #[test]
-fn what_is_not_ours_is_dropped() {
+fn foreign_and_torn_reports_are_dropped() {
     let ours = report(&[result("a.xodr", endings())]);
     let torn = &ours[..ours.len() / 2];
     assert!(Suites.split(torn).is_empty());
@@ -166,7 +166,7 @@ fn what_is_not_ours_is_dropped() {
 }
 
 #[test]
-fn a_daemon_that_is_started_again_keeps_what_it_wrote() {
+fn restarted_daemon_keeps_earlier_reports() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("all.junit.xml");
     let make = |keep| {

@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_hull_of_a_square_is_its_corners() {
+    fn hull_of_square_is_its_corners() {
         let points = vec![[0, 0], [2, 2], [1, 1], [2, 0], [0, 2], [1, 0], [2, 2]];
         assert_eq!(hull(points), [[0, 0], [2, 0], [2, 2], [0, 2]]);
         assert_eq!(hull(vec![[1, 1], [1, 1]]), [[1, 1]]);
@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn the_centroid_is_that_of_the_area() {
+    fn centroid_is_computed_from_the_area() {
         // An additional corner on one edge moves the mean of the points, but not the centroid of
         // the area.
         let square = [[0, 0], [4, 0], [4, 1], [4, 2], [4, 4], [0, 4]];

@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn forced_points_stay_on_the_finest_level() {
+    fn forced_points_stay_on_finest_level() {
         let points: Vec<Spot> = (0..10)
             .map(|x| Spot {
                 x: f64::from(x),
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_loses_one_point_at_a_time_is_halved() {
+    fn worst_case_line_is_simplified_without_quadratic_time() {
         // The farthest point is always the next one. At this length, quadratic time would take
         // hours.
         let point = |at: u32| Spot {
@@ -201,7 +201,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_level_keeps_its_distance(
+        fn every_level_stays_within_its_tolerance(
             steps in prop::collection::vec((-300.0..300.0_f64, -300.0..300.0_f64), 2..200),
         ) {
             let mut at = Spot { x: 0.0, y: 0.0 };

@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_take_the_bytes_that_they_need_and_no_more_than_53_bits() {
+    fn numbers_use_variable_length_up_to_53_bits() {
         let mut out = Writer::default();
         for value in [0, 127, 128, 300] {
             out.unsigned(value);

@@ -11,7 +11,7 @@ fn places(border: &Border) -> Vec<[i64; 2]> {
 }
 
 #[test]
-fn the_borders_of_a_straight_road_lie_to_the_centimetre() {
+fn straight_road_borders_are_exact_to_the_centimetre() {
     let plan = plan(&road(
         "5",
         "name='Main'",
@@ -87,7 +87,7 @@ const ARC: &str =
     "<geometry s='0' x='3' y='4' hdg='0' length='150'><arc curvature='0.02'/></geometry>";
 
 #[test]
-fn an_arc_stays_within_its_tolerance_on_every_level() {
+fn arc_stays_within_tolerance_on_every_level() {
     let plan = plan(&road("1", "", 150.0, ARC, TWO_LANES));
     let section = &plan.roads[0].sections[0];
     let lanes = [
@@ -107,7 +107,7 @@ fn an_arc_stays_within_its_tolerance_on_every_level() {
 }
 
 #[test]
-fn coarser_levels_are_parts_of_finer_ones_and_have_fewer_points() {
+fn coarser_levels_are_subsets_with_fewer_points() {
     let plan = plan(&road("1", "", 150.0, ARC, TWO_LANES));
     let points = &plan.roads[0].sections[0].left[0].border.points;
     let count = |level| points.iter().filter(|point| point.level >= level).count();
@@ -152,7 +152,7 @@ fn spirals_and_cubics_stay_within_two_centimetres() {
 }
 
 #[test]
-fn a_mark_begins_at_a_point() {
+fn road_mark_begins_at_a_point() {
     let lanes = "<laneSection s='20'><center><lane id='0'>\
         <roadMark sOffset='0' type='solid' color='white' width='0.12'/>\
         <roadMark sOffset='33.3' type='none' color='white'/>\
@@ -202,7 +202,7 @@ fn a_mark_begins_at_a_point() {
 }
 
 #[test]
-fn a_step_in_width_is_a_step_of_the_border() {
+fn step_in_width_becomes_step_of_border() {
     let lanes = "<laneSection s='0'><center><lane id='0'/></center><right><lane id='-1'>\
         <width sOffset='0' a='3' b='0' c='0' d='0'/><width sOffset='40' a='4' b='0' c='0' d='0'/>\
         </lane></right></laneSection>";
@@ -225,7 +225,7 @@ fn a_step_in_width_is_a_step_of_the_border() {
 }
 
 #[test]
-fn sections_follow_each_other_in_the_order_of_the_file() {
+fn sections_follow_order_of_the_file() {
     let section = |s: u32, id: i64| {
         format!(
             "<laneSection s='{s}'><center><lane id='0'/></center><right>\
@@ -249,7 +249,7 @@ fn sections_follow_each_other_in_the_order_of_the_file() {
 }
 
 #[test]
-fn traffic_on_the_left_links_and_elevation_are_told() {
+fn left_hand_traffic_links_and_elevation_are_included() {
     let more = "<link><predecessor elementType='road' elementId='x'/>\
         <successor elementType='junction' elementId='j'/></link>\
         <elevationProfile><elevation s='0' a='10' b='0.1' c='0' d='0'/>\
@@ -278,7 +278,7 @@ fn traffic_on_the_left_links_and_elevation_are_told() {
 }
 
 #[test]
-fn large_coordinates_are_shifted_before_they_are_rounded() {
+fn large_coordinates_are_shifted_before_rounding() {
     let geometry = line(0.0, 690_123.456, 5_334_567.891, 0.0, 100.0);
     let plan = plan(&road("1", "", 100.0, &geometry, TWO_LANES));
     assert_eq!(plan.origin, [690_123.0, 5_334_567.0]);
@@ -287,7 +287,7 @@ fn large_coordinates_are_shifted_before_they_are_rounded() {
 }
 
 #[test]
-fn the_outline_of_a_junction_goes_around_its_connecting_roads() {
+fn junction_outline_surrounds_connecting_roads() {
     let member = |id: &str, x: f64, y: f64, hdg: f64| {
         road(
             id,
@@ -337,7 +337,7 @@ fn the_outline_of_a_junction_goes_around_its_connecting_roads() {
 }
 
 #[test]
-fn the_outline_of_a_junction_is_its_boundary() {
+fn junction_outline_follows_given_boundary() {
     let road = road(
         "a",
         "junction='j'",
@@ -358,7 +358,7 @@ fn the_outline_of_a_junction_is_its_boundary() {
 }
 
 #[test]
-fn signals_and_objects_stand_where_the_model_says() {
+fn signals_and_objects_stand_where_model_places_them() {
     let more = "<objects><object id='box' type='building' s='10' t='5' hdg='0' length='4' width='2'/>\
         <object id='tree' type='tree' s='20' t='-5' radius='1'/>\
         <object id='spot' s='30' t='0'/>\

@@ -9,7 +9,7 @@ use support::{TWO_LANES, decode, line, plan, road, with_map};
 const CANNOT_BE_DRAWN: u64 = 2;
 
 #[test]
-fn roads_without_a_place_are_listed_and_said() {
+fn roads_without_place_are_listed_and_reported() {
     let good = road("good", "", 50.0, &line(0.0, 7.0, 8.0, 0.0, 50.0), TWO_LANES);
     let good = good.clone() + &good + &good;
     let nan = good.replace("x='7'", "x='NaN'").replace("good", "nan");
@@ -53,7 +53,7 @@ fn roads_without_a_place_are_listed_and_said() {
 }
 
 #[test]
-fn a_circle_that_is_driven_a_million_times_is_given_up() {
+fn road_circling_a_million_times_is_not_drawn() {
     let shapes = [
         "<arc curvature='0.1'/>",
         "<spiral curvStart='-3' curvEnd='5'/>",
@@ -70,7 +70,7 @@ fn a_circle_that_is_driven_a_million_times_is_given_up() {
 }
 
 #[test]
-fn ten_thousand_lanes_in_one_place_are_listed_without_borders() {
+fn ten_thousand_lanes_are_listed_without_borders() {
     let lanes: String = (1..=10_000)
         .map(|id| format!("<lane id='-{id}'><width sOffset='0' a='1' b='0' c='0' d='0'/></lane>"))
         .collect();
@@ -87,7 +87,7 @@ fn ten_thousand_lanes_in_one_place_are_listed_without_borders() {
 }
 
 #[test]
-fn many_small_endless_roads_share_what_work_there_is() {
+fn many_endless_roads_share_the_point_limit() {
     let geometry =
         "<geometry s='0' x='0' y='0' hdg='0' length='2e4'><arc curvature='0.1'/></geometry>";
     let roads: String = (0..2_000)
@@ -101,7 +101,7 @@ fn many_small_endless_roads_share_what_work_there_is() {
 }
 
 #[test]
-fn a_width_beyond_reason_is_none() {
+fn implausible_width_is_treated_as_none() {
     let lanes = TWO_LANES
         .replace("a='3.5'", "a='1e29'")
         .replace("a='3'", "a='x'");
@@ -120,7 +120,7 @@ fn a_width_beyond_reason_is_none() {
 }
 
 #[test]
-fn names_with_markup_pass_and_long_ones_are_cut() {
+fn names_with_markup_are_kept_and_long_ones_cut() {
     let long = "x".repeat(10_000);
     let xml = road(
         "&lt;/script&gt;&amp;",
@@ -185,7 +185,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn no_number_loses_a_road(numbers in prop::collection::vec(number(), 97)) {
+    fn arbitrary_numbers_lose_no_road(numbers in prop::collection::vec(number(), 97)) {
         let xml = filled(&numbers);
         with_map(&xml, |map| {
             let plan = decode(&Plan::of(map).bytes());

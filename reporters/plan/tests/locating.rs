@@ -66,7 +66,7 @@ fn lane(section: usize, lane: i64) -> Target {
 }
 
 #[test]
-fn each_element_of_a_road_has_its_place() {
+fn each_element_of_road_has_its_place() {
     let all: &[(&str, [f64; 2], Target)] = &[
         ("", [50.0, 0.0], ROAD),
         ("/@length", [50.0, 0.0], ROAD),
@@ -151,7 +151,7 @@ fn each_element_of_a_road_has_its_place() {
 }
 
 #[test]
-fn of_elements_with_one_id_the_one_that_is_meant_counts() {
+fn duplicate_ids_resolve_to_intended_element() {
     let second = element("/OpenDRIVE/road[2]/objects/object[2]");
     let on = Target::Object { object: 3 };
     assert_eq!(second, expect([31.0, 57.0], How::Element, &[on]));
@@ -166,7 +166,7 @@ fn of_elements_with_one_id_the_one_that_is_meant_counts() {
 }
 
 #[test]
-fn junctions_and_their_connections_have_places() {
+fn junctions_and_connections_have_places() {
     let junction = Target::Junction { junction: 0 };
     let middle = element("/OpenDRIVE/junction[1]");
     assert_eq!(
@@ -192,7 +192,7 @@ fn junctions_and_their_connections_have_places() {
 }
 
 #[test]
-fn what_is_said_exactly_wins_and_what_it_is_about_comes_from_the_element() {
+fn most_exact_position_wins_and_target_comes_from_element() {
     let mut said = Said {
         xpath: Some("/OpenDRIVE/road[1]/lanes/laneSection[1]/right/lane[1]"),
         road: Some(("5", 10.0, 2.0)),
@@ -219,7 +219,7 @@ fn what_is_said_exactly_wins_and_what_it_is_about_comes_from_the_element() {
 }
 
 #[test]
-fn what_is_no_part_of_the_plan_has_no_place() {
+fn elements_outside_plan_have_no_place() {
     let nothing = [
         "/OpenDRIVE",
         "/OpenDRIVE/header",
@@ -238,7 +238,7 @@ fn what_is_no_part_of_the_plan_has_no_place() {
 }
 
 #[test]
-fn xpaths_of_other_tools_are_understood() {
+fn xpaths_of_other_tools_are_located() {
     let on = lane(0, -1);
     for xpath in [
         "//lane[@id='-1']",
@@ -251,7 +251,7 @@ fn xpaths_of_other_tools_are_understood() {
 }
 
 #[test]
-fn ten_thousand_findings_on_many_roads_go_to_their_own() {
+fn ten_thousand_findings_are_located_on_their_roads() {
     let roads: String = (0..500)
         .map(|id| {
             let geometry = line(0.0, 0.0, f64::from(id), 0.0, 100.0);

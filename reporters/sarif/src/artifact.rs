@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_below_the_root_is_relative() {
+    fn path_below_root_is_relative() {
         let paths = paths("/farm/maps/a b.xodr", "maps/a b.xodr");
         assert_eq!(uri(paths.checked()), ("maps/a%20b.xodr".into(), true));
         let other = |path| uri(paths.other(path));
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_is_absolute() {
+    fn path_outside_root_is_absolute() {
         let absolute = paths("/farm/a.xodr", "/farm/a.xodr");
         assert_eq!(
             uri(absolute.checked()),

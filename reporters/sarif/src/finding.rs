@@ -180,7 +180,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_that_no_file_has_are_unknown() {
+    fn impossible_line_numbers_are_unknown() {
         let at = |row, column| region(row, column).map(|it| (it.start_line, it.start_column));
         assert_eq!(at(Some(3), Some(4)), Some((3, Some(4))));
         assert_eq!(at(Some(3), Some(0)), Some((3, None)));
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn positions_are_numbers_that_read_back() {
+    fn positions_are_rounded_and_implausible_ones_dropped() {
         assert_eq!(metres(12.345_678), Some(12.346));
         assert_eq!(metres(-0.000_1).map(f64::to_bits), Some(0.0_f64.to_bits()));
         for number in [f64::NAN, f64::INFINITY, 1e300, -1e9] {

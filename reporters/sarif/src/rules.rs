@@ -91,14 +91,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_page_begins_after_its_title() {
+    fn page_description_begins_after_title() {
         let page = "# Title\n\nFirst `a`\nsecond.\n\n## Why\n\nBecause.";
         assert_eq!(beginning(page), "First `a` second.");
         assert_eq!(beginning("# Title"), "");
     }
 
     #[test]
-    fn tags_are_what_people_filter_by() {
+    fn tags_name_standard_version_and_area() {
         let uid = "asam.net:xodr:1.4.0:road.lane.x";
         assert_eq!(tags(uid), ["xodr", "xodr 1.4.0", "road"]);
         assert!(tags("").is_empty());

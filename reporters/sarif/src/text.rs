@@ -49,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_text_of_others_steers_or_links() {
+    fn foreign_text_cannot_steer_terminal_or_add_links() {
         assert_eq!(
             message("a\u{1b}[2K\n b [x](http://e) {0}"),
             "a\u{FFFD}[2K b [x] (http://e) {0}"
@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_long_ends_with_a_sign() {
+    fn long_message_ends_with_ellipsis() {
         let long = message(&"ü".repeat(5000));
         assert_eq!(long.chars().count(), LONGEST_MESSAGE);
         assert!(long.ends_with("ü…"));

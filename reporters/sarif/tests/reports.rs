@@ -189,20 +189,20 @@ fn fingerprints(run: &Value) -> Vec<&str> {
 }
 
 #[test]
-fn a_whole_log() {
+fn whole_sarif_log_matches_snapshot() {
     let results = [rejected("maps/a b.xodr"), accepted("maps/fine.xodr")];
     insta::assert_snapshot!(pretty(&results));
 }
 
 #[test]
-fn a_log_of_nothing_is_a_log() {
+fn log_without_results_is_valid() {
     let run = run(&[]);
     assert_eq!(run["results"], Value::Array(Vec::new()));
     assert_eq!(run["invocations"][0]["executionSuccessful"], true);
 }
 
 #[test]
-fn what_is_undetermined_never_looks_like_success() {
+fn undetermined_file_is_never_shown_as_success() {
     let nobody = result(
         "c.xodr",
         vec![checker("a", Some(Status::Skipped), Vec::new())],
@@ -244,7 +244,7 @@ fn what_is_undetermined_never_looks_like_success() {
 }
 
 #[test]
-fn a_dead_bundle_is_one_sentence_and_shows_beside_errors() {
+fn dead_bundle_is_single_notification_beside_errors() {
     let mut checkers: Vec<Checker> = (0..300)
         .map(|n| checker(&format!("check_{n:03}"), Some(Status::Error), Vec::new()))
         .collect();
@@ -288,7 +288,7 @@ fn many(path: &str, count: usize) -> ResultMessage {
 }
 
 #[test]
-fn ten_thousand_findings_are_all_there_and_what_is_shown_is_said() {
+fn all_ten_thousand_findings_are_kept_with_notice() {
     let run = run(&[many("a.xodr", 10_000)]);
     assert_eq!(run["results"].as_array().unwrap().len(), 10_000);
     let told = run["invocations"][0]["toolConfigurationNotifications"]
@@ -303,7 +303,7 @@ fn ten_thousand_findings_are_all_there_and_what_is_shown_is_said() {
 }
 
 #[test]
-fn thirty_thousand_findings_lose_the_least_severe_and_say_it() {
+fn findings_beyond_limit_drop_least_severe_with_notice() {
     let results = [many("a.xodr", 15_000), many("b.xodr", 15_000)];
     let text = unchecked(&results);
     let log: Value = serde_json::from_str(&text).unwrap();
@@ -327,7 +327,7 @@ fn thirty_thousand_findings_lose_the_least_severe_and_say_it() {
 }
 
 #[test]
-fn what_is_too_large_when_packed_is_cut_and_said() {
+fn log_too_large_when_compressed_is_cut_with_notice() {
     // Each finding has its own random text, so that the log cannot be compressed well.
     let mut random = numbers(7);
     let issues = (0..9_000).map(|n| {
@@ -368,7 +368,7 @@ fn numbers(seed: u64) -> impl FnMut() -> u64 {
 }
 
 #[test]
-fn fingerprints_outlive_edits_and_tell_findings_apart() {
+fn fingerprints_survive_edits_and_distinguish_findings() {
     let of = |row, road: &str, text: &str| {
         let place = |id: &str| {
             at(
@@ -428,7 +428,7 @@ fn hostile_text_stays_text() {
 }
 
 #[test]
-fn a_log_comes_apart_into_what_it_was_made_of() {
+fn log_splits_into_its_sections() {
     let mut same_name = rejected("maps/a b.xodr");
     same_name.input = "/other/farm/maps/a b.xodr".into();
     let mut results = vec![
@@ -451,7 +451,7 @@ fn a_log_comes_apart_into_what_it_was_made_of() {
 }
 
 #[test]
-fn what_is_not_ours_is_dropped() {
+fn foreign_and_torn_logs_are_dropped() {
     let text = whole(&[rejected("a.xodr")]);
     let foreign = text.replace("\"name\":\"qcbus\"", "\"name\":\"other\"");
     assert_ne!(foreign, text);
@@ -462,7 +462,7 @@ fn what_is_not_ours_is_dropped() {
 
 /// Writes the logs of these tests for `tests/multitool`: `QCBUS_SARIF_OUT=DIRECTORY cargo test …`.
 #[test]
-fn logs_for_other_validators() {
+fn logs_are_written_for_other_validators() {
     let given = std::env::var_os("QCBUS_SARIF_OUT");
     let own = tempfile::tempdir().unwrap();
     let directory = given.map_or(own.path().to_owned(), Into::into);

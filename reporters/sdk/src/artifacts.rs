@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn the_newest_section_of_each_path_is_kept_and_sorted_in_the_end() {
+    fn newest_section_of_each_path_is_kept_and_sorted() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("all.txt");
         let read = || std::fs::read_to_string(&path).unwrap();
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn in_a_run_the_file_is_written_once() {
+    fn file_is_written_once_at_end_of_run() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("all.txt");
         let read = || std::fs::read_to_string(&path).unwrap();
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_restart_keeps_what_is_whole() {
+    fn restart_keeps_only_complete_sections() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("all.txt");
         std::fs::write(&path, "a=1\nb=2\nc=to").unwrap();

@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_appended_count_is_no_reason() {
+    fn issue_count_is_stripped_from_reason() {
         for (summary, text) in [
             ("Too old. 0 issue(s) are found.", "Too old."),
             ("0 issue(s) are found.", "no reason given"),

@@ -30,7 +30,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn escape_sequences_and_overrides_do_not_get_through() {
+    fn escape_sequences_and_overrides_are_replaced() {
         assert_eq!(
             printable("a\u{1b}[31mb\u{202e}c\r\nd\te\u{2028}f"),
             "a\u{FFFD}[31mb\u{FFFD}c\nd\te\u{FFFD}f"
@@ -38,7 +38,7 @@ mod tests {
     }
 
     #[test]
-    fn one_line_is_one_line() {
+    fn text_is_joined_to_single_line() {
         assert_eq!(one_line("  a\n\t b\u{7} "), "a b\u{FFFD}");
     }
 }

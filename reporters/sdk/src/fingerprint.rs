@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn edits_around_a_finding_leave_its_fingerprint() {
+    fn edits_around_finding_keep_its_fingerprint() {
         let before = of(
             "0.5 m too long",
             Some(&place(7, "/map/road[2]/lane[@id='-1']")),
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn what_names_another_thing_is_another_finding() {
+    fn different_findings_have_different_fingerprints() {
         let lane = |id: &str| place(7, &format!("/map/road[2]/lane[@id='{id}']"));
         let on_road = |id: &str| IssueLocation {
             road: Some((id.into(), 1.0, 2.0)),
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn only_predicates_that_count_are_left_out() {
+    fn only_positional_predicates_are_removed() {
         for (xpath, kept) in [
             ("/a[1]/b[@id='2'][3]/@c", "/a/b[@id='2']/@c"),
             ("/a[@n='x[2]']/b[12]", "/a[@n='x[2]']/b"),
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn the_value_stays_from_build_to_build() {
+    fn fingerprint_is_stable_between_builds() {
         assert_eq!(fingerprint_of(&["a", "bc"]), fingerprint_of(&["a", "bc"]));
         assert_eq!(of("x", None), "7c68368f00d78326ca7c11445e6f2a11");
         let mut repeats = Repeats::default();

@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_in_another_file_keeps_where_it_is_referred_to() {
+    fn place_in_other_file_keeps_its_reference() {
         let other = Locations {
             elsewhere: Some(elsewhere("/m/t.xodr", 12, 5)),
             ..at("the road", 7, 9)
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn without_locations_the_other_file_is_the_place() {
+    fn other_file_is_place_without_locations() {
         let found = issue_locations(&issue(
             Vec::new(),
             vec![elsewhere("/c.xosc", 0, 4).to_info()],

@@ -93,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_result_says_which_file_and_why() {
+    fn unreadable_result_is_reported_with_file_and_reason() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.xqar");
         let missing = load(&path).unwrap_err().to_string();

@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn the_name_of_the_older_reports_is_known_too() {
+    fn output_parameter_of_older_reports_is_accepted() {
         let named = |name: &str, value: &str| Param {
             name: name.into(),
             value: value.into(),
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn the_parameter_decides_where_reports_go() {
+    fn output_parameter_decides_where_reports_go() {
         let result = result(1, "maps/a.xodr");
         assert_eq!(Output::of(&[]), Output::BesideResult);
         assert_eq!(
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_are_no_utf8_have_a_report_each() {
+    fn non_utf8_paths_have_separate_reports() {
         use std::os::unix::ffi::OsStrExt as _;
         let mut result = result(1, "bytes:maps/a%FE.xodr");
         result.xqar = "bytes:/out/maps/a%FE.xodr.xqar".into();
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_for_people_cannot_lead_out_of_the_directory() {
+    fn display_path_cannot_leave_output_directory() {
         let result = result(1, "../../etc/a.xodr");
         assert_eq!(
             Output::of(&params("r/")).own_file(Subject::from(&result), "txt"),
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn the_more_specific_parameter_wins() {
+    fn more_specific_parameter_wins() {
         let mut both = params("global.txt");
         both.extend(params("own.txt"));
         assert_eq!(param(&both, "OutputFile"), Some("own.txt"));
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_replaced_and_nothing_is_left_beside_it() {
+    fn file_is_replaced_without_leftovers() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("new/report.txt");
         replace_file(&path, b"one").unwrap();
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refusal_names_the_file() {
+    fn write_error_names_the_file() {
         let dir = tempfile::tempdir().unwrap();
         std::fs::write(dir.path().join("file"), "").unwrap();
         let error = replace_file(&dir.path().join("file/report.txt"), b"x").unwrap_err();

@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_result_that_comes_again_is_acknowledged_and_not_written_again() {
+    fn repeated_result_is_acknowledged_but_not_written_again() {
         let mut notebook = Notebook::default();
         let mut responder = Responder::new(&mut notebook);
         assert_eq!(tell(&mut responder, 1, "a.xodr"), PeerReport::Written);
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_written_is_said_with_the_reason() {
+    fn write_failure_is_reported_with_reason() {
         let mut notebook = Notebook::default();
         let mut responder = Responder::new(&mut notebook);
         let PeerReport::Failed(why) = tell(&mut responder, 1, "fails.xodr") else {
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_costs_one_result() {
+    fn panic_fails_only_its_own_result() {
         let mut notebook = Notebook::default();
         let mut responder = Responder::new(&mut notebook);
         let report = tell(&mut responder, 1, "panics.xodr");
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_has_gone_takes_its_report_with_it() {
+    fn removed_file_has_its_report_removed() {
         let mut notebook = Notebook::default();
         let mut responder = Responder::new(&mut notebook);
         tell(&mut responder, 1, "a.xodr");

@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn those_of_one_reason_are_told_together() {
+    fn checkers_with_same_reason_are_reported_together() {
         let mut all: Vec<Checker> = (0..7)
             .map(|id| checker(id, Some(Status::Error), "Error: it died. 0 issues."))
             .collect();
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn the_blocked_count_where_no_error_decides() {
+    fn blocked_checkers_are_reported_when_no_error_decides() {
         let mut blocked = checker(0, Some(Status::Skipped), "`c1` failed.");
         blocked.metadata.push(Metadata {
             key: BLOCKED.into(),

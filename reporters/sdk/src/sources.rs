@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_very_long_line_only_a_part_is_given() {
+    fn only_part_of_very_long_line_is_returned() {
         for letter in ["a", "ü"] {
             let text = format!("{}<{}", letter.repeat(5000), letter.repeat(5000));
             let index = Index::of(text.as_bytes());
@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_image_gives_no_lines() {
+    fn damaged_image_gives_no_lines() {
         let sources = ImageSources::new(vec![0_u8; 100], "a.xodr");
         assert_eq!(sources.answer("a.xodr", 1, 1), Answer::OtherFile);
     }

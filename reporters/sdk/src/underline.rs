@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tags_and_attributes_are_marked_as_a_whole() {
+    fn tags_and_attributes_are_underlined_completely() {
         for (line, at, marked) in [
             ("<road id='5'>", 0, 5),
             ("<road id='5'>", 6, 6),

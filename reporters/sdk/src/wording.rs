@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_rule_goes_by_the_end_of_its_uid() {
+    fn rule_name_is_end_of_its_uid() {
         assert_eq!(rule_name("asam.net:xodr:1.4.0:ids.x", "check_x"), "ids.x");
         assert_eq!(rule_name("odd", "check_x"), "odd");
         assert_eq!(rule_name("", "check_x"), "check_x");
@@ -48,7 +48,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_say_what_matters() {
+    fn numbers_are_rounded_to_relevant_digits() {
         for (number, text) in [
             (0.0, "0"),
             (-0.0001, "0"),

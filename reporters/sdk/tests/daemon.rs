@@ -214,7 +214,7 @@ fn results_are_written_acknowledged_and_drained() {
 }
 
 #[test]
-fn a_new_broker_gets_the_reporter_back() {
+fn reporter_rejoins_new_broker() {
     let dir = tempfile::tempdir().unwrap();
     let instance = Instance::at(dir.path().join("i"));
     let file = dir.path().join("a.xodr");
@@ -246,7 +246,7 @@ fn a_new_broker_gets_the_reporter_back() {
 }
 
 #[test]
-fn without_a_broker_it_says_what_to_do() {
+fn reporter_without_broker_fails_with_explanation() {
     let dir = tempfile::tempdir().unwrap();
     let instance = Instance::at(dir.path().join("nobody"));
     block_on(async {

@@ -63,7 +63,7 @@ fn packed_and_transcoded_files_show_their_text() {
 }
 
 #[test]
-fn without_a_digest_the_file_must_be_older_than_the_result() {
+fn file_without_digest_must_be_older_than_result() {
     let dir = tempfile::tempdir().unwrap();
     let (file, xqar) = (dir.path().join("a.xodr"), dir.path().join("a.xodr.xqar"));
     let write = |path: &Path, at: u64| {
@@ -82,7 +82,7 @@ fn without_a_digest_the_file_must_be_older_than_the_result() {
 }
 
 #[test]
-fn what_is_no_file_has_no_lines() {
+fn unreadable_path_has_no_source_lines() {
     let dir = tempfile::tempdir().unwrap();
     let result = result(dir.path(), Path::new("none.xqar"), Digest::default());
     let sources = FileSources::new(&result);

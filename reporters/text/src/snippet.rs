@@ -144,14 +144,14 @@ mod tests {
     }
 
     #[test]
-    fn a_column_beyond_the_line_points_past_its_end() {
+    fn column_beyond_line_points_past_its_end() {
         assert_eq!(show("<a>", 99, 80), "<a>\n   ^");
         assert_eq!(show("", 1, 80), "\n^");
         assert_eq!(show("<a>", u64::MAX, 80), "<a>\n   ^");
     }
 
     #[test]
-    fn a_long_line_is_cut_around_the_column() {
+    fn long_line_is_cut_around_the_column() {
         let line = format!("{}<road id='7'>{}", "x".repeat(500), "y".repeat(500));
         let shown = show(&line, 501, 40);
         let text = shown.lines().next().unwrap();
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_part_of_a_line_is_cut_on_both_sides() {
+    fn partial_line_is_marked_as_cut_on_both_sides() {
         let line = Line {
             text: "abc <road> def".into(),
             skipped: 1000,
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_column_nothing_is_marked() {
+    fn nothing_is_marked_without_column() {
         assert_eq!(snippet(&Line::from("<a>"), None, 80).marks, None);
     }
 }

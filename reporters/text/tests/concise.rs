@@ -60,7 +60,7 @@ fn errors_come_first_and_each_finding_is_one_line() {
 }
 
 #[test]
-fn what_is_folded_is_counted() {
+fn folded_findings_are_counted() {
     let issues = (1..=12)
         .map(|row| issue(Level::Error, "again", row))
         .collect();
@@ -79,7 +79,7 @@ fn what_is_folded_is_counted() {
 }
 
 #[test]
-fn an_open_verdict_is_never_silent() {
+fn undetermined_verdict_is_always_explained() {
     let mut blocked = checker(
         Status::Skipped,
         "Skipped: `check_y` failed. 0 issues.",
@@ -118,7 +118,7 @@ fn an_open_verdict_is_never_silent() {
 }
 
 #[test]
-fn a_daemon_that_is_started_again_keeps_the_lines_of_other_files() {
+fn restarted_daemon_keeps_lines_of_other_files() {
     let dir = tempfile::tempdir().unwrap();
     let all = dir.path().join("all.txt");
     let new_reporter = || -> Box<dyn Reporter> {

@@ -38,7 +38,7 @@ fn scene(dir: &Path) {
 }
 
 #[test]
-fn the_result_file_is_enough() {
+fn report_is_written_from_result_file_alone() {
     let dir = tempfile::tempdir().unwrap();
     scene(dir.path());
     let output = dir.path().join("report.txt");
@@ -55,7 +55,7 @@ fn the_result_file_is_enough() {
 }
 
 #[test]
-fn a_configuration_names_result_output_and_width() {
+fn configuration_gives_result_output_and_line_width() {
     let dir = tempfile::tempdir().unwrap();
     scene(dir.path());
     let at = |name: &str| dir.path().join(name);
@@ -91,7 +91,7 @@ fn a_configuration_names_result_output_and_width() {
 }
 
 #[test]
-fn what_cannot_be_used_is_named() {
+fn unusable_input_is_named_in_error() {
     let dir = tempfile::tempdir().unwrap();
     let fails = |what: &OneShot| once(what).unwrap_err().to_string();
     let results = vec![dir.path().join("none.xqar")];

@@ -151,18 +151,18 @@ fn text(result: &ResultMessage) -> String {
 }
 
 #[test]
-fn issues_follow_the_file_and_a_rule_is_explained_once() {
+fn issues_follow_file_order_and_rule_is_explained_once() {
     insta::assert_snapshot!(text(&duplicates()));
 }
 
 #[test]
-fn an_accepted_file_is_two_lines_and_its_hash() {
+fn accepted_file_is_two_lines_and_hash() {
     let checkers = vec![checker("check_ids", Status::Completed, "", Vec::new())];
     insta::assert_snapshot!(text(&result("a.xodr", Verdict::Accepted, checkers)));
 }
 
 #[test]
-fn what_did_not_run_is_said_with_its_reason() {
+fn checkers_that_did_not_run_are_listed_with_reason() {
     let newer = "The rule holds from 1.7.0 on, the file is of 1.4. 0 issue(s) are found.";
     let checkers = vec![
         checker("check_ids", Status::Completed, "", Vec::new()),
@@ -180,7 +180,7 @@ fn what_did_not_run_is_said_with_its_reason() {
 }
 
 #[test]
-fn what_does_not_apply_is_counted_where_people_look() {
+fn inapplicable_checkers_are_only_counted() {
     let options = Options {
         inapplicable: false,
         ..Options::default()
@@ -214,7 +214,7 @@ fn what_does_not_apply_is_counted_where_people_look() {
 }
 
 #[test]
-fn a_place_in_another_file_is_shown_there() {
+fn place_in_other_file_is_shown_there() {
     let mut found = issue(
         Level::Error,
         "the scenario's map has two roads \"5\"",
@@ -238,7 +238,7 @@ fn a_place_in_another_file_is_shown_there() {
 }
 
 #[test]
-fn nonsense_of_other_tools_is_tolerated() {
+fn invalid_data_of_other_tools_is_tolerated() {
     let zero = at(0, 0, "", "somewhere");
     let no_column = at(3, 0, "/OpenDRIVE/road", "");
     let far = at(u64::MAX, u64::MAX, "//*", "");
@@ -264,7 +264,7 @@ fn nonsense_of_other_tools_is_tolerated() {
 }
 
 #[test]
-fn colours_change_nothing_but_colours() {
+fn coloured_report_has_same_text() {
     let options = Options {
         color: true,
         ..Options::default()
@@ -282,13 +282,13 @@ fn colours_change_nothing_but_colours() {
 }
 
 #[test]
-fn without_sources_descriptions_still_appear() {
+fn descriptions_appear_without_sources() {
     let text = render(&duplicates(), &Options::default(), &NoSources);
     assert!(text.contains("= here: the first one"), "{text}");
 }
 
 #[test]
-fn reports_go_beside_the_result_or_into_one_file() {
+fn reports_go_beside_result_or_into_one_file() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name).to_string_lossy().into_owned();
     let mut first = duplicates();
@@ -321,7 +321,7 @@ fn reports_go_beside_the_result_or_into_one_file() {
 }
 
 #[test]
-fn a_senseless_width_is_refused_with_what_is_allowed() {
+fn invalid_width_is_refused_with_allowed_range() {
     let mut result = duplicates();
     result.params.push(Param {
         name: "LineWidth".into(),

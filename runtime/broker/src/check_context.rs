@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn bundles_that_are_started_otherwise_are_others() {
+    fn bundles_started_differently_have_different_check_context() {
         let ours = of(&[spec("a", &["a", "--threads", "4"]), spec("b", &["b"])]);
         let same = [spec("a", &["a"])];
         assert_eq!(differs(&ours, &of(&same)), None);

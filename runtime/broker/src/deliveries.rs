@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_result_that_is_too_large_is_cut_where_most_is_said() {
+    fn oversized_result_is_cut_at_largest_checker() {
         let mut results = Results::default();
         results.bundles.push(CheckerBundle {
             checkers: vec![checker("modest", 2), checker("flood", 1000)],

@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn as_many_peers_are_let_in_as_there_are_descriptors_for() {
+    fn peer_limit_follows_available_descriptors() {
         let allowed = |allowed| Descriptors {
             allowed,
             before: None,
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn what_may_be_had_is_taken() {
+    fn descriptor_limit_is_raised_to_maximum() {
         let taken = Descriptors::take();
         let now = getrlimit(Resource::Nofile);
         assert!(now.current.is_none_or(|it| it >= taken.allowed));

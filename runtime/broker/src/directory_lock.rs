@@ -397,7 +397,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_has_it_and_says_who() {
+    fn held_directory_is_refused_with_name_of_holder() {
         for purpose in [Purpose::State, Purpose::Results, Purpose::Gate] {
             let dir = tempfile::tempdir().unwrap();
             let take = |instance| DirectoryLock::take(dir.path(), purpose, instance);
@@ -413,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn replaced_directory_is_taken_unless_another_broker_has_it() {
+    fn replaced_directory_is_taken_unless_held_by_another() {
         for purpose in [Purpose::State, Purpose::Results, Purpose::Gate] {
             let dir = tempfile::tempdir().unwrap();
             let (place, aside) = (dir.path().join("place"), dir.path().join("aside"));
@@ -436,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_share_results_and_a_broker_does_not() {
+    fn runs_share_results_directory_but_broker_does_not() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("out");
         let broker = || DirectoryLock::take(&out, Purpose::Results, "farm");
@@ -457,7 +457,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_gets_a_directory_below_or_above_one_of_another_broker() {
+    fn directory_nested_in_held_directory_is_refused() {
         let dir = tempfile::tempdir().unwrap();
         let below = dir.path().join("maps/new");
         for held in [Purpose::Results, Purpose::Gate] {

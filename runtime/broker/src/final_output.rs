@@ -172,7 +172,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tail_keeps_the_last_lines_and_the_begin_of_each() {
+    fn tail_keeps_last_lines_and_start_of_each() {
         let mut tail = Tail::default();
         tail.add(b"fir");
         tail.add(b"st\n\nsec");
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn words_of_a_child_are_there_when_it_has_ended() {
+    async fn final_output_of_child_that_never_joined_is_kept() {
         let words = FinalOutput::default();
         let run = async |launch: u64| {
             let mut command = Command::new("sh");

@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_proof_is_of_one_start_and_one_name_and_outlives_its_broker() {
+    fn launch_proof_is_bound_to_start_and_name() {
         let dir = tempfile::tempdir().unwrap();
         let one = Launches::of(dir.path()).unwrap();
         let proof = one.proof(Launch(7), "xodrBundle");

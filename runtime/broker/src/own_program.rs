@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn environment_is_where_the_program_lies_or_its_link() {
+    fn environment_is_directory_of_program_or_its_link() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name, is_virtual, has_python| place(dir.path(), name, is_virtual, has_python);
         let [system, venv, bare] = [
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn environment_stands_first_unless_it_may_be_the_systems() {
+    fn environment_comes_first_unless_it_may_be_system() {
         let environment = |is_virtual| Environment {
             programs: "/e/bin".into(),
             is_virtual,
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn other_file_at_the_path_is_said() {
+    fn replaced_program_file_is_reported() {
         let dir = tempfile::tempdir().unwrap();
         let mut program = OwnProgram::look();
         assert_eq!(program.replaced(), None);

@@ -167,7 +167,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn scouts_come_back_with_what_they_have_seen() {
+    fn probes_return_their_results() {
         let probes = Probes::default();
         for number in 0..100 {
             assert_eq!(probes.within(move || number * 2).unwrap(), number * 2);
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scout_that_does_not_come_back_is_given_up() {
+    fn hanging_probe_is_given_up() {
         let dir = tempfile::tempdir().unwrap();
         let pipe = dir.path().join("pipe");
         assert!(
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn work_that_takes_long_without_waiting_for_a_file_is_not_given_up() {
+    fn slow_probe_without_file_access_is_not_given_up() {
         let probes = Probes::new(Arc::default(), Duration::from_millis(1));
         let slow = probes.within(|| std::thread::sleep(Duration::from_millis(20)));
         assert!(slow.is_ok());

@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_watched_has_nobodys_place() {
+    fn unwatched_file_has_separate_result_path() {
         let places = ResultPaths::of_watched("/out".into(), paths(&["/farm"]));
         let (inside, outside) = (Path::new("/farm/a.xodr"), Path::new("/old/a.xodr"));
         assert!(places.contains(inside) && !places.contains(outside));
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn only_results_below_the_own_directory_are_owned() {
+    fn only_results_below_own_directory_are_owned() {
         let places = ResultPaths::of_watched("/live/out".into(), paths(&["/farm"]));
         for (path, owned) in [
             ("/live/out/a.xodr.xqar", true),
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn results_of_a_run_mirror_the_paths_from_where_it_is_run() {
+    fn run_results_mirror_paths_below_working_directory() {
         let files = paths(&["/x/a/m.xodr", "/x/b/m.xodr", "/y/m.xodr"]);
         let run = |here: &str, files: &[PathBuf]| {
             ResultPaths::of_run("/out".into(), here.into(), paths(&["/x/c"]), files)
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn the_verdict_file_lies_beside() {
+    fn verdict_file_lies_beside_result() {
         let beside = |xqar| verdict_beside(Path::new(xqar));
         let expected = Some(PathBuf::from("/out/a.xodr.verdict.json"));
         assert_eq!(beside("/out/a.xodr.xqar"), expected);
@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn two_directories_keep_their_files_apart() {
+    fn results_of_two_watched_directories_are_separate() {
         let places = ResultPaths::of_watched("/out".into(), paths(&["/x/a", "/x/b"]));
         assert_eq!(
             places.xqar(Path::new("/x/a/m.xodr")),
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn a_directory_inside_another_does_not_move_results() {
+    fn nested_watched_directory_does_not_move_results() {
         let places = ResultPaths::of_watched("/out".into(), paths(&["/x", "/x/b"]));
         assert_eq!(
             places.xqar(Path::new("/x/b/m.xodr")),

@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_a_former_broker_of_this_instance_started_and_did_not_join_is_killed() {
+    fn only_stale_children_of_this_instance_are_killed() {
         let base = tempfile::tempdir().unwrap();
         let [here, elsewhere] = ["here", "elsewhere"].map(|name| {
             let path = base.path().join(name);

@@ -183,7 +183,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_file_has_the_same_stamp_however_it_is_looked_at() {
+    fn stamp_is_same_for_every_way_of_reading() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.xodr");
         let half = Duration::from_nanos(500_000_001);
@@ -206,7 +206,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn size_and_time_put_back_do_not_give_the_stamp_back() {
+    fn restored_size_and_time_do_not_restore_stamp() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.xodr");
         let time = SystemTime::now() - HOUR;
@@ -223,7 +223,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_young_file_is_racy_however_old_it_says_that_it_is() {
+    fn recently_changed_file_is_racy_despite_old_mtime() {
         let dir = tempfile::tempdir().unwrap();
         let stamp = put(&dir.path().join("a.xodr"), b"", UNIX_EPOCH - HOUR);
         let now = stamp.ctime_ns;
@@ -247,7 +247,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_time_of_modification_that_is_to_come_makes_no_file_young() {
+    fn future_modification_time_does_not_make_file_young() {
         let now = nanoseconds(HOUR);
         let second = nanoseconds(Duration::from_secs(1));
         let modified = |seconds: i128| {
@@ -264,7 +264,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn behind_a_link_lies_the_file_or_none() {
+    fn link_gives_stamp_of_its_target_or_none() {
         use std::os::unix::fs::symlink;
         let dir = tempfile::tempdir().unwrap();
         let (file, link) = (dir.path().join("a.xodr"), dir.path().join("link.xodr"));

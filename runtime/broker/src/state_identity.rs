@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn unchanged_state_says_nothing() {
+    fn unchanged_state_gives_no_notice() {
         let dir = tempfile::tempdir().unwrap();
         assert_eq!(said(dir.path(), "/out"), None, "it is new");
         assert_eq!(said(dir.path(), "/out"), None);
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn state_on_a_file_system_that_was_mounted_again_says_nothing() {
+    fn state_on_remounted_file_system_gives_no_notice() {
         let dir = tempfile::tempdir().unwrap();
         said(dir.path(), "/out");
         let file = dir.path().join(FILE);
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn state_from_a_backup_says_that_it_was_replaced() {
+    fn state_restored_from_backup_is_reported() {
         let dir = tempfile::tempdir().unwrap();
         let state = dir.path().join("state");
         std::fs::create_dir(&state).unwrap();
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn another_directory_of_results_is_said() {
+    fn changed_results_directory_is_reported() {
         let dir = tempfile::tempdir().unwrap();
         said(dir.path(), "/one");
         let told = said(dir.path(), "/two").unwrap();

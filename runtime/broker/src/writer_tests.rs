@@ -97,7 +97,7 @@ fn only_what_was_judged_in_the_present_epoch_is_written() {
 }
 
 #[test]
-fn what_has_changed_since_it_was_read_is_not_written() {
+fn result_of_a_changed_file_is_not_written() {
     let dir = tempfile::tempdir().unwrap();
     let store = store_in(dir.path());
     let mut job = finished(dir.path(), NOW);
@@ -109,7 +109,7 @@ fn what_has_changed_since_it_was_read_is_not_written() {
 
 /// Another connection locks the journal, so that no entry can be recorded.
 #[test]
-fn what_must_not_lie_behind_the_gate_waits_for_no_journal() {
+fn withdrawal_from_the_gate_needs_no_journal() {
     let dir = tempfile::tempdir().unwrap();
     let mut store = store_in(dir.path());
     let gate = GateOptions {

@@ -412,7 +412,7 @@ mod tests {
     }
 
     #[test]
-    fn the_kernel_says_who_has_connected() {
+    fn kernel_identifies_the_connected_process() {
         let dir = tempfile::TempDir::new().unwrap();
         let (instance, mut admission) = admission(&far(dir.path()));
         let _one = introduce(&instance, key(1, 1)).unwrap();
@@ -434,7 +434,7 @@ mod tests {
     }
 
     #[test]
-    fn another_process_is_another_and_is_seen_to_go() {
+    fn other_process_is_distinguished_and_its_end_noticed() {
         let dir = tempfile::TempDir::new().unwrap();
         let (instance, mut admission) = admission(dir.path());
         let _own = introduce(&instance, key(1, 1)).unwrap();
@@ -473,7 +473,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_statement_is_not_kept() {
+    fn malformed_statement_is_not_kept() {
         let dir = tempfile::TempDir::new().unwrap();
         let (instance, mut admission) = admission(dir.path());
         let path = dir.path().join(SOCKET);
@@ -509,7 +509,7 @@ mod tests {
     }
 
     #[test]
-    fn a_socket_that_was_removed_comes_back() {
+    fn removed_socket_is_created_again() {
         let dir = tempfile::TempDir::new().unwrap();
         let (instance, mut admission) = admission(dir.path());
         std::fs::remove_file(dir.path().join(SOCKET)).unwrap();
@@ -523,7 +523,7 @@ mod tests {
     }
 
     #[test]
-    fn statements_are_what_they_were() {
+    fn statements_survive_a_round_trip() {
         for launch in ["", "1:abc:name", &"x".repeat(MAX_LAUNCH)] {
             let said = statement(key(1, 2), launch);
             assert_eq!(parse(&said), Some((key(1, 2), launch.to_owned())));

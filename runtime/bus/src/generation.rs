@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_has_locked_is_a_stray_when_it_is_old() {
+    fn unlocked_root_is_stray_once_it_is_old() {
         let root = root();
         assert!(!is_stray(&root), "its broker may be about to lock it");
         age(&root, UNLOCKED_FOR);
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn broker_that_has_not_locked_its_memory_yet_is_no_stray() {
+    fn memory_of_a_starting_broker_is_not_stray() {
         let root = root();
         let mut seen = None;
         let life = lock_life(&root, || seen = Some(is_stray(&root))).unwrap();
@@ -343,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_broker_has_locked_is_none_however_old() {
+    fn locked_root_is_not_stray_at_any_age() {
         let root = root();
         let life = File::create(root.join(LIFE)).unwrap();
         flock(&life, FlockOperation::NonBlockingLockExclusive).unwrap();
@@ -355,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_removed_is_known_to_the_next_broker() {
+    fn unremovable_root_is_known_to_the_next_broker() {
         let dir = tempfile::TempDir::new().unwrap();
         let instance = Instance::at(dir.path().to_owned());
         let prefix = identity(&instance).unwrap();

@@ -228,7 +228,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_that_leave_the_directory_are_refused() {
+    fn invalid_instance_names_are_refused() {
         for name in [
             "",
             ".",
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lock_is_free_again_after_a_crash_and_after_a_stop() {
+    fn lock_is_free_again_after_crash_or_stop() {
         let dir = tempfile::TempDir::new().unwrap();
         let instance = Instance::at(dir.path().to_owned());
         let lock = InstanceLock::take(&instance).unwrap();

@@ -299,7 +299,7 @@ mod tests {
     use crate::options::StartError;
 
     #[test]
-    fn interrupted_step_is_repeated_and_nothing_is_left_out() {
+    fn interrupted_step_is_repeated_without_gaps() {
         let (mut calls, mut had) = (0, 0);
         let done = in_steps(0..HAVE_STEP * 2 + 1, |from, bytes| {
             calls += 1;
@@ -314,13 +314,13 @@ mod tests {
     }
 
     #[test]
-    fn step_without_room_is_told() {
+    fn step_without_space_is_reported() {
         let done = in_steps(0..1, |_, _| Err(Errno::NOSPC));
         assert_eq!(done, Err(Errno::NOSPC));
     }
 
     #[test]
-    fn room_in_a_directory_that_was_removed_is_not_called_a_lack_of_room() {
+    fn removed_directory_is_not_reported_as_lack_of_space() {
         let dir = tempfile::TempDir::new_in(SHARED_MEMORY).unwrap();
         let error = keep_room(&dir.path().join("gone"), 1).unwrap_err();
         let said = StartError::no_room(error, u64::MAX).to_string();

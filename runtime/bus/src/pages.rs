@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn every_page_is_there_whoever_asks_for_it() {
+    fn every_page_is_populated_by_any_number_of_threads() {
         const LEN: usize = 64 << 20;
         for parts in [1, 2, 3, 7] {
             let mut room: Vec<u8> = Vec::with_capacity(LEN);
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn few_pages_and_none_are_no_trouble() {
+    fn few_or_no_pages_are_populated() {
         let mut small = [0u8; 16];
         assert_eq!(back_with_memory(&mut small), Ok(()));
         assert_eq!(populate_by(4, &mut small), Ok(()));

@@ -357,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn services_are_made_as_the_table_says() {
+    fn services_match_the_table() {
         let dir = tempfile::TempDir::new().unwrap();
         let instance = crate::Instance::at(dir.path().to_owned());
         let limits = Limits::default();
@@ -378,7 +378,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_else_makes_services_or_ports() {
+    fn only_this_module_creates_services_and_ports() {
         let makers = [
             "service_builder(",
             ".publish_subscribe::<",
@@ -404,7 +404,7 @@ mod tests {
     }
 
     #[test]
-    fn the_version_is_the_one_that_is_linked() {
+    fn version_constant_matches_the_linked_version() {
         let lock = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../Cargo.lock");
         let text = fs::read_to_string(lock).unwrap();
         let linked = format!("name = \"iceoryx2\"\nversion = \"{ICEORYX2_VERSION}\"");

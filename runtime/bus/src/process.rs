@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_process_is_told_from_another_with_its_id() {
+    fn process_is_distinguished_from_another_with_its_id() {
         let own = std::process::id();
         assert!(Process::open(own, start_time(own)).is_some());
         assert!(Process::open(own, Some(1)).is_none());
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn a_process_is_killed_with_its_group_and_nobody_else_is() {
+    fn process_is_killed_only_with_its_own_group() {
         use std::os::unix::process::CommandExt as _;
         let start = |group: bool| {
             let mut command = std::process::Command::new("sleep");
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_death_is_seen_before_anybody_has_waited_for_it() {
+    fn death_is_noticed_before_the_process_is_reaped() {
         let mut child = std::process::Command::new("cat")
             .stdin(std::process::Stdio::piped())
             .spawn()

@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn many_small_or_few_large_events_are_enough() {
+    fn many_small_or_few_large_events_fill_the_queue() {
         let mut waiting = Waiting::default();
         for _ in 0..MAX_WAITING {
             assert!(!waiting.is_full());
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_ends_by_frames_by_bytes_and_by_time() {
+    fn receive_budget_ends_by_frames_bytes_and_time() {
         let now = Instant::now() + Duration::from_secs(3600);
         let mut budget = Budget::new(now);
         budget.spend(1, TURN_BYTES / 2);

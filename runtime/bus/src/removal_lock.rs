@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_enters_what_is_removed() {
+    fn removed_directory_cannot_be_entered() {
         let (_dir, root) = root();
         let early = RemovalLock::of(&root).unwrap();
         drop(early.enter().unwrap());
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_opened_is_not_said_to_be_shut() {
+    fn unopenable_lock_is_not_reported_as_locked() {
         let (_dir, root) = root();
         fs::remove_file(root.join(REMOVAL_LOCK)).unwrap();
         std::os::unix::fs::symlink("elsewhere", root.join(REMOVAL_LOCK)).unwrap();
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_removed_waits_for_whoever_is_inside() {
+    fn removal_waits_for_a_process_inside() {
         let (_dir, root) = root();
         let inside = RemovalLock::of(&root).unwrap().enter().unwrap();
         let remover = {
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn who_was_stopped_inside_removes_what_it_made_too_late() {
+    fn process_stopped_inside_removes_its_late_files() {
         let (_dir, root) = root();
         let inside = RemovalLock::of(&root).unwrap().enter().unwrap();
         lock_and_remove(&root).unwrap();
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn it_goes_under_the_hands_of_many() {
+    fn removal_succeeds_with_concurrent_users() {
         for _ in 0..20 {
             let (_dir, root) = root();
             let over = AtomicBool::new(false);

@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn the_window_stops_the_sender_until_it_is_acknowledged() {
+    fn full_window_stops_the_sender_until_acknowledged() {
         let now = Instant::now();
         let mut out = Outgoing::new(now);
         out.push(&vec![0; FRAME_BYTES * (FRAME_WINDOW + 10)]);
@@ -383,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn an_acknowledgement_of_what_was_never_sent_is_ignored() {
+    fn acknowledgement_of_an_unsent_frame_is_ignored() {
         let now = Instant::now();
         let mut out = Outgoing::new(now);
         out.push(&[1]);
@@ -394,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hostile_length_reserves_nothing_and_ends_the_stream() {
+    fn hostile_length_reserves_nothing_and_ends_the_stream() {
         let mut incoming = Incoming::new(MAX_MESSAGE);
         let huge = u32::try_from(MAX_MESSAGE).unwrap();
         incoming.accept(1, &huge.to_le_bytes(), |_| {}).unwrap();
@@ -411,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn a_peer_may_announce_less_than_a_broker_may() {
+    fn peer_may_announce_less_than_a_broker() {
         let largest = u32::try_from(MAX_FROM_PEER).unwrap();
         let mut incoming = Incoming::new(MAX_FROM_PEER);
         assert_eq!(incoming.accept(1, &largest.to_le_bytes(), |_| {}), Ok(()));

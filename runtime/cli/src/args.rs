@@ -661,13 +661,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_command_line_is_sound() {
+    fn command_line_definition_is_consistent() {
         use clap::CommandFactory;
         Args::command().debug_assert();
     }
 
     #[test]
-    fn times_are_read_as_people_write_them() {
+    fn durations_with_common_units_are_parsed() {
         assert_eq!(duration("250ms"), Ok(Duration::from_millis(250)));
         assert_eq!(rest("30s"), Ok(Duration::from_secs(30)));
         for text in ["0s", "9ms", "61m", "soon"] {

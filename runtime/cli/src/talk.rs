@@ -173,7 +173,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_log_line_keeps_its_colours_and_nothing_else_that_steers() {
+    fn log_line_keeps_colours_but_no_other_control_codes() {
         for (text, line) in [
             ("plain", "plain"),
             ("\u{1b}[2mdim\u{1b}[0m", "\u{1b}[2mdim\u{1b}[0m"),

@@ -2,7 +2,7 @@
 
 #![expect(
     clippy::unwrap_used,
-    reason = "a test that cannot set up its desk has failed"
+    reason = "a test that cannot set up its directory has failed"
 )]
 
 use std::path::Path;
@@ -134,7 +134,7 @@ fn names_own_schema(cli: &Path, result: &str) -> bool {
 }
 
 #[test]
-fn the_flag_reaches_the_bundles_and_the_result_names_the_schema() {
+fn schema_flag_reaches_the_bundles_and_the_result() {
     let cli = cli();
     let output = qcbus(
         cli.path(),
@@ -146,7 +146,7 @@ fn the_flag_reaches_the_bundles_and_the_result_names_the_schema() {
 }
 
 #[test]
-fn a_broken_schema_ends_every_command_before_it_begins() {
+fn broken_schema_stops_every_command_at_the_start() {
     let cli = cli();
     for arguments in [
         &["check", "--schema-dir", "broken", "map.xodr"][..],
@@ -180,7 +180,7 @@ fn a_broken_schema_ends_every_command_before_it_begins() {
 }
 
 #[test]
-fn a_configuration_names_schemas_checker_before_bundle_before_global() {
+fn checker_schema_precedes_bundle_and_global_schema() {
     let cli = cli();
     let own = cli.path().join("own").display().to_string();
     for (global, bundle, checker) in [
@@ -197,7 +197,7 @@ fn a_configuration_names_schemas_checker_before_bundle_before_global() {
 }
 
 #[test]
-fn a_broken_schema_of_a_configuration_is_the_checkers_error_unless_the_flag_says_another() {
+fn broken_configured_schema_is_an_error_of_the_checker() {
     let cli = cli();
     configuration(cli.path(), "", "broken", "");
     let output = qcbus(cli.path(), &["check", "-q", "-c", "config.xml", "map.xodr"]);
@@ -225,7 +225,7 @@ fn a_broken_schema_of_a_configuration_is_the_checkers_error_unless_the_flag_says
 }
 
 #[test]
-fn other_schemas_make_a_running_broker_judge_again() {
+fn other_schemas_make_the_next_broker_judge_again() {
     let cli = cli();
     let check = |schemas: &[&str]| {
         // The brokers run one after the other on the same state.
@@ -243,7 +243,7 @@ fn other_schemas_make_a_running_broker_judge_again() {
 }
 
 #[test]
-fn a_running_broker_uses_what_a_schema_of_its_configuration_has_become() {
+fn running_broker_uses_a_changed_configured_schema() {
     let cli = cli();
     let write = |name: &str, text: &str| std::fs::write(cli.path().join(name), text).unwrap();
     let own = cli.path().join("own").display().to_string();
@@ -275,7 +275,7 @@ fn a_running_broker_uses_what_a_schema_of_its_configuration_has_become() {
 }
 
 #[test]
-fn tables_are_for_the_version_in_the_name_of_their_directory() {
+fn schema_tables_take_the_version_from_the_directory_name() {
     let cli = cli();
     let dir = cli.path().join("acme-1.7");
     std::fs::create_dir(&dir).unwrap();

@@ -336,7 +336,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn there_is_a_filter_for_whatever_is_declared() {
+    fn filter_exists_for_every_declaration() {
         for (network, programs) in [(false, false), (true, false), (false, true), (true, true)] {
             let may = May {
                 network,

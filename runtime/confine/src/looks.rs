@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn filters_count_beyond_those_given_where_no_rights_can_be_gained() {
+    fn only_filters_beyond_the_given_ones_count() {
         let status = |filters, privileges| {
             format!(
                 "Name:\tx\nNoNewPrivs:\t{privileges}\nSeccomp:\t2\nSeccomp_filters:\t{filters}\n"
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_not_there_cannot_be_looked_at() {
+    fn sandbox_of_a_missing_process_is_unknown() {
         assert_ne!(looks(std::process::id(), 0), Looks::Unknown);
         assert_eq!(looks(u32::MAX, 0), Looks::Unknown);
     }

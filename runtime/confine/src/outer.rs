@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn who_only_has_this_ring_does_not_look_confined() {
+    fn outer_sandbox_alone_does_not_look_confined() {
         let mut command = Command::new("sleep");
         command.arg("60");
         Outer::new(&May::default()).unwrap().surround(&mut command);
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_program_changes_nothing_of_others_before_it_has_joined() {
+    fn program_cannot_change_other_files_before_joining() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let may = May::default();
         assert!(inside(&may, "cat \"$0\"", file.path()));

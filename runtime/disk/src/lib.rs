@@ -401,7 +401,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn links_are_followed_and_devices_stay_devices() {
+    fn writing_follows_links_and_keeps_devices() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
         std::fs::write(at("file"), "old").unwrap();
@@ -425,7 +425,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_the_dead_left_is_swept() {
+    fn only_files_of_dead_processes_are_removed() {
         let dir = tempfile::tempdir().unwrap();
         let below = dir.path().join("maps");
         std::fs::create_dir(&below).unwrap();
@@ -452,7 +452,7 @@ mod tests {
     }
 
     #[test]
-    fn who_writes_first_into_a_directory_removes_what_the_dead_left_there() {
+    fn first_write_removes_files_of_dead_processes() {
         let dir = tempfile::tempdir().unwrap();
         let dead = dir.path().join(".qcbus-4194999.1-a1b2c3.tmp");
         std::fs::write(&dead, "half").unwrap();
@@ -467,7 +467,7 @@ mod tests {
     }
 
     #[test]
-    fn empty_directories_go_and_the_top_stays() {
+    fn empty_directories_are_removed_up_to_the_top() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
         std::fs::create_dir_all(at("top/a/b")).unwrap();
@@ -503,7 +503,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_there_is_removed_already() {
+    fn removing_an_impossible_file_succeeds() {
         let dir = tempfile::TempDir::new().unwrap();
         let file = dir.path().join("file");
         std::fs::write(&file, "").unwrap();
@@ -516,7 +516,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_files_both_are_written_or_none() {
+    fn two_files_are_written_together_or_not_at_all() {
         let dir = tempfile::TempDir::new().unwrap();
         let path = |name: &str| dir.path().join(name);
         let (first, second) = (path("a.verdict.json"), path("deep/a.xqar"));

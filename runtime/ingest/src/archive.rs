@@ -380,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn the_main_member_is_found() {
+    fn main_member_is_found() {
         let packed = zip(&[("lib.xosc", b"<a/>"), ("main.xosc", b"<OpenSCENARIO/>")]);
         let (bytes, codes, _) = read(&packed, Limits::default());
         assert_eq!((&bytes[..], &codes[..]), (&b"<OpenSCENARIO/>"[..], &[][..]));
@@ -390,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_lead_out_are_refused() {
+    fn member_names_that_leave_the_archive_are_refused() {
         let names = [
             "../evil.xosc",
             "/etc/passwd",
@@ -410,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn caps_name_themselves() {
+    fn exceeded_limits_are_named() {
         let big = vec![b' '; 4 << 20];
         let packed = zip(&[("main.xosc", &big), ("b", b""), ("c", b"")]);
         let limits = Limits::default();
@@ -449,7 +449,7 @@ mod tests {
     }
 
     #[test]
-    fn members_of_one_name_are_named() {
+    fn duplicate_members_are_named() {
         let mut packed = zip(&[("main.xosc", b"<a/>"), ("a.xosc", b"1"), ("b.xosc", b"2")]);
         // The zip writer refuses duplicate names, so the test renames the member in the bytes.
         for at in 0..packed.len() - 6 {
@@ -466,7 +466,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_a_fault() {
+    fn damaged_archive_is_a_fault() {
         let packed = zip(&[("main.xosc", b"<a/>")]);
         let (_, codes, _) = read(&packed[..packed.len() - 10], Limits::default());
         assert_eq!(codes, [Code::ArchiveTruncated]);

@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_bound_covers_what_is_there() {
+    fn quick_bound_covers_the_actual_content() {
         let text = "<?xml version='1.0'?><a b='1' c='2'>x<d/> y &amp;\n<!-- --><![CDATA[z]]></a>";
         let marks = Marks::of(text.as_bytes());
         assert_eq!(

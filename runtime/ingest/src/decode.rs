@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn one_byte_encodings_follow_the_declaration() {
+    fn single_byte_encodings_follow_the_declaration() {
         let table: &[(&str, &[u8], &str)] = &[
             ("UTF-8", "Straße €".as_bytes(), "Straße €"),
             ("ISO-8859-1", b"Stra\xDFe \x80", "Straße \u{80}"),
@@ -351,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn utf16_with_and_without_a_mark() {
+    fn utf16_is_decoded_with_and_without_a_mark() {
         let text = "<?xml version=\"1.0\" encoding=\"UTF-16\"?><a name=\"ß😀\"/>";
         let little: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
         let big: Vec<u8> = text.encode_utf16().flat_map(u16::to_be_bytes).collect();
@@ -370,7 +370,7 @@ mod tests {
     }
 
     #[test]
-    fn a_utf8_byte_order_mark_stays() {
+    fn utf8_byte_order_mark_is_kept() {
         assert_eq!(
             read(b"\xEF\xBB\xBF<a/>"),
             ("\u{FEFF}<a/>".to_string(), vec![])
@@ -379,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_declarations_are_found_where_they_stand() {
+    fn wrong_declarations_are_found_at_their_place() {
         let marked = [b"\xEF\xBB\xBF", &with_declaration("ISO-8859-1", b"x")[..]].concat();
         let cases: &[(&[u8], Code, &str, usize)] = &[
             (

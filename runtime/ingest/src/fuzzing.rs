@@ -45,12 +45,12 @@ pub fn ingest(bytes: &[u8]) {
 }
 
 /// Documents of an archive in memory. No other files are read.
-struct Shelf {
+struct Files {
     reader: Reader,
     images: Vec<Vec<u8>>,
 }
 
-impl Source for Shelf {
+impl Source for Files {
     type Document = Vec<u8>;
     type Halt = Infallible;
 
@@ -113,7 +113,7 @@ pub fn archive(bytes: &[u8]) -> Outcome {
     let root = reader
         .prepare_bytes(Path::new("/fuzz.mosc"), bytes.to_vec())
         .build();
-    let mut shelf = Shelf {
+    let mut store = Files {
         reader,
         images: Vec::new(),
     };
@@ -127,8 +127,8 @@ pub fn archive(bytes: &[u8]) -> Outcome {
         max_image: limits.max_image,
         search: &search,
     };
-    let Ok(found) = gather(&root, &walking, &mut shelf);
-    let images = shelf.images.iter().map(|image| Document::open(image));
+    let Ok(found) = gather(&root, &walking, &mut store);
+    let images = store.images.iter().map(|image| Document::open(image));
     let documents = std::iter::once(root).chain(images.filter_map(Result::ok));
     let pieces: Vec<Piece<'_>> = documents
         .zip(found.links)

@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_removed_while_being_read_is_noticed() {
+    fn file_removed_while_being_read_is_noticed() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.xodr");
         fs::write(&path, "<OpenDRIVE/>").unwrap();
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_changed_or_replaced_while_being_read_is_noticed() {
+    fn file_changed_or_replaced_while_being_read_is_noticed() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.xodr");
         fs::write(&path, "<OpenDRIVE/>").unwrap();
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn directories_devices_and_large_files_are_named_as_such() {
+    fn directories_devices_and_large_files_are_named() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("x.xodr");
         fs::create_dir(&path).unwrap();
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn the_digest_is_the_one_sha256sum_prints() {
+    fn digest_matches_sha256sum() {
         let hex: String = sha256(b"abc")
             .iter()
             .map(|byte| format!("{byte:02x}"))

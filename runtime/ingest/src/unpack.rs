@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn all_members_are_inflated() {
+    fn all_gzip_members_are_inflated() {
         let packed = [gzip(b"<OpenDRIVE>"), gzip(b"</OpenDRIVE>")].concat();
         let inflated = gunzip(&packed, &Limits::default());
         assert_eq!(inflated.bytes, b"<OpenDRIVE></OpenDRIVE>");
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn a_truncated_stream_keeps_what_came_before() {
+    fn truncated_stream_keeps_its_readable_part() {
         let text: String = (0..20_000).map(|i| format!("<road id='{i}'/>")).collect();
         let packed = gzip(text.as_bytes());
         let inflated = gunzip(&packed[..packed.len() / 2], &Limits::default());
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bomb_is_stopped_by_its_ratio_and_by_its_size() {
+    fn gzip_bomb_is_stopped_by_ratio_and_size() {
         let packed = gzip(&vec![b' '; 4 << 20]);
         let inflated = gunzip(&packed, &Limits::default());
         assert!(inflated.bytes.is_empty());

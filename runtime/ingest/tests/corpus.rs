@@ -85,7 +85,7 @@ fn real_files_are_well_formed_and_complete() {
 }
 
 #[test]
-fn cases_of_the_asam_bundles_have_faults_only_where_malformed() {
+fn only_malformed_asam_cases_have_faults() {
     for path in cases("asam") {
         let image = prepare(&path, path.parent().unwrap(), &Limits::default())
             .unwrap()

@@ -64,7 +64,7 @@ fn prepared(path: &Path, limits: &Limits) -> Result<Prepared, qcbus_ingest::Inge
 }
 
 #[test]
-fn the_digest_is_of_the_bytes_on_disk_whatever_they_are() -> Outcome {
+fn digest_covers_the_bytes_on_disk() -> Outcome {
     let dir = tempfile::tempdir()?;
     let limits = Limits::default();
     for (name, bytes) in files()? {
@@ -85,7 +85,7 @@ fn the_digest_is_of_the_bytes_on_disk_whatever_they_are() -> Outcome {
 }
 
 #[test]
-fn what_is_given_up_has_its_digest_all_the_same() -> Outcome {
+fn abandoned_file_still_has_its_digest() -> Outcome {
     let dir = tempfile::tempdir()?;
     for limits in [
         Limits {

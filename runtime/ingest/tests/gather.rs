@@ -16,14 +16,14 @@ use qcbus_messages::{Absence, DocumentRole, MissingDocument};
 
 /// Files in memory. All other files are missing.
 #[derive(Default)]
-struct Shelf {
+struct Files {
     files: HashMap<PathBuf, &'static str>,
     kept: Vec<(PathBuf, DocumentRole)>,
     images: Vec<Vec<u8>>,
     looked: Vec<PathBuf>,
 }
 
-impl Source for Shelf {
+impl Source for Files {
     type Document = Vec<u8>;
     type Halt = Infallible;
 
@@ -67,11 +67,11 @@ fn gathered(
     text: &str,
     files: &[(&str, &'static str)],
     most: usize,
-) -> (Shelf, Vec<MissingDocument>) {
+) -> (Files, Vec<MissingDocument>) {
     let path = Path::new("/farm/s/x.xosc");
     let image = prepare_bytes(path, text.into(), &Limits::default()).build();
-    let mut shelf = Shelf::default();
-    shelf.files.extend(
+    let mut store = Files::default();
+    store.files.extend(
         files
             .iter()
             .map(|(path, text)| (PathBuf::from(path), *text)),
@@ -82,18 +82,18 @@ fn gathered(
         max_image: 1 << 24,
         search: &SearchPath::default(),
     };
-    let Ok(found) = gather(&Document::open(&image).unwrap(), &walking, &mut shelf);
-    (shelf, found.missing)
+    let Ok(found) = gather(&Document::open(&image).unwrap(), &walking, &mut store);
+    (store, found.missing)
 }
 
 const TWO_MAPS: &str = "<OpenSCENARIO><RoadNetwork><LogicFile filepath='a%20b.xodr'/>\
                         <LogicFile filepath='c.xodr'/></RoadNetwork></OpenSCENARIO>";
 
 #[test]
-fn the_first_spelling_that_is_there_is_meant() {
-    let (shelf, missing) = gathered(TWO_MAPS, &[("/farm/s/a b.xodr", "<OpenDRIVE/>")], 10);
+fn first_existing_spelling_of_a_reference_is_used() {
+    let (store, missing) = gathered(TWO_MAPS, &[("/farm/s/a b.xodr", "<OpenDRIVE/>")], 10);
     assert_eq!(
-        shelf.kept,
+        store.kept,
         [(PathBuf::from("/farm/s/a b.xodr"), DocumentRole::Map)]
     );
     assert_eq!(missing.len(), 1);
@@ -103,19 +103,19 @@ fn the_first_spelling_that_is_there_is_meant() {
     );
     let looked = ["/farm/s/a%20b.xodr", "/farm/s/c.xodr"].map(PathBuf::from);
     assert_eq!(
-        shelf.looked, looked,
+        store.looked, looked,
         "who watches knows where one may appear"
     );
 }
 
 #[test]
-fn documents_beyond_the_limit_are_said() {
+fn documents_above_the_limit_are_reported() {
     let both = [
         ("/farm/s/a b.xodr", "<OpenDRIVE/>"),
         ("/farm/s/c.xodr", "<OpenDRIVE/>"),
     ];
-    let (shelf, missing) = gathered(TWO_MAPS, &both, 2);
-    assert_eq!(shelf.kept.len(), 1);
+    let (store, missing) = gathered(TWO_MAPS, &both, 2);
+    assert_eq!(store.kept.len(), 1);
     assert_eq!(
         (&missing[0].why, missing[0].level),
         (&Absence::TooMany { most: 2 }, Level::Warning)
@@ -123,13 +123,13 @@ fn documents_beyond_the_limit_are_said() {
 }
 
 #[test]
-fn a_map_that_is_broken_is_kept_and_said() {
+fn broken_map_is_kept_and_reported() {
     let broken = [
         ("/farm/s/a b.xodr", "<OpenDRIVE>\n<road></OpenDRIVE>"),
         ("/farm/s/c.xodr", "<OpenDRIVE/>"),
     ];
-    let (shelf, missing) = gathered(TWO_MAPS, &broken, 10);
-    assert_eq!(shelf.kept.len(), 2);
+    let (store, missing) = gathered(TWO_MAPS, &broken, 10);
+    assert_eq!(store.kept.len(), 2);
     let Absence::Broken { path, row, .. } = &missing[0].why else {
         unreachable!("{missing:?}")
     };
@@ -146,7 +146,7 @@ fn catalog(users: &str) -> String {
 }
 
 #[test]
-fn a_catalog_location_that_is_not_there_weighs_what_its_use_weighs() {
+fn level_of_a_missing_catalog_depends_on_its_use() {
     for (users, level) in [
         ("", Level::Information),
         (
@@ -168,7 +168,7 @@ fn a_catalog_location_that_is_not_there_weighs_what_its_use_weighs() {
 }
 
 #[test]
-fn findings_stand_at_the_reference() {
+fn findings_are_located_at_the_reference() {
     let text = "<OpenSCENARIO>\n<RoadNetwork>\n  <LogicFile filepath='gone.xodr'/>\n\
                 </RoadNetwork></OpenSCENARIO>";
     let (_, missing) = gathered(text, &[], 10);
@@ -193,7 +193,7 @@ fn findings_stand_at_the_reference() {
 }
 
 #[test]
-fn a_file_that_is_not_whole_says_so_itself() {
+fn incomplete_file_reports_its_own_faults() {
     let faults = |text: &str| {
         let image = prepare_bytes(Path::new("/a.xodr"), text.into(), &Limits::default()).build();
         faults_of_root(&Document::open(&image).unwrap())

@@ -34,14 +34,14 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn an_empty_file() {
+fn empty_file_is_a_fault() {
     assert_eq!(codes("a.xodr", ""), [FaultCode::Empty]);
     assert_eq!(codes("a.xodrz", ""), [FaultCode::Empty]);
     assert_eq!(codes("a.mosc", ""), [FaultCode::ArchiveMalformed]);
 }
 
 #[test]
-fn a_directory_named_like_a_map() {
+fn directory_with_a_map_name_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("x.xodr");
     fs::create_dir(&path).unwrap();
@@ -59,7 +59,7 @@ fn a_directory_named_like_a_map() {
 
 #[cfg(unix)]
 #[test]
-fn an_unreadable_file() {
+fn unreadable_file_is_an_error() {
     use std::os::unix::fs::PermissionsExt;
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("x.xodr");
@@ -74,7 +74,7 @@ fn an_unreadable_file() {
 }
 
 #[test]
-fn two_hundred_megabytes_of_start_tags_cost_no_tree() {
+fn two_hundred_megabytes_of_start_tags_need_little_memory() {
     let text = b"<a>".repeat((200 << 20) / 3);
     let len = text.len();
     let (codes, bound) = codes_within("a.xodr", text, &Limits::default());
@@ -86,7 +86,7 @@ fn two_hundred_megabytes_of_start_tags_cost_no_tree() {
 }
 
 #[test]
-fn a_hundred_thousand_nested_elements() {
+fn deeply_nested_elements_stop_at_the_limit() {
     let text = ["<a>".repeat(100_000), "</a>".repeat(100_000)].concat();
     let prepared = prepare_bytes(Path::new("a.xodr"), text.into_bytes(), &Limits::default());
     let image = prepared.build();
@@ -123,7 +123,7 @@ fn entity_bombs_and_external_entities_are_never_expanded() {
 }
 
 #[test]
-fn gzip_bombs_and_truncated_gzip() {
+fn gzip_bombs_and_truncated_gzip_are_faults() {
     let bomb = gzip(&vec![b' '; 8 << 20]);
     assert_eq!(codes("a.xodrz", bomb.clone()), [FaultCode::RatioLimit]);
     assert_eq!(codes("a.xodr", bomb.clone()), [FaultCode::RatioLimit]);
@@ -153,7 +153,7 @@ fn gzip_bombs_and_truncated_gzip() {
 }
 
 #[test]
-fn packing_that_contradicts_the_name() {
+fn packing_that_contradicts_the_name_is_noticed() {
     assert_eq!(
         codes("a.xodr.gz", "<OpenDRIVE/>"),
         [FaultCode::GzipMalformed]
@@ -170,7 +170,7 @@ fn packing_that_contradicts_the_name() {
 }
 
 #[test]
-fn bytes_that_are_no_text() {
+fn bytes_that_are_no_text_are_faults() {
     let utf8 = "<?xml version='1.0' encoding='UTF-8'?><a b='\u{0}'/>";
     assert_eq!(codes("a.xodr", utf8), [FaultCode::BadCharacter]);
     let latin1 = b"<?xml version='1.0' encoding='UTF-8'?><a b='\xE4'/>";
@@ -191,7 +191,7 @@ fn bytes_that_are_no_text() {
 }
 
 #[test]
-fn many_attributes_and_many_faults_stay_linear() {
+fn many_attributes_and_faults_take_linear_time() {
     let many: String = (0..60_000).map(|i| format!(" a{i}='{i}'")).collect();
     assert_eq!(codes("a.xodr", format!("<a{many}/>")), []);
     let twice = format!("<a{many} a59999=''/>");
@@ -213,7 +213,7 @@ fn many_attributes_and_many_faults_stay_linear() {
 }
 
 #[test]
-fn values_that_outgrow_the_quick_bound_are_built_in_a_second_attempt() {
+fn values_above_the_quick_bound_need_a_second_attempt() {
     let long = "x\n".repeat(2_000_000);
     let text = format!("<a b='{long}'/>");
     let prepared = prepare_bytes(Path::new("a.xodr"), text.into_bytes(), &Limits::default());
@@ -233,7 +233,7 @@ fn values_that_outgrow_the_quick_bound_are_built_in_a_second_attempt() {
 }
 
 #[test]
-fn an_image_above_its_limit_is_a_fault_that_names_the_limit() {
+fn image_above_its_limit_is_a_named_fault() {
     let limits = Limits {
         max_image: 100_000,
         ..Limits::default()

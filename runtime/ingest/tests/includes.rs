@@ -64,7 +64,7 @@ const ROOT: &str = "<OpenDRIVE>\n  <road id='1'>\n    <planView>\n      <geometr
                     </road>\n</OpenDRIVE>";
 
 #[test]
-fn children_of_the_included_root_stand_behind_the_include() {
+fn children_of_an_included_root_follow_the_include() {
     let built = built(&[
         ("maps/root.xodr", ROOT),
         (
@@ -127,7 +127,7 @@ fn children_of_the_included_root_stand_behind_the_include() {
 }
 
 #[test]
-fn a_missing_file_is_a_fault_and_is_watched() {
+fn missing_include_is_a_fault_and_is_watched() {
     let built = built(&[("maps/root.xodr", ROOT)]);
     assert_eq!(
         built.faults(),
@@ -139,7 +139,7 @@ fn a_missing_file_is_a_fault_and_is_watched() {
 }
 
 #[test]
-fn a_cycle_ends_where_it_closes() {
+fn include_cycle_ends_where_it_closes() {
     let built = built(&[
         (
             "maps/root.xodr",
@@ -170,7 +170,7 @@ fn a_cycle_ends_where_it_closes() {
 }
 
 #[test]
-fn nothing_outside_of_the_boundary_is_read() {
+fn files_outside_the_boundary_are_not_read() {
     let files = |written: &str| format!("<OpenDRIVE><include file='{written}'/></OpenDRIVE>");
     for written in ["../secret.xml", "/etc/hostname", "sub/../../secret.xml"] {
         let built = built(&[
@@ -212,7 +212,7 @@ fn include_is_missing_where_the_system_cannot_follow_it() {
 
 #[cfg(unix)]
 #[test]
-fn a_symbolic_link_does_not_lead_out() {
+fn symbolic_link_does_not_leave_the_boundary() {
     let dir = tempfile::tempdir().unwrap();
     let boundary = dir.path().join("maps");
     fs::create_dir(&boundary).unwrap();
@@ -236,7 +236,7 @@ fn a_symbolic_link_does_not_lead_out() {
 }
 
 #[test]
-fn other_ways_to_fail() {
+fn malformed_includes_are_faults() {
     let root = |inner: &str| format!("<OpenDRIVE>\n<road>{inner}</road></OpenDRIVE>");
     let case = |inner: &str, included: &str| {
         built(&[("maps/root.xodr", &root(inner)), ("maps/i.xml", included)])

@@ -64,7 +64,7 @@ fn stopped(files: &[(&str, String)]) -> String {
 }
 
 #[test]
-fn a_group_takes_the_place_of_the_reference_as_it_is_written() {
+fn group_replaces_its_reference_as_written() {
     let uses = named("G", &key("World.x", "7&quot;&lt;"));
     let text = expanded(&[
         ("main.xosc", main_with(&referring("lib.xosc", &uses))),
@@ -78,13 +78,13 @@ fn a_group_takes_the_place_of_the_reference_as_it_is_written() {
 }
 
 #[test]
-fn without_references_nothing_changes() {
+fn scenario_without_references_is_unchanged() {
     let plain = main_with("<!-- c --><ManeuverGroup name='a>b' x='&#10;'/>");
     assert_eq!(expanded(&[("main.xosc", plain.clone())]), plain);
 }
 
 #[test]
-fn the_direct_form_takes_all_groups() {
+fn direct_form_takes_all_groups() {
     let lib = format!("{}{}", group("G", SPEED), group("H", SPEED));
     let text = expanded(&[
         (
@@ -101,7 +101,7 @@ fn the_direct_form_takes_all_groups() {
 }
 
 #[test]
-fn the_most_specific_key_wins() {
+fn most_specific_key_wins() {
     for order in [[0, 1, 2], [2, 1, 0], [1, 2, 0]] {
         let keys = [
             key("x", "1"),
@@ -121,7 +121,7 @@ fn the_most_specific_key_wins() {
 }
 
 #[test]
-fn archives_within_archives_have_names_of_their_own() {
+fn nested_archives_have_separate_names() {
     let inner = fuzzing_pack(&[
         (
             "main.xosc",
@@ -168,7 +168,7 @@ fn fuzzing_pack(files: &[(&str, String)]) -> Vec<u8> {
 }
 
 #[test]
-fn what_stops_an_expansion_is_said() {
+fn reason_for_a_stopped_expansion_is_given() {
     let lib = ("lib.xosc", main_with(&group("G", SPEED)));
     let of = |groups: &str| stopped(&[("main.xosc", main_with(groups)), lib.clone()]);
     let cases = [
@@ -221,7 +221,7 @@ fn what_stops_an_expansion_is_said() {
 }
 
 #[test]
-fn a_chain_that_is_too_deep_is_stopped() {
+fn too_deep_chain_is_stopped() {
     let chain = |length: usize| {
         let mut files = vec![(
             "main.xosc".to_owned(),
@@ -246,7 +246,7 @@ fn a_chain_that_is_too_deep_is_stopped() {
 }
 
 #[test]
-fn what_would_grow_without_bound_is_stopped() {
+fn unbounded_growth_is_stopped() {
     // Each level uses the one below it four times: 4^11 groups.
     let four: String = (0..4).map(|_| referring("NEXT", "")).collect();
     let mut files = vec![(
@@ -269,7 +269,7 @@ fn what_would_grow_without_bound_is_stopped() {
 }
 
 #[test]
-fn prefixes_of_a_library_travel_with_its_groups() {
+fn prefixes_of_a_library_follow_its_groups() {
     let lib = main_with(&group("G", "<x:a x:b='1'/>"))
         .replace("<OpenSCENARIO>", "<OpenSCENARIO xmlns:x='u' xmlns:y='v'>");
     let text = expanded(&[
@@ -428,7 +428,7 @@ fn config() -> ProptestConfig {
 }
 
 #[test]
-fn random_trees_and_keys() {
+fn random_scenarios_expand_the_same_every_time() {
     let mut runner = proptest::test_runner::TestRunner::new(config());
     let files = (scenario(), library(), library(), library(), library());
     let mut whole = 0;
@@ -463,7 +463,7 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn damaged_archives(
+    fn damaged_archives_never_panic(
         main in scenario(),
         lib in scenario(),
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0..4u8), 1..6),

@@ -66,7 +66,7 @@ fn directories() -> (tempfile::TempDir, PathBuf) {
 }
 
 #[test]
-fn path_leads_where_the_system_follows_it() {
+fn path_is_resolved_as_by_the_system() {
     let (_directory, root) = directories();
     let from = root.join("s/x.xosc");
     for (filepath, expected) in [
@@ -92,7 +92,7 @@ fn path_leads_where_the_system_follows_it() {
 
 /// The directory existed when the scenario was read. It may exist again when the map is opened.
 #[test]
-fn directory_of_the_scenario_is_one_though_it_is_moved_away() {
+fn missing_scenario_directory_still_resolves_paths() {
     let (_directory, root) = directories();
     let text = "<OpenSCENARIO><RoadNetwork><LogicFile filepath='../../maps/a.xodr'/></RoadNetwork></OpenSCENARIO>";
     let found = of(&root.join("moved/away/x.xosc"), text);
@@ -109,7 +109,7 @@ fn path_that_ends_as_a_directory_names_no_map() {
 }
 
 #[test]
-fn an_exclamation_mark_alone_makes_no_archive() {
+fn exclamation_mark_alone_makes_no_archive() {
     let text =
         "<OpenSCENARIO><RoadNetwork><LogicFile filepath='map.xodr'/></RoadNetwork></OpenSCENARIO>";
     let found = of(Path::new("/farm/NEW!/s.xosc"), text);
@@ -117,7 +117,7 @@ fn an_exclamation_mark_alone_makes_no_archive() {
 }
 
 #[test]
-fn what_names_no_file_says_why() {
+fn unresolvable_reference_gives_the_reason() {
     let unknown = Absence::Parameter {
         name: "unknown".to_owned(),
     };
@@ -159,7 +159,7 @@ fn catalog_directories_are_listed() {
 }
 
 #[test]
-fn other_roles() {
+fn distribution_refers_to_its_scenario() {
     let text = "<OpenSCENARIO xmlns:xsi='http://www.w3.org/2001/XMLSchema-instance' \
                 xsi:noNamespaceSchemaLocation='http://x/OpenSCENARIO.xsd'>\
                 <ParameterValueDistribution><ScenarioFile filepath='b/a.xosc'/>\
@@ -173,7 +173,7 @@ fn other_roles() {
 }
 
 #[test]
-fn what_an_archive_is_made_of_lies_in_it() {
+fn members_of_an_archive_are_found_inside_it() {
     let main = "<OpenSCENARIO><RoadNetwork><LogicFile filepath='m.xodr'/></RoadNetwork>\
                 <ManeuverGroup><ScenarioReference scenarioFileName='lib.xosc'/></ManeuverGroup>\
                 </OpenSCENARIO>";
@@ -205,7 +205,7 @@ fn what_an_archive_is_made_of_lies_in_it() {
 }
 
 #[test]
-fn catalogs_that_are_too_many_are_said() {
+fn too_many_catalogs_are_reported() {
     let dir = tempfile::tempdir().unwrap();
     for number in 0..=1000 {
         fs::write(dir.path().join(format!("{number}.xosc")), "").unwrap();

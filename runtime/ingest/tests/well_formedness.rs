@@ -122,7 +122,7 @@ fn each_violation_is_found_at_its_place() {
 }
 
 #[test]
-fn what_can_be_read_of_a_faulty_file_is_in_the_tree() {
+fn readable_part_of_a_faulty_file_is_kept() {
     let text = "<a><b><c/></a><d/>";
     let image = image(text);
     let document = Document::open(&image).unwrap();

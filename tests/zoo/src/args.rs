@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn an_animal_and_how_it_joins() {
+    fn arguments_of_an_animal_are_parsed() {
         let args = of(&[
             "slow",
             "--millis",
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_named() {
+    fn invalid_arguments_are_refused() {
         for wrong in [
             &[][..],
             &["slow", "--millis"],

@@ -2,17 +2,17 @@
 //! under an honest name. One of them behaves correctly. Tests of the broker run them.
 //!
 //! Each animal is one file in `animals/`; [`animals::ANIMALS`] is the list. Their common code is in
-//! `keeper`: joining the bus, the loop, and the answer to a job if there is one.
+//! `harness`: joining the bus, the loop, and the answer to a job if there is one.
 
 pub mod animals;
 mod args;
-mod keeper;
+mod harness;
 mod polite;
 
 use std::process::ExitCode;
 
 pub use args::{Args, USAGE};
-pub use keeper::{Animal, Manners, Mood};
+pub use harness::{Animal, Manners, Mood};
 
 /// Runs the animal that the arguments name.
 pub fn main(arguments: impl Iterator<Item = String>) -> ExitCode {
@@ -27,7 +27,7 @@ pub fn main(arguments: impl Iterator<Item = String>) -> ExitCode {
         return polite::run(args);
     }
     match animals::named(&args.animal) {
-        Some(animal) => keeper::keep(animal, &args),
+        Some(animal) => harness::run(animal, &args),
         None => {
             let known: Vec<&str> = animals::ANIMALS.iter().map(|it| it.name).collect();
             complain(&format!(

@@ -4,7 +4,7 @@
 use std::process::Command;
 
 #[test]
-fn who_asks_for_no_animal_that_there_is_reads_which_there_are() {
+fn unknown_animal_is_refused_with_the_known_names() {
     let zoo = env!("CARGO_BIN_EXE_zoo");
     let output = Command::new(zoo).arg("unicorn").output().unwrap();
     assert_eq!(output.status.code(), Some(2));

@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn words_are_those_of_a_shell() {
+    fn command_words_are_split_like_in_shell() {
         for command in [
             "qc -c $P",
             "qc -c \"$P\"",
@@ -383,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn what_needs_a_shell_is_said() {
+    fn command_that_needs_shell_is_refused_with_reason() {
         for (command, why) in [
             ("a; b", "its command needs a shell because of `;`"),
             ("a && b", "its command needs a shell because of `&`"),

@@ -152,7 +152,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_minimum_is_found_between_the_ends() {
+    fn minimum_between_interval_ends_is_found() {
         let parabola = Cubic::new(3.0, -2.0, 1.0, 0.0);
         let lowest = parabola.minimum(0.0, 5.0).unwrap();
         assert!((lowest.at - 1.0).abs() < 1e-12 && (lowest.value - 2.0).abs() < 1e-12);
@@ -176,7 +176,7 @@ mod tests {
         }
 
         #[test]
-        fn a_shifted_cubic_is_the_same_curve(
+        fn shifted_cubic_is_same_curve(
             a in -10.0..10.0, b in -1.0..1.0, c in -1.0..1.0, d in -1.0..1.0,
             offset in -20.0..20.0, x in -20.0..20.0,
         ) {
@@ -186,7 +186,7 @@ mod tests {
         }
 
         #[test]
-        fn hostile_numbers_do_no_harm(
+        fn extreme_numbers_give_finite_minimum_or_none(
             a in any::<f64>(), b in any::<f64>(), c in any::<f64>(), d in any::<f64>(),
             from in any::<f64>(), to in any::<f64>(),
         ) {

@@ -87,7 +87,7 @@ mod tests {
 
     /// Checks values to 16 digits from tables of the integrals.
     #[test]
-    fn known_values() {
+    fn fresnel_integrals_match_known_values() {
         let table = [
             (0.0, 0.0, 0.0),
             (0.5, 0.492_344_225_871_445_6, 0.064_732_432_859_999_29),
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ends_of_the_scale() {
+    fn fresnel_handles_extreme_arguments() {
         assert_eq!(fresnel(f64::NAN), None);
         assert_eq!(fresnel(f64::INFINITY), None);
         let (c, s) = fresnel(1e300).unwrap();
@@ -118,7 +118,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn agrees_with_quadrature(x in -7.0..7.0_f64) {
+        fn fresnel_agrees_with_quadrature(x in -7.0..7.0_f64) {
             let c = integrate(0.0, x, 1e-15, |t| (0.5 * PI * t * t).cos()).unwrap();
             let s = integrate(0.0, x, 1e-15, |t| (0.5 * PI * t * t).sin()).unwrap();
             let (got_c, got_s) = fresnel(x).unwrap();

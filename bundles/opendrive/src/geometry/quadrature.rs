@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn known_integrals() {
+    fn quadrature_matches_known_integrals() {
         let close = |a: Option<f64>, b: f64| assert!((a.unwrap() - b).abs() < 1e-11, "{a:?} {b}");
         close(integrate(0.0, 1.0, 1e-12, |x| x * x), 1.0 / 3.0);
         close(integrate(0.0, 3.0, 1e-12, f64::exp), 3.0_f64.exp() - 1.0);
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_integrated_is_none() {
+    fn non_integrable_function_gives_none() {
         assert_eq!(integrate(0.0, 1.0, 1e-12, |_| f64::NAN), None);
         assert_eq!(integrate(0.0, f64::INFINITY, 1e-12, |x| x), None);
         assert_eq!(integrate(0.0, 1e6, 1e-12, |x| (x * x).sin()), None);

@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn without_length_there_is_no_spiral() {
+    fn spiral_without_positive_length_is_refused() {
         for length in [0.0, -1.0, f64::NAN] {
             assert_eq!(Spiral::between(0.0, 0.1, length), None);
         }
@@ -133,7 +133,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn both_ways_to_the_point_agree(
+        fn quadrature_and_fresnel_points_agree(
             start in -0.3..0.3_f64, rate in prop_oneof![-0.05..-1e-4_f64, 1e-4..0.05_f64], ds in 0.0..60.0_f64,
         ) {
             let spiral = Spiral { start, rate };
@@ -145,7 +145,7 @@ mod tests {
         }
 
         #[test]
-        fn a_mirrored_spiral_is_a_mirrored_curve(
+        fn mirrored_spiral_is_mirrored_curve(
             start in -0.3..0.3_f64, rate in -0.05..0.05_f64, ds in 0.0..60.0_f64,
         ) {
             let one = Spiral { start, rate }.pose(ds).unwrap();

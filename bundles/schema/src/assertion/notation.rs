@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn expressions_survive_the_notation() {
+    fn xpath_expressions_round_trip_through_notation() {
         assert_eq!(
             through("not(@a or @b) or (@a and not(b/@c != 0))"),
             "(or (not (or @a @b)) (and @a (not (!= b/@c 0))))"
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn other_xpath_is_refused_by_name() {
+    fn unsupported_xpath_is_refused_by_name() {
         for (xpath, what) in [
             ("matches(@a, 'x')", "`,`"),
             ("string-length(@a)", "string-length"),

@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn eight_digits_are_told_from_other_bytes() {
+    fn eight_digits_are_distinguished_from_other_bytes() {
         for at in 0..8 {
             for byte in 0..=u8::MAX {
                 let mut word = *b"90817263";
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_may_be_open() {
+    fn empty_bound_means_no_limit() {
         assert!(in_bounds("99999999999999999999", ("0", "")));
         assert!(!in_bounds("-1", ("0", "")));
         assert!(in_bounds("-2147483648", ("-2147483648", "2147483647")));

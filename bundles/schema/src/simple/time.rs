@@ -100,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn days_and_clocks() {
+    fn date_times_follow_calendar_and_clock() {
         for good in [
             "2024-02-29T12:00:00",
             "2020-03-20T12:00:00Z",

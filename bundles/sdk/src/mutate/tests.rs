@@ -26,7 +26,7 @@ fn assert_edit(selector: &str, action: &str, from: &str, to: &str, rows: &[u64])
 }
 
 #[test]
-fn an_attribute_is_edited() {
+fn attribute_is_edited_in_place() {
     assert_edit("Act#c", "set @name=e", "\"c\"", "\"e\"", &[6]);
     assert_edit("Act[n=1]", "set @n=2", "'1'", "'2'", &[4, 5]);
     assert_edit(
@@ -43,7 +43,7 @@ fn an_attribute_is_edited() {
 }
 
 #[test]
-fn an_element_is_edited() {
+fn element_is_edited_in_place() {
     let (a, c) = (
         "<Act name=\"a b\"\n       n='1'/>",
         "<Act name=\"c\">x</Act>",
@@ -65,7 +65,7 @@ fn an_element_is_edited() {
 }
 
 #[test]
-fn text_is_inserted() {
+fn text_is_inserted_at_selected_element() {
     let c = "<Act name=\"c\">x</Act>";
     assert_edit("Act#c", "prepend <p/>", ">x<", "><p/>x<", &[6]);
     assert_edit("Act#c", "append <p/>", ">x<", ">x<p/><", &[6]);
@@ -90,12 +90,12 @@ fn text_is_inserted() {
 }
 
 #[test]
-fn an_empty_element_gets_an_end_tag() {
+fn empty_element_gets_end_tag_when_appended_to() {
     assert_edit("Act#d", "append", "\"d\"/>", "\"d\"></Act>", &[7]);
 }
 
 #[test]
-fn an_edit_that_cannot_be_made_is_an_error() {
+fn impossible_edit_is_refused_with_reason() {
     for (selector, action, why) in [
         ("Act#x", "drop", "0 elements fit"),
         ("Act", "drop", "3 elements fit"),
@@ -123,7 +123,7 @@ fn an_edit_that_cannot_be_made_is_an_error() {
 }
 
 #[test]
-fn selectors_mean_one_element() {
+fn selector_matches_exactly_one_element() {
     for (selector, row) in [
         ("Story > Act:1", 4),
         ("Act[n=1]", 4),
@@ -140,7 +140,7 @@ fn selectors_mean_one_element() {
 }
 
 #[test]
-fn a_broken_file_has_elements() {
+fn elements_of_ill_formed_file_are_found() {
     let scan = Scan::of("<a><b><c></b></x>\n<d>").unwrap();
     let ends: Vec<_> = scan
         .elements
@@ -153,7 +153,7 @@ fn a_broken_file_has_elements() {
 }
 
 #[test]
-fn a_file_is_stored_otherwise() {
+fn storage_edit_changes_encoding_and_line_ends() {
     let of = |edit: &str, bytes: &[u8]| Storage::parse(edit).and_then(|it| it.apply(bytes));
     let declared =
         |encoding: &str| format!("<?xml version=\"1.0\" encoding=\"{encoding}\"?>\n<ü/>\n");
@@ -180,7 +180,7 @@ fn a_file_is_stored_otherwise() {
 }
 
 #[test]
-fn an_overlay_changes_files_for_a_while() {
+fn overlay_changes_files_temporarily() {
     let source = tempfile::tempdir().unwrap();
     std::fs::create_dir(source.path().join("maps")).unwrap();
     std::fs::write(source.path().join("a.xosc"), TEXT).unwrap();

@@ -238,7 +238,7 @@ mod tests {
         ```xml also file=c.xodr\n<c/>\n```\n\n```issues\nerror 1:1 /b: no\n```\n";
 
     #[test]
-    fn a_page_is_taken_apart() {
+    fn page_is_parsed_into_title_and_examples() {
         let page = Page::parse(PAGE).unwrap();
         assert_eq!(
             (page.title.as_str(), page.summary.as_str()),
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_summary_ends_with_its_paragraph() {
+    fn summary_ends_with_its_paragraph() {
         let of = |text: &str| Page::head(text).summary;
         assert_eq!(of(PAGE), "One sentence on two lines.");
         assert_eq!(
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_named_with_their_line() {
+    fn page_errors_are_reported_with_their_line() {
         let of = |page: &str| Page::parse(page).unwrap_err().to_string();
         assert!(of("no title").starts_with("line 1: a page begins"));
         assert!(of("# T\n\nS.\n\n```xml bda\n```\n").contains("line 5: `bda`"));

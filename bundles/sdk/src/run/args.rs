@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn three_ways_to_run() {
+    fn arguments_select_one_of_three_modes() {
         assert_eq!(of(&[]), Ok(Mode::Bus(BusOptions::default())));
         assert_eq!(
             of(&["--format", "json", "a.xodr"]),
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_named() {
+    fn invalid_arguments_are_refused() {
         for wrong in [
             &["--bad"][..],
             &["-c"],

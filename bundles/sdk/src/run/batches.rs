@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn small_findings_go_by_number_and_large_ones_by_size() {
+    fn findings_are_batched_by_count_and_size() {
         let lengths = |issues| batches(issues).iter().map(Vec::len).collect::<Vec<_>>();
         assert_eq!(lengths(Vec::new()), [0; 0]);
         assert_eq!(lengths(vec![saying(100); 130]), [64, 64, 2]);
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_of_hundreds_of_checkers_are_one_message_and_long_ones_several() {
+    fn short_checker_ends_share_message_and_long_are_split() {
         let end = |bytes: usize| CheckerEnd {
             checker: 1,
             ending: Ending::NotApplicable {
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn a_finding_about_a_huge_text_arrives_and_is_as_severe() {
+    fn finding_with_huge_text_arrives_with_same_level() {
         let huge = "x".repeat(MAX_FROM_PEER);
         let place = Locations {
             description: huge.clone(),

@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_slowest_comes_first_and_the_sums_follow() {
+    fn slowest_checker_comes_first_followed_by_sums() {
         let millis = Duration::from_millis;
         let checkers = [("quick", 1), ("slow", 30), ("idle", 0)];
         let timings = Timings {

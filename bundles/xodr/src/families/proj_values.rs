@@ -35,7 +35,7 @@ mod tests {
     use super::degrees;
 
     #[test]
-    fn degrees_as_proj_writes_them() {
+    fn degrees_are_parsed_in_proj_notation() {
         assert_eq!(degrees("11.5"), Some(11.5));
         assert_eq!(degrees("-12d30'"), Some(-12.5));
         assert_eq!(degrees("12d30'36\"W"), Some(-12.51));

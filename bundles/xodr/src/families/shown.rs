@@ -62,7 +62,7 @@ mod tests {
     use super::{beside, number};
 
     #[test]
-    fn no_more_digits_than_tell_something() {
+    fn numbers_are_shown_with_significant_digits_only() {
         assert_eq!(number(3.5), "3.5");
         assert_eq!(number(0.004_999_999_999_995_452_5), "0.005");
         assert_eq!(number(-0.0), "0");
@@ -73,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_differs_from_its_limit() {
+    fn number_is_shown_distinct_from_its_limit() {
         assert_eq!(beside(-0.010_921, 0.0), "-0.011");
         assert_eq!(beside(-0.000_1, 0.0), "-0.0001");
         assert_eq!(beside(-3e-7, 0.0), "-3e-7");

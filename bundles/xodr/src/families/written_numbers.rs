@@ -253,7 +253,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn spellings() {
+    fn non_finite_spellings_are_recognised() {
         for text in ["NaN", "nan", "-nan(ind)", "1.#QNAN", "-1.#IND", " NaN "] {
             assert_eq!(Written::read(text), Some(Written::Nan), "{text}");
             assert!(is_suspicious(text.as_bytes()), "{text}");
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn long_ones_are_cut() {
+    fn long_numbers_are_shortened() {
         assert_eq!(brief(12.345, 1), "12.3");
         assert_eq!(brief(1.234e19, 3), "1.2e19");
         assert_eq!(shown(" 1.5 "), "1.5");

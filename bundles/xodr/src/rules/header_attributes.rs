@@ -229,7 +229,7 @@ mod tests {
     use super::is_iso_8601;
 
     #[test]
-    fn dates_of_iso_8601() {
+    fn iso_8601_dates_are_recognised() {
         for right in [
             "2024-02-29",
             "2026-01-31T12:30:00",

@@ -57,7 +57,7 @@ fn works(temporary: &[&str], behind: &[&str]) -> String {
 }
 
 #[test]
-fn temporary_lanes() {
+fn temporary_lanes_give_expected_findings() {
     let both = ["p-1 permanent", "p-1 temporary"];
     let rows: Vec<Row> = vec![
         (
@@ -91,7 +91,7 @@ fn temporary_lanes() {
 }
 
 #[test]
-fn sides_loops_and_places_within_roads() {
+fn section_sides_loops_and_inner_links_give_expected_findings() {
     let one_side = |links: &str| {
         let right = format!(
             "<laneSection s=\"50\" singleSide=\"true\"><center>{CENTER}</center><right>{}</right></laneSection>",
@@ -146,7 +146,7 @@ fn sides_loops_and_places_within_roads() {
 }
 
 #[test]
-fn data_of_others() {
+fn foreign_user_data_gives_expected_findings() {
     let with = |tail: &str| {
         Road {
             tail,
@@ -193,7 +193,7 @@ fn data_of_others() {
 }
 
 #[test]
-fn numbers_of_outlines_and_corners() {
+fn outline_and_corner_ids_give_expected_findings() {
     let object = |reference: &str, outline: &str| {
         let corner = |id: &str, u: &str, v: &str| {
             format!(r#"<cornerLocal id="{id}" u="{u}" v="{v}" z="0" height="0"/>"#)

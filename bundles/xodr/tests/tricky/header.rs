@@ -18,7 +18,7 @@ fn reference(text: &str) -> String {
 const FLAWED: &[&str] = &["warning header_geo_reference"];
 
 #[test]
-fn geographic_references() {
+fn geographic_references_give_expected_findings() {
     let rows: Vec<Row> = vec![
         (
             "blanks and lines around the string",
@@ -121,7 +121,7 @@ fn geographic_references() {
 }
 
 #[test]
-fn bounds() {
+fn header_bounds_give_expected_findings() {
     let road = |x: &str, shape: &str| {
         Road::default().with_plan_view(&geometry("0", x, "0", "0", "100", shape))
     };
@@ -183,7 +183,7 @@ fn bounds() {
 }
 
 #[test]
-fn offsets() {
+fn header_offsets_give_expected_findings() {
     let offset = |x: &str, hdg: &str| {
         let offset = format!("<offset x=\"{x}\" y=\"0\" z=\"0\" hdg=\"{hdg}\"/>");
         with_header("", &offset, "")

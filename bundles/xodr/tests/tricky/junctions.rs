@@ -133,7 +133,7 @@ impl Common<'_> {
 }
 
 #[test]
-fn common() {
+fn common_junctions_give_expected_findings() {
     let against = Common {
         links: &["p3 start", "s1 end"],
         pose: ["120", "0", PI],
@@ -264,7 +264,7 @@ fn direct(ramp: &[&str], heading: &str, roads: [&str; 2]) -> String {
 }
 
 #[test]
-fn direct_junctions() {
+fn direct_junctions_give_expected_findings() {
     let rows: Vec<Row> = vec![
         ("plain", direct(&["pJ 7"], "0", ["2", "3"]), &[]),
         (
@@ -294,7 +294,7 @@ fn direct_junctions() {
 }
 
 #[test]
-fn virtual_junctions() {
+fn virtual_junctions_give_expected_findings() {
     let with = |attributes: &str| {
         format!(
             "{}<junction id=\"7\" name=\"\" type=\"virtual\" {attributes}/>\n",

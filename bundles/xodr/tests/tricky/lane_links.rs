@@ -21,7 +21,7 @@ fn width(a: &str, b: &str) -> String {
 }
 
 #[test]
-fn between_sections() {
+fn lane_links_between_sections_give_expected_findings() {
     let two = |one: &str, other: &str| format!("{}{}", lane("-1", one), lane("-2", other));
     let rows: Vec<Row> = vec![
         (

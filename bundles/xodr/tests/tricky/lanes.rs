@@ -23,7 +23,7 @@ fn record(name: &str, values: &[[&str; 3]]) -> String {
 }
 
 #[test]
-fn numbers() {
+fn lane_numbers_give_expected_findings() {
     let rows: Vec<Row> = vec![
         ("spaces around a number", right(&lane(" -1 ", "")), &[]),
         ("a sign", lanes(&section("\"0\"", &lane("+1", ""), "")), &[]),
@@ -77,7 +77,7 @@ fn numbers() {
 }
 
 #[test]
-fn sections() {
+fn lane_sections_give_expected_findings() {
     let (one, two) = (lane("-1", "s-1"), lane("-1", "p-1"));
     let both =
         |links: &str, s: &str| section(s, &lane("1", &links.replace('-', "")), &lane("-1", links));
@@ -132,7 +132,7 @@ fn sections() {
 }
 
 #[test]
-fn widths_and_borders() {
+fn lane_widths_and_borders_give_expected_findings() {
     let with = |records: &str| right(&lane_with("-1", "", records));
     let offset = |a: &str| {
         let offset = format!(

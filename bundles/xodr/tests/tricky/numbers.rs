@@ -33,7 +33,7 @@ fn tail(tail: &str) -> String {
 }
 
 #[test]
-fn not_finite() {
+fn non_finite_numbers_give_expected_findings() {
     let rows: Vec<Row> = vec![
         (
             "a name is no number",
@@ -104,7 +104,7 @@ fn not_finite() {
 }
 
 #[test]
-fn sizes() {
+fn implausible_sizes_give_expected_findings() {
     let rows: Vec<Row> = vec![
         ("a lane that opens slowly", right(&width("0", "0.014")), &[]),
         ("narrow as none", right(&width("0.04", "0")), &[]),
@@ -187,7 +187,7 @@ fn curve(shape: &str, length: &str, left: &str, right: &str) -> String {
 }
 
 #[test]
-fn folds() {
+fn folded_lanes_give_expected_findings() {
     let wide = |id: &str| lane_with(id, "", &width("6", "0"));
     let rows: Vec<Row> = vec![
         ("straight", curve(LINE, "7", &wide("1"), &wide("-1")), &[]),

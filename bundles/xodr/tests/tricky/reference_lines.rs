@@ -32,7 +32,7 @@ fn elevations(records: &[(&str, &str, &str)]) -> String {
 }
 
 #[test]
-fn geometries() {
+fn geometries_give_expected_findings() {
     let turned = "6.283185307179586";
     let curve = |range: &str, b: &str| {
         format!(
@@ -118,7 +118,7 @@ fn geometries() {
 }
 
 #[test]
-fn elevation() {
+fn elevation_records_give_expected_findings() {
     let rows: Vec<Row> = vec![
         (
             "one step back",
@@ -150,7 +150,7 @@ fn elevation() {
 type Spell = Box<dyn Fn(&str) -> Vec<u8>>;
 
 #[test]
-fn a_file_may_be_written_in_many_ways() {
+fn equivalent_spellings_of_file_give_same_findings() {
     let plan = qcbus_sdk::Plan::by_default(&qcbus_xodr::BUNDLE);
     let good = file("9", &Road::default().text());
     let bad = good.replace("lane id=\"-1\"", "lane id=\"1\"");

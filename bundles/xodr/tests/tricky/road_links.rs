@@ -66,7 +66,7 @@ const RIGHT_UP: &str =
     r#"<lateralProfile><superelevation s="0" a="-0.05" b="0" c="0" d="0"/></lateralProfile>"#;
 
 #[test]
-fn between_two_roads() {
+fn links_between_two_roads_give_expected_findings() {
     let rows: Vec<Row> = vec![
         ("end to start", ALONG.text(), &[]),
         ("end to end", HEAD_ON.text(), &[]),
@@ -211,7 +211,7 @@ fn between_two_roads() {
 }
 
 #[test]
-fn a_road_that_follows_itself() {
+fn self_following_road_gives_expected_findings() {
     let lanes = section("\"0\"", "", &lane("-1", "p-1 s-1"));
     let ring = Road {
         length: "62.83185307179586",
@@ -247,7 +247,7 @@ fn a_road_that_follows_itself() {
 }
 
 #[test]
-fn lanes_far_from_reference_lines_that_meet() {
+fn lanes_far_from_reference_lines_give_expected_findings() {
     const LANES: &[&str] = &["error lane_smoothness_contact_point_no_horizontal_gaps"];
     const LINES: &[&str] = &["error road_geometry_contact_point"];
     let row = |offset: &str, y: &str| {

@@ -29,7 +29,7 @@ fn signals(list: &[String]) -> String {
 }
 
 #[test]
-fn signals_and_controllers() {
+fn signals_and_controllers_give_expected_findings() {
     let valid = |range: [&str; 2]| {
         let [from, to] = range;
         signals(&[signal(
@@ -97,7 +97,7 @@ fn signals_and_controllers() {
 }
 
 #[test]
-fn objects() {
+fn objects_give_expected_findings() {
     let object = |s: &str, size: &str, children: &str| {
         let object = format!(
             r#"<object type="obstacle" id="1" s="{s}" t="-10" zOffset="0" orientation="none" hdg="0" pitch="0" roll="0" height="1" {size}>{children}</object>"#

@@ -57,7 +57,7 @@ fn beside_contact_point(extra: &str) -> String {
 }
 
 #[test]
-fn lengths_and_widths() {
+fn slight_length_and_width_errors_give_expected_findings() {
     let two = |start: &str| {
         lanes(&format!(
             "{}{}",
@@ -95,7 +95,7 @@ fn lengths_and_widths() {
 }
 
 #[test]
-fn shapes_in_order_and_flat() {
+fn shape_order_and_flat_shapes_give_expected_findings() {
     let rows: Vec<Row> = vec![
         (
             "zeros in any order",
@@ -140,7 +140,7 @@ fn shapes_in_order_and_flat() {
 }
 
 #[test]
-fn marks_at_one_place() {
+fn road_marks_at_same_place_give_expected_findings() {
     let mark = |kind: &str, lines: &str| {
         format!(
             r#"<roadMark sOffset="0" type="{kind}" color="standard" width="0.12">{lines}</roadMark>"#
@@ -180,7 +180,7 @@ fn marks_at_one_place() {
 }
 
 #[test]
-fn links_with_more_than_they_take() {
+fn superfluous_link_attributes_give_expected_findings() {
     let rows: Vec<Row> = vec![
         (
             "a direction beside the contact point",
@@ -197,7 +197,7 @@ fn links_with_more_than_they_take() {
 }
 
 #[test]
-fn what_begins_late() {
+fn late_profile_records_give_expected_findings() {
     let late = |records: &str| profiles(&format!("<elevationProfile>{records}</elevationProfile>"));
     let offset = |s: &str| {
         format!(
@@ -248,7 +248,7 @@ fn what_begins_late() {
 }
 
 #[test]
-fn lengths_of_geometries() {
+fn geometry_lengths_give_expected_findings() {
     let road = |length: &str, geometries: &str| {
         Road {
             length,
@@ -278,7 +278,7 @@ fn lengths_of_geometries() {
 }
 
 #[test]
-fn lane_offsets_that_step_back_by_rounding() {
+fn lane_offset_rounding_steps_give_expected_findings() {
     let offsets = |second: &str| {
         lanes(&format!(
             "<laneOffset s=\"0\" a=\"0\" b=\"0\" c=\"0\" d=\"0\"/>\

@@ -47,7 +47,7 @@ fn light(id: &str, s: &str, children: &str) -> String {
 const FIFTY: &str = r#"orientation="+" subtype="-1" hOffset="0" value="50" unit="km/h""#;
 
 #[test]
-fn places() {
+fn object_and_signal_positions_give_expected_findings() {
     let building = |place: &str| objects(&[&object("building", "1", place, "")]);
     let pole = |place: &str| objects(&[&object("pole", "1", place, "")]);
     let at = |place: &str| signals(&[sign("1", place, FIFTY, "")]);
@@ -155,7 +155,7 @@ fn places() {
 }
 
 #[test]
-fn twins() {
+fn duplicate_signs_give_expected_findings() {
     let place = r#"s="50" t="-8" zOffset="2""#;
     let valid = |lane: &str| format!(r#"<validity fromLane="{lane}" toLane="{lane}"/>"#);
     let back = FIFTY.replace(r#"orientation="+""#, r#"orientation="-""#);
@@ -188,7 +188,7 @@ fn twins() {
 }
 
 #[test]
-fn speeds() {
+fn speed_signs_give_expected_findings() {
     let limit = |more: &str| {
         let more = format!(r#"orientation="+" hOffset="0" {more}"#);
         signals(&[sign("1", r#"s="50" t="-8" zOffset="2""#, &more, "")])
@@ -237,7 +237,7 @@ fn speeds() {
 }
 
 #[test]
-fn controllers() {
+fn signal_controllers_give_expected_findings() {
     let lights = |last: &str| {
         signals(&[
             light("11", "10", ""),
@@ -286,7 +286,7 @@ fn controllers() {
 }
 
 #[test]
-fn shapes() {
+fn outline_shapes_give_expected_findings() {
     let outline = |attributes: &str, corners: &[[&str; 2]]| {
         let corner =
             |[u, v]: &[&str; 2]| format!(r#"<cornerLocal u="{u}" v="{v}" z="0" height="1"/>"#);
@@ -390,7 +390,7 @@ fn shapes() {
 }
 
 #[test]
-fn lanes_of_validities() {
+fn validity_lanes_give_expected_findings() {
     let lanes = format!(
         "<laneSection s=\"0\"><center>{CENTER}</center><right>{}{}</right></laneSection>\n{}",
         lane("-1", "s-1"),
@@ -421,7 +421,7 @@ fn lanes_of_validities() {
 }
 
 #[test]
-fn repeated() {
+fn repeated_objects_give_expected_findings() {
     let row = |kind: &str, more: &str| {
         objects(&[&object(
             kind,
@@ -495,7 +495,7 @@ fn repeated() {
 }
 
 #[test]
-fn outlines_that_are_lines() {
+fn degenerate_outlines_give_expected_findings() {
     let outline = |more: &str, corners: [[&str; 3]; 4]| {
         let corners = corners
             .map(|[u, v, z]| format!(r#"<cornerLocal u="{u}" v="{v}" z="{z}" height="0"/>"#));

@@ -58,7 +58,7 @@ impl Way<'_> {
 const TWO: &str = "warning junctions_common_when_to_use";
 
 #[test]
-fn lanes_at_junctions() {
+fn lanes_entering_junctions_give_expected_findings() {
     let with = |lanes: [String; 3], connection| Way {
         lanes,
         connection,
@@ -120,7 +120,7 @@ fn lanes_at_junctions() {
 }
 
 #[test]
-fn lanes_out_of_junctions() {
+fn lanes_leaving_junctions_give_expected_findings() {
     let right = |lanes: &[(&str, &str)]| {
         let lanes: String = lanes.iter().map(|(id, links)| lane(id, links)).collect();
         section("\"0\"", "", &lanes)
@@ -199,7 +199,7 @@ fn lanes_out_of_junctions() {
 }
 
 #[test]
-fn the_whole_map() {
+fn touching_road_ends_give_expected_findings() {
     let road = |id: &str, x: &str, hdg: &str| {
         let pose = [x, "0", hdg];
         Road {

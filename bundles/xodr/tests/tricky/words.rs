@@ -27,7 +27,7 @@ const POST: &str =
 const LIMIT: &str = r#"s="10" t="-5" zOffset="2" orientation="+" dynamic="no" country="DEU" type="274" subtype="50""#;
 
 #[test]
-fn words() {
+fn unknown_words_give_expected_findings() {
     let kind = |version, kind: &str| road(version, &format!(r#"<type s="0" type="{kind}"/>"#), "");
     let rows: Vec<Row> = vec![
         ("a word of a later version", kind("2", "townLocal"), &[]),
@@ -54,7 +54,7 @@ fn words() {
 }
 
 #[test]
-fn attributes() {
+fn missing_attributes_give_expected_findings() {
     let rows: Vec<Row> = vec![
         (
             "an empty id",

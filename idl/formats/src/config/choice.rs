@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn a_checker_goes_by_every_name_that_people_see() {
+    fn checker_is_selected_by_each_of_its_names() {
         for name in [
             ID,
             UID,
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn to_ignore_wins_and_what_is_off_is_named_in_full() {
+    fn ignore_wins_and_default_off_checker_needs_full_name() {
         assert!(!asks(&["road"], &["road.lane"], true));
         assert!(!asks(&[], &[], false));
         assert!(!asks(&["road"], &[], false));

@@ -157,7 +157,7 @@ mod tests {
     use super::{is_any_rule_uid, is_rule_uid};
 
     #[test]
-    fn follows_the_published_pattern() {
+    fn rule_uid_follows_published_pattern() {
         for good in [
             "asam.net:xodr:1.7.0:road.lane.level_true_one_side",
             "qcbus.dev:qcbus:1.0.0:pooling.filtered",
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn the_fast_way_says_the_same() {
+    fn fast_uid_check_agrees_with_full_check() {
         let uid = "a9_.Bc.d:xo:1.70:rd.l_9.X";
         for at in 0..=uid.len() {
             for put in [":", ".", "", "a", "Z", "_", "7", " ", "::", "..", "é", "-"] {

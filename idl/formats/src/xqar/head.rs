@@ -42,7 +42,7 @@ mod tests {
     use crate::xqar::{CheckerBundle, Dialect, Param, Results, write};
 
     #[test]
-    fn the_checked_file_is_found_in_the_beginning() {
+    fn checked_file_is_found_in_head_of_result() {
         let value = "/a <b> & \"c\".xodr".to_owned();
         let results = Results {
             version: "1.0.0".into(),

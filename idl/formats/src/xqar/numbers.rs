@@ -31,7 +31,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_shortest_text_that_reads_back() {
+    fn number_is_written_as_shortest_text_that_reads_back() {
         for (value, text) in [
             (0.0, "0"),
             (-0.0, "-0"),

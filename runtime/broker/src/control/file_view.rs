@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn another_program_is_not_like_us() {
+    fn process_of_other_program_is_distinguished_from_own() {
         let own = Process::open(std::process::id(), None).unwrap();
         assert!(is_like_us(&own));
         let mut other = std::process::Command::new("sleep")

@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn instance_is_read_from_the_command_line_of_a_broker() {
+    fn instance_is_read_from_broker_command_line() {
         let of = |line: &'static str| served(&line.split(' ').collect::<Vec<_>>());
         assert_eq!(of("/usr/bin/qcbus serve in"), Some("default"));
         assert_eq!(of("qcbus serve --instance farm in"), Some("farm"));
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn user_without_a_name_is_a_number() {
+    fn user_without_name_is_shown_as_number() {
         let users = "root:x:0:0:root:/root:/bin/sh\nfarm:x:1001:1001::/:/bin/sh\n";
         assert_eq!(name_of(1001, users), Some("farm"));
         assert_eq!(name_of(7, users), None);

@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_path_and_a_cleaner_are_no_obstacles() {
+    fn control_socket_supports_long_path_and_is_restored() {
         let base = tempfile::TempDir::new().unwrap();
         let directory = base.path().join("a".repeat(100)).join("b".repeat(80));
         std::fs::create_dir_all(&directory).unwrap();

@@ -18,7 +18,7 @@ fn taken(files: &mut Files, now: Duration) -> Vec<FileId> {
 }
 
 #[test]
-fn how_many_wait_where_is_counted() {
+fn waiting_files_are_counted_per_queue() {
     let mut files = files(5);
     files.enqueue(0, Priority::Fresh, at(1));
     files.enqueue(1, Priority::Background, at(1));
@@ -40,7 +40,7 @@ fn how_many_wait_where_is_counted() {
 }
 
 #[test]
-fn it_is_quiet_when_nothing_waits_and_nothing_is_checked() {
+fn queue_is_quiet_when_nothing_waits_or_is_checked() {
     let busy = [
         Stage::Waiting(Priority::Fresh, at(0)),
         Stage::Waiting(Priority::Background, at(0)),
@@ -60,7 +60,7 @@ fn it_is_quiet_when_nothing_waits_and_nothing_is_checked() {
 }
 
 #[test]
-fn a_file_that_moved_up_is_taken_once_and_in_its_new_place() {
+fn promoted_file_is_taken_once_at_its_new_place() {
     let mut files = files(3);
     for (id, priority) in [
         (1, Priority::Background),
@@ -75,7 +75,7 @@ fn a_file_that_moved_up_is_taken_once_and_in_its_new_place() {
 }
 
 #[test]
-fn a_file_in_the_other_queue_does_not_go_by_its_former_place() {
+fn promoted_file_is_not_taken_at_its_former_place() {
     let mut files = files(2);
     files.enqueue(0, Priority::Background, at(1));
     // It moved up, but its former place is still in the background queue.
@@ -88,7 +88,7 @@ fn a_file_in_the_other_queue_does_not_go_by_its_former_place() {
 }
 
 #[test]
-fn the_background_has_its_share_while_fresh_files_come() {
+fn background_gets_its_share_while_fresh_files_arrive() {
     let mut files = files(60);
     files.enqueue(0, Priority::Background, at(0));
     (1..60).for_each(|id| files.enqueue(id, Priority::Fresh, at(0)));
@@ -98,7 +98,7 @@ fn the_background_has_its_share_while_fresh_files_come() {
 }
 
 #[test]
-fn the_longest_wait_is_that_of_the_first_fresh_file() {
+fn longest_wait_is_that_of_first_fresh_file() {
     let mut files = files(3);
     assert_eq!(files.oldest_wait(at(9)), Duration::ZERO);
     files.enqueue(0, Priority::Background, at(1));
@@ -111,7 +111,7 @@ fn the_longest_wait_is_that_of_the_first_fresh_file() {
 }
 
 #[test]
-fn a_file_waits_once_however_often_it_is_queued() {
+fn file_queued_repeatedly_waits_once() {
     let mut files = files(1);
     for _ in 0..3 {
         files.enqueue(0, Priority::Background, Duration::ZERO);
@@ -123,7 +123,7 @@ fn a_file_waits_once_however_often_it_is_queued() {
 }
 
 #[test]
-fn a_file_that_must_rest_lets_others_pass() {
+fn paused_file_lets_others_pass() {
     let mut files = files(2);
     files.enqueue(0, Priority::Fresh, Duration::ZERO);
     files.enqueue(1, Priority::Fresh, Duration::ZERO);

@@ -41,7 +41,7 @@ fn task(pending: BTreeMap<u32, Pending>) -> Task {
 }
 
 #[test]
-fn a_result_has_what_a_checker_said_and_what_is_known_of_it() {
+fn result_has_checker_ending_and_known_facts() {
     let param = Param {
         name: "tolerance".to_owned(),
         value: "0.1".to_owned(),
@@ -114,7 +114,7 @@ fn in_the_result(ending: Ending, issues: Vec<Issue>) -> (Status, String, Vec<Str
 }
 
 #[test]
-fn a_checker_that_says_it_did_not_look_and_reports_findings_has_failed_and_keeps_them() {
+fn skipped_checker_with_findings_fails_and_keeps_them() {
     let reason = || "it is for versions from 1.7".to_owned();
     let not_applicable = Ending::NotApplicable { reason: reason() };
     let blocked = Ending::Blocked {
@@ -134,7 +134,7 @@ fn a_checker_that_says_it_did_not_look_and_reports_findings_has_failed_and_keeps
 }
 
 #[test]
-fn what_a_failed_checker_had_found_is_kept() {
+fn findings_of_failed_checker_are_kept() {
     let failed = Ending::Failed {
         reason: "it crashed".to_owned(),
     };
@@ -144,7 +144,7 @@ fn what_a_failed_checker_had_found_is_kept() {
 }
 
 #[test]
-fn a_bundle_that_takes_no_such_files_says_so_of_each_checker_asked() {
+fn selected_checkers_of_other_file_kind_are_not_applicable() {
     let outcome = not_applicable("Bundle", "1", &offers(), vec![1], FileKind::Xosc);
     let reason = "Bundle does not check .xosc files".to_owned();
     let said = outcome.said();
@@ -158,7 +158,7 @@ fn a_bundle_that_takes_no_such_files_says_so_of_each_checker_asked() {
 /// Checks that every text from a bundle counts, byte for byte, because the weight limits the kept
 /// data.
 #[test]
-fn what_an_issue_weighs_grows_with_each_of_its_texts() {
+fn issue_weight_grows_with_each_text() {
     let place = |text: &str, which: usize| {
         let at = |number: usize| if which == number { text } else { "" }.to_owned();
         let child = InfoElement {
@@ -204,7 +204,7 @@ fn what_an_issue_weighs_grows_with_each_of_its_texts() {
 }
 
 #[test]
-fn a_text_is_cut_at_a_character_and_says_so() {
+fn text_is_cut_at_character_boundary_with_ellipsis() {
     let cut = |text: &str, most: usize| {
         let mut text = text.to_owned();
         clip_text(&mut text, most);
@@ -220,7 +220,7 @@ fn a_text_is_cut_at_a_character_and_says_so() {
 
 /// Checks that a cut text releases its memory. Otherwise a few bytes would hold megabytes.
 #[test]
-fn what_is_cut_gives_its_memory_back() {
+fn cut_text_releases_its_memory() {
     let mut text = "x".repeat(1 << 20);
     clip_text(&mut text, 100);
     assert!(text.capacity() < 200, "{}", text.capacity());
@@ -232,7 +232,7 @@ fn what_is_cut_gives_its_memory_back() {
 }
 
 #[test]
-fn roads_and_messages_weigh_what_they_are_called() {
+fn road_and_message_names_count_to_weight() {
     let called = |text: &str, which: usize| {
         let at = |number: usize| if which == number { text } else { "" }.to_owned();
         let road = Location::Road {
@@ -262,7 +262,7 @@ fn roads_and_messages_weigh_what_they_are_called() {
 }
 
 #[test]
-fn what_a_finding_has_too_much_of_is_cut() {
+fn oversized_finding_is_cut() {
     let long = "x".repeat(2000);
     let place = Locations {
         description: long.clone(),

@@ -166,7 +166,7 @@ fn is_over(actions: &[Action]) -> bool {
 }
 
 #[test]
-fn a_reporter_that_is_there_is_told_at_once() {
+fn present_reporter_gets_withdrawal_at_once() {
     let mut requests = Requests::new(true);
     let (session, _) = requests.join();
     let actions = requests.vanish();
@@ -181,7 +181,7 @@ fn a_reporter_that_is_there_is_told_at_once() {
 /// Checks that a report is withdrawn only after the journal has recorded it. If the broker were
 /// killed in between, the next one would treat the report as present.
 #[test]
-fn nothing_is_taken_back_that_the_journal_knows_to_be_there() {
+fn withdrawal_is_sent_only_after_journal_entry() {
     let mut requests = Requests::new(true);
     let (session, _) = requests.join();
     let actions = requests.vanish_unrecorded();
@@ -207,7 +207,7 @@ fn nothing_is_taken_back_that_the_journal_knows_to_be_there() {
 }
 
 #[test]
-fn what_a_reporter_has_is_not_sent_to_it_again() {
+fn reporter_is_not_sent_known_result_again() {
     for has in [true, false] {
         let mut requests = Requests::new(has);
         let path = requests.path.clone();
@@ -219,7 +219,7 @@ fn what_a_reporter_has_is_not_sent_to_it_again() {
 }
 
 #[test]
-fn a_reporter_that_is_away_is_told_when_it_comes() {
+fn missing_reporter_gets_withdrawal_when_it_joins() {
     let mut requests = Requests::new(true);
     assert!(!is_told(&requests.vanish()));
     let (_, actions) = requests.join();
@@ -227,7 +227,7 @@ fn a_reporter_that_is_away_is_told_when_it_comes() {
 }
 
 #[test]
-fn a_reporter_that_dies_before_it_has_done_so_is_told_again() {
+fn killed_reporter_gets_the_withdrawal_again() {
     let mut requests = Requests::new(true);
     let (session, _) = requests.join();
     assert!(is_told(&requests.vanish()));
@@ -240,7 +240,7 @@ fn a_reporter_that_dies_before_it_has_done_so_is_told_again() {
 }
 
 #[test]
-fn a_result_under_way_is_not_sent_after_its_file_has_gone() {
+fn pending_result_is_dropped_when_its_file_vanishes() {
     let mut requests = Requests::new(false);
     let (session, actions) = requests.join();
     let sent = |it: &Action| matches!(it, Action::Deliver { .. });
@@ -251,7 +251,7 @@ fn a_result_under_way_is_not_sent_after_its_file_has_gone() {
 }
 
 #[test]
-fn what_a_former_broker_sent_unheard_is_taken_back_too() {
+fn unacknowledged_result_of_former_broker_is_withdrawn() {
     let mut requests = Requests::new(false);
     let launch = requests.wants(1);
     requests.vanish();
@@ -260,7 +260,7 @@ fn what_a_former_broker_sent_unheard_is_taken_back_too() {
 }
 
 #[test]
-fn nobody_joins_by_hand_as_a_child() {
+fn child_role_is_refused_without_launch_id() {
     let mut requests = Requests::new(false);
     let launch = requests.wants(1);
     let is_refused = |actions: &[Action]| {
@@ -276,7 +276,7 @@ fn nobody_joins_by_hand_as_a_child() {
 }
 
 #[test]
-fn what_the_journal_remembers_is_said_after_a_restart() {
+fn journalled_withdrawal_is_sent_after_restart() {
     let mut requests = Requests::new(false);
     let gone: Arc<Path> = Path::new("/x/gone.xodr").into();
     requests.state.remember_void(&gone, TEXT);
@@ -286,7 +286,7 @@ fn what_the_journal_remembers_is_said_after_a_restart() {
 }
 
 #[test]
-fn a_newer_result_waits_until_the_one_before_it_has_arrived() {
+fn newer_result_waits_for_previous_acknowledgement() {
     let mut requests = Requests::new(false);
     let (session, actions) = requests.join();
     let sent = |actions: &[Action]| {
@@ -313,7 +313,7 @@ fn a_newer_result_waits_until_the_one_before_it_has_arrived() {
 }
 
 #[test]
-fn a_reporter_that_is_upgraded_finishes_what_it_has_begun() {
+fn upgraded_reporter_finishes_pending_results() {
     // The reporter leaves as requested or is killed meanwhile. The end of the process may be known
     // before the end of its session.
     let leaves: fn(&mut Requests, SessionId, Launch) -> Vec<Action> =
@@ -388,7 +388,7 @@ fn written(job: u64) -> FromPeer {
 }
 
 #[test]
-fn results_with_many_findings_travel_one_after_the_other() {
+fn results_with_many_findings_are_sent_in_turn() {
     let mut requests = Requests::new(true);
     more(&mut requests, &[1_500, 500, 1, 3_000, 1]);
     let (session, actions) = requests.join();
@@ -402,7 +402,7 @@ fn results_with_many_findings_travel_one_after_the_other() {
 /// Checks the limit for large results, which are read back and kept in memory. There may be many
 /// reporters: a broker with eight of them took 600 MiB while a bundle reported far too much.
 #[test]
-fn few_reporters_have_a_large_result_at_once() {
+fn few_reporters_hold_large_result_at_once() {
     let mut requests = Requests::new(true);
     more(&mut requests, &[3_000]);
     let mut sessions = Vec::new();
@@ -427,7 +427,7 @@ fn few_reporters_have_a_large_result_at_once() {
 }
 
 #[test]
-fn a_reporter_has_no_more_under_way_than_it_said() {
+fn reporter_has_at_most_its_announced_pending_results() {
     let mut requests = Requests::new(true);
     more(&mut requests, &[1; 6]);
     requests.vanish();
@@ -438,7 +438,7 @@ fn a_reporter_has_no_more_under_way_than_it_said() {
 }
 
 #[test]
-fn a_result_under_way_is_not_sent_twice() {
+fn pending_result_is_not_sent_twice() {
     let mut requests = Requests::new(false);
     let path = requests.path.clone();
     requests.event(Event::Present { path });
@@ -451,7 +451,7 @@ fn a_result_under_way_is_not_sent_twice() {
 }
 
 #[test]
-fn a_reporter_that_does_not_leave_at_the_end_is_killed() {
+fn reporter_that_does_not_leave_on_drain_is_killed() {
     let mut requests = Requests::new(true);
     let launch = requests.wants(1);
     requests.join_as(Some(launch.0));
@@ -474,7 +474,7 @@ fn not(mut report: FromPeer, why: &str) -> FromPeer {
 }
 
 #[test]
-fn what_a_reporter_did_and_could_not_do_is_in_its_status() {
+fn reporter_status_counts_written_and_failed_reports() {
     let mut requests = Requests::new(true);
     more(&mut requests, &[1, 1, 1]);
     requests.vanish();
@@ -492,7 +492,7 @@ fn what_a_reporter_did_and_could_not_do_is_in_its_status() {
 }
 
 #[test]
-fn what_one_reporter_has_written_does_not_touch_what_another_has() {
+fn written_report_does_not_affect_other_reporters() {
     let mut requests = Requests::new(false);
     let path = requests.path.clone();
     requests.event(Event::Present { path });
@@ -505,7 +505,7 @@ fn what_one_reporter_has_written_does_not_touch_what_another_has() {
 }
 
 #[test]
-fn a_result_that_cannot_be_read_back_is_said_and_makes_room_for_the_next() {
+fn unreadable_result_is_reported_and_makes_room_for_next() {
     let mut requests = Requests::new(true);
     more(&mut requests, &[3_000, 1]);
     let (session, actions) = requests.join();
@@ -530,7 +530,7 @@ fn named(actions: &[Action]) -> Vec<String> {
 }
 
 #[test]
-fn who_never_had_a_report_is_not_told_that_its_file_has_gone() {
+fn reporter_without_report_gets_no_withdrawal() {
     let mut requests = Requests::new(false);
     requests.state.reporter_index(TEXT);
     assert!(named(&requests.vanish()).is_empty());
@@ -539,7 +539,7 @@ fn who_never_had_a_report_is_not_told_that_its_file_has_gone() {
 }
 
 #[test]
-fn a_file_that_goes_twice_before_its_report_is_taken_back_stays_to_be_taken_back() {
+fn file_that_vanishes_twice_keeps_its_withdrawal() {
     for there in [false, true] {
         let mut requests = Requests::new(true);
         requests.judges_nothing();
@@ -555,7 +555,7 @@ fn a_file_that_goes_twice_before_its_report_is_taken_back_stays_to_be_taken_back
 }
 
 #[test]
-fn a_reporter_that_leaves_goes_without_a_word_and_gets_the_rest_when_it_comes_back() {
+fn leaving_reporter_gets_remaining_results_on_return() {
     let mut requests = Requests::new(false);
     let path = requests.path.clone();
     requests.event(Event::Present { path });
@@ -596,14 +596,14 @@ fn waited(owes: bool, beats: bool, limit: fn(&Settings) -> Duration) -> Vec<bool
 }
 
 #[test]
-fn a_reporter_that_owes_an_answer_is_waited_for_so_long_and_no_longer() {
+fn unacknowledged_reporter_times_out() {
     assert_eq!(waited(true, false, |it| it.silence_limit), [false, true]);
     assert_eq!(waited(true, true, |it| it.job_deadline), [false, true]);
     assert_eq!(waited(false, false, |it| it.job_deadline), [false, false]);
 }
 
 #[test]
-fn a_run_does_not_end_before_every_report_is_written() {
+fn run_ends_only_after_every_report_is_written() {
     let mut requests = Requests::new(false);
     requests.judges_nothing();
     let path = requests.path.clone();
@@ -626,7 +626,7 @@ fn a_run_does_not_end_before_every_report_is_written() {
 }
 
 #[test]
-fn a_reporter_whose_process_has_ended_is_away_at_once() {
+fn reporter_of_ended_process_is_missing_at_once() {
     let mut requests = Requests::new(true);
     let launch = requests.wants(1);
     requests.join_as(Some(launch.0));
@@ -640,7 +640,7 @@ fn a_reporter_whose_process_has_ended_is_away_at_once() {
 }
 
 #[test]
-fn failed_report_is_tried_again_after_a_pause_and_then_the_rest() {
+fn failed_report_is_retried_after_pause_then_the_rest() {
     let mut requests = Requests::new(true);
     more(&mut requests, &[1; 20]);
     let (session, _) = requests.join();
@@ -670,7 +670,7 @@ fn failed_report_is_tried_again_after_a_pause_and_then_the_rest() {
 }
 
 #[test]
-fn result_that_cannot_be_read_back_is_delivered_later() {
+fn unreadable_result_is_delivered_later() {
     let mut requests = Requests::new(false);
     let path = requests.path.clone();
     requests.event(Event::Present { path });
@@ -702,7 +702,7 @@ fn answer(actions: &[Action]) -> Option<&Response> {
 }
 
 #[test]
-fn client_that_waits_for_reports_is_answered_when_every_one_is_written() {
+fn client_is_answered_when_all_reports_are_written() {
     let mut requests = Requests::new(false);
     requests.makes_it_stand();
     let launch = requests.wants(1);
@@ -721,7 +721,7 @@ fn client_that_waits_for_reports_is_answered_when_every_one_is_written() {
 }
 
 #[test]
-fn client_is_told_at_its_timeout_which_report_is_missing_and_why() {
+fn client_timeout_names_missing_report_and_reason() {
     let mut requests = Requests::new(false);
     requests.makes_it_stand();
     let launch = requests.wants(1);
@@ -739,7 +739,7 @@ fn client_is_told_at_its_timeout_which_report_is_missing_and_why() {
 }
 
 #[test]
-fn client_that_waits_for_reports_does_not_wait_where_there_is_no_reporter() {
+fn client_does_not_wait_for_reports_without_reporter() {
     let mut requests = Requests::new(false);
     requests.makes_it_stand();
     let actions = waits(&mut requests, None);
@@ -750,7 +750,7 @@ fn client_that_waits_for_reports_does_not_wait_where_there_is_no_reporter() {
 }
 
 #[test]
-fn client_is_answered_when_the_reporter_that_owes_is_removed() {
+fn client_is_answered_when_owing_reporter_is_removed() {
     let mut requests = Requests::new(false);
     requests.makes_it_stand();
     requests.wants(1);

@@ -164,20 +164,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_jury_that_nobody_knows_is_not_one_without_members() {
+    fn unknown_required_set_differs_from_empty_set() {
         // The empty set is required for a kind of file that no bundle checks.
         assert_ne!(RequiredSet::unknown(), RequiredSet::default());
     }
 
     #[test]
-    fn epochs_go_up_over_every_restart() {
+    fn epochs_increase_over_every_restart() {
         let (first, second) = (Epoch::first_of(1), Epoch::first_of(2));
         assert!(Epoch::default() < first && first < first.next());
         assert!(first.next().next() < second);
     }
 
     #[test]
-    fn whatever_a_bundle_would_judge_otherwise_has_another_mark() {
+    fn every_catalogue_change_changes_the_version_digest() {
         let checker = CheckerInfo {
             id: "one".into(),
             description: "".into(),

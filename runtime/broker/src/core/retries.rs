@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn pauses_double_up_to_a_minute() {
+    fn retry_pauses_double_up_to_a_minute() {
         let mut retries = Retries::default();
         let mut now = Duration::ZERO;
         let mut pauses = Vec::new();
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn few_of_many_are_probed_and_all_are_tried_when_one_succeeds() {
+    fn few_failures_are_probed_and_success_retries_all() {
         let mut retries = Retries::default();
         for file in 0..100 {
             assert!(retries.failed(file, Duration::ZERO, FIRST));
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn fresh_success_does_not_try_what_failed() {
+    fn fresh_success_does_not_retry_failures() {
         let mut retries = Retries::default();
         retries.failed(1, Duration::ZERO, FIRST);
         assert!(retries.written(2).is_empty());
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn rest_is_tried_when_all_probes_have_gone() {
+    fn rest_is_retried_when_all_probes_are_gone() {
         let mut retries = Retries::default();
         for file in 0..=PROBES as FileId {
             retries.failed(file, Duration::ZERO, FIRST);

@@ -199,7 +199,7 @@ proptest! {
     /// has a verdict on its present bytes and those of all its dependencies. No removed file has a
     /// verdict, every waiting client has an answer, and no work is in flight.
     #[test]
-    fn every_file_gets_its_verdict_whatever_happens(steps in steps()) {
+    fn every_file_gets_its_verdict_after_random_steps(steps in steps()) {
         let mut world = World::with_a_reporter();
         for step in &steps {
             world.step(step);
@@ -239,7 +239,7 @@ proptest! {
     /// Checks that a broker always stops once after it is told to, and that every waiting client
     /// gets an answer.
     #[test]
-    fn every_broker_comes_to_its_end(steps in steps()) {
+    fn every_broker_stops_after_random_steps(steps in steps()) {
         let mut world = World::with_a_reporter();
         for step in &steps {
             world.step(step);
@@ -293,7 +293,7 @@ fn judged_world() -> World {
 }
 
 #[test]
-fn a_file_that_has_not_changed_is_not_judged_again() {
+fn unchanged_file_is_not_judged_again() {
     let mut world = judged_world();
     let before = world.stored.len();
     let stamp = stamp(world.there[&path_of(1)]);
@@ -306,7 +306,7 @@ fn a_file_that_has_not_changed_is_not_judged_again() {
 }
 
 #[test]
-fn a_bundle_that_joins_later_judges_old_files_in_the_background() {
+fn late_bundle_judges_old_files_in_background() {
     let mut world = World::new();
     world.join("First");
     world.write(1);
@@ -318,7 +318,7 @@ fn a_bundle_that_joins_later_judges_old_files_in_the_background() {
 }
 
 #[test]
-fn a_pair_that_dies_twice_alone_is_condemned_and_not_tried_again() {
+fn file_that_kills_bundle_twice_alone_is_not_retried() {
     let mut world = World::new();
     world.join("First");
     world.write(1);
@@ -347,7 +347,7 @@ fn a_pair_that_dies_twice_alone_is_condemned_and_not_tried_again() {
 }
 
 #[test]
-fn a_bundle_that_hangs_is_given_up_after_its_deadline() {
+fn hanging_bundle_is_disconnected_after_silence_limit() {
     let mut world = World::new();
     world.join("First");
     world.write(1);
@@ -361,7 +361,7 @@ fn a_bundle_that_hangs_is_given_up_after_its_deadline() {
 }
 
 #[test]
-fn a_killed_bundle_stays_demanded_until_nobody_can_hope_for_it() {
+fn killed_bundle_stays_required_until_absence_limit() {
     let mut world = World::new();
     world.join("First");
     world.write(1);
@@ -375,7 +375,7 @@ fn a_killed_bundle_stays_demanded_until_nobody_can_hope_for_it() {
 }
 
 #[test]
-fn files_are_judged_again_without_a_bundle_that_has_left() {
+fn files_are_judged_again_without_bundle_that_left() {
     let mut world = World::new();
     world.join("First");
     world.join("Second");
@@ -428,7 +428,7 @@ fn world_with_an_unwanted_bundle() -> (World, SessionId) {
 }
 
 #[test]
-fn a_bundle_left_over_from_a_former_broker_takes_no_part() {
+fn stale_bundle_of_former_broker_gets_no_jobs() {
     let (mut world, session) = world_with_an_unwanted_bundle();
     world.write(1);
     world.settle();
@@ -437,7 +437,7 @@ fn a_bundle_left_over_from_a_former_broker_takes_no_part() {
 }
 
 #[test]
-fn a_bundle_that_does_not_go_is_made_to() {
+fn unwanted_bundle_that_stays_is_disconnected() {
     let (mut world, session) = world_with_an_unwanted_bundle();
     world.pass(Duration::from_secs(60));
     assert!(!world.peers.contains_key(&session));
@@ -445,7 +445,7 @@ fn a_bundle_that_does_not_go_is_made_to() {
 }
 
 #[test]
-fn what_a_former_broker_started_and_did_not_come_back_is_killed_once() {
+fn stale_children_are_killed_once() {
     let mut world = World::new();
     world.generation = 2;
     world.state = fresh_state(2, 0);
@@ -471,7 +471,7 @@ fn what_a_former_broker_started_and_did_not_come_back_is_killed_once() {
 }
 
 #[test]
-fn a_cancelled_job_makes_room_for_the_next() {
+fn cancelled_job_makes_room_for_next() {
     let mut world = World::new();
     world.join("First");
     for file in 0..2 {
@@ -495,7 +495,7 @@ fn a_cancelled_job_makes_room_for_the_next() {
 }
 
 #[test]
-fn jobs_wait_while_findings_take_up_the_room() {
+fn jobs_wait_while_findings_exceed_memory_limit() {
     let mut world = World::new();
     world.join("First");
     for file in 0..4 {

@@ -16,7 +16,7 @@ fn spec(command: &str) -> ChildSpec {
 }
 
 #[test]
-fn launches_count_up_within_their_generation_and_tell_what_was_started() {
+fn launches_increase_and_identify_what_was_started() {
     let (one, other) = (spec("one"), spec("other"));
     let mut launch = Launch::first_of(3);
     for number in 0..1000 {
@@ -33,7 +33,7 @@ fn launches_count_up_within_their_generation_and_tell_what_was_started() {
 }
 
 #[test]
-fn only_a_new_time_of_change_is_told_from_any_other_difference() {
+fn touched_stamp_differs_in_ctime_only() {
     let stamp = Stamp {
         size: 1,
         mtime_ns: 2,
@@ -62,7 +62,7 @@ fn only_a_new_time_of_change_is_told_from_any_other_difference() {
 }
 
 #[test]
-fn a_notice_tells_whom_it_is_about() {
+fn notice_names_the_affected_peer() {
     let name = "Child".to_owned();
     let why = "it crashed".to_owned();
     assert_eq!(Notice::Ended { name, why }.about(), Some("Child"));

@@ -559,7 +559,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn time_in_which_the_broker_stands_still_does_not_pass() {
+    fn time_while_broker_is_suspended_does_not_count() {
         let mut clock = AttendedTime::new();
         let start = clock.last;
         let at = |millis| start + Duration::from_millis(millis);

@@ -145,7 +145,7 @@ fn names(all: &[&str]) -> BTreeSet<String> {
 }
 
 #[test]
-fn a_file_comes_with_what_it_needs_and_goes_before_it() {
+fn file_is_published_with_dependencies_and_removed_before_them() {
     let bench = Bench::new(Outside::Name);
     bench.accept("t.xosc");
     bench.accept("s.xosc");
@@ -175,7 +175,7 @@ fn a_file_comes_with_what_it_needs_and_goes_before_it() {
 }
 
 #[test]
-fn a_part_that_changes_takes_all_that_rests_on_it_with_it() {
+fn changed_part_withdraws_all_dependents() {
     let bench = Bench::new(Outside::Name);
     for name in ["a.xodr", "b.xodr", "s.xosc"] {
         bench.accept(name);
@@ -195,7 +195,7 @@ fn a_part_that_changes_takes_all_that_rests_on_it_with_it() {
 }
 
 #[test]
-fn other_bytes_than_the_accepted_ones_are_not_published() {
+fn bytes_other_than_accepted_are_not_published() {
     let bench = Bench::new(Outside::Name);
     for changed in ["a.xodr", "part.xml"] {
         let judged = bench.judged("a.xodr");
@@ -220,7 +220,7 @@ fn files_that_refer_to_each_other_are_published_together() {
 }
 
 #[test]
-fn what_lies_outside_is_named_or_refused() {
+fn input_outside_gate_root_is_named_or_refused() {
     for outside in [Outside::Name, Outside::Refuse] {
         let bench = Bench::new(outside);
         let mut judged = bench.judged("b.xodr");
@@ -249,7 +249,7 @@ fn what_lies_outside_is_named_or_refused() {
 
 /// There are no links behind the gate. The same path leads to another file there, or to none.
 #[test]
-fn what_is_found_by_the_parent_of_a_link_is_not_published() {
+fn file_reached_through_parent_of_link_is_not_published() {
     let bench = Bench::new(Outside::Name);
     let far = bench.dir.path().join("far");
     std::fs::create_dir_all(far.join("deep")).unwrap();
@@ -264,7 +264,7 @@ fn what_is_found_by_the_parent_of_a_link_is_not_published() {
 }
 
 #[test]
-fn an_ignored_file_comes_along_until_it_gets_a_verdict() {
+fn ignored_file_is_published_along_until_it_has_verdict() {
     let bench = Bench::new(Outside::Name);
     bench.write("ignored.xodr", "1");
     let inputs = vec![bench.input("s.xosc"), bench.input("ignored.xodr")];
@@ -278,7 +278,7 @@ fn an_ignored_file_comes_along_until_it_gets_a_verdict() {
 }
 
 #[test]
-fn a_start_keeps_what_stands_and_removes_the_rest() {
+fn start_keeps_valid_publications_and_removes_the_rest() {
     let bench = Bench::new(Outside::Name);
     for name in ["a.xodr", "b.xodr", "s.xosc", "t.xosc"] {
         bench.accept(name);
@@ -311,7 +311,7 @@ fn a_start_keeps_what_stands_and_removes_the_rest() {
 }
 
 #[test]
-fn a_directory_of_others_is_no_gate() {
+fn foreign_directory_is_refused_as_gate() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("precious"), "").unwrap();
     assert!(matches!(
@@ -323,7 +323,7 @@ fn a_directory_of_others_is_no_gate() {
 }
 
 #[test]
-fn gate_whose_file_is_removed_gets_it_back_and_another_directory_does_not() {
+fn gate_file_is_restored_only_in_own_directory() {
     let bench = Bench::new(Outside::Name);
     bench.accept("a.xodr");
     let directory = &bench.gate.options.directory;
@@ -416,7 +416,7 @@ fn faults(bench: &Bench, model: &Model) -> Vec<String> {
     let mut faults = Vec::new();
     for name in behind.iter().filter(|it| *it != "part.xml") {
         let Some(publication) = model.get(name) else {
-            faults.push(format!("{name} has no claim"));
+            faults.push(format!("{name} has no publication"));
             continue;
         };
         for (part, bytes) in publication {
@@ -456,7 +456,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
 
     #[test]
-    fn nothing_is_ever_there_without_all_its_parts(
+    fn nothing_is_published_without_all_its_parts(
         steps in proptest::collection::vec(step(), 1..40)
     ) {
         let bench = Bench::new(Outside::Name);
@@ -479,7 +479,7 @@ proptest! {
 }
 
 #[test]
-fn claims_on_different_bytes_of_one_file_wait_for_a_verdict() {
+fn publications_of_different_bytes_wait_for_verdict() {
     let bench = Bench::new(Outside::Name);
     bench.accept("a.xodr");
     bench.write("part.xml", "2");
@@ -498,7 +498,7 @@ fn claims_on_different_bytes_of_one_file_wait_for_a_verdict() {
 }
 
 #[test]
-fn many_threads_neither_block_each_other_nor_leave_holes() {
+fn concurrent_publications_neither_block_nor_leave_gaps() {
     let bench = Bench::new(Outside::Name);
     std::thread::scope(|scope| {
         for thread in 0..8 {

@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_becomes_of_a_linked_file_never_makes_the_root_vanish() {
+    fn failure_of_linked_file_never_removes_the_root() {
         let path = Path::new("/farm/map.xodr");
         let of = |failure: Failure| failure.of_linked(path);
         let unsettled = IngestError::Unsettled {
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn what_never_fits_is_not_waited_for() {
+    fn file_that_never_fits_is_not_retried() {
         let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"));
         let never = || {
             Failure::Loan(LoanError::NeverFits {
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_bus_does_not_take_now_is_tried_again() {
+    fn refusal_by_bus_is_retried() {
         let path = Path::new("/farm/map.xodr");
         let refused = || Failure::Publish("no subscriber slot".to_owned());
         let linked = refused().of_linked(path);

@@ -80,7 +80,7 @@ impl Farm {
 }
 
 #[tokio::test]
-async fn scenarios_on_one_map_share_its_image_as_long_as_its_bytes_are_the_same() {
+async fn scenarios_share_map_image_while_bytes_are_unchanged() {
     let farm = Farm::new();
     farm.put("town.xodr", MAP);
     farm.scenario("a.xosc", "town.xodr");
@@ -92,7 +92,7 @@ async fn scenarios_on_one_map_share_its_image_as_long_as_its_bytes_are_the_same(
 }
 
 #[tokio::test]
-async fn a_map_changed_in_place_a_moment_later_is_read_anew() {
+async fn map_changed_in_place_is_read_again() {
     let farm = Farm::new();
     farm.put("town.xodr", MAP);
     farm.scenario("a.xosc", "town.xodr");
@@ -117,7 +117,7 @@ async fn a_map_changed_in_place_a_moment_later_is_read_anew() {
 }
 
 #[tokio::test]
-async fn a_map_replaced_by_another_of_its_size_and_time_is_read_anew() {
+async fn replaced_map_of_equal_size_and_time_is_reread() {
     let farm = Farm::new();
     let long_ago = SystemTime::now() - Duration::from_secs(3600);
     let put_old = |name: &str, bytes: &[u8]| {
@@ -151,7 +151,7 @@ async fn equal_maps_at_two_paths_are_two_documents() {
 }
 
 #[tokio::test]
-async fn a_map_whose_include_changes_is_another_document() {
+async fn map_with_changed_include_is_new_document() {
     let farm = Farm::new();
     farm.put(
         "town.xodr",
@@ -169,7 +169,7 @@ async fn a_map_whose_include_changes_is_another_document() {
 
 /// The stamp of a young map proves nothing yet: a second write may leave it unchanged.
 #[tokio::test]
-async fn a_young_map_is_read_again_for_whoever_asks_after_it_was_read() {
+async fn young_map_is_read_again_for_later_requests() {
     let farm = Farm::new();
     farm.put("town.xodr", MAP);
     farm.scenario("a.xosc", "town.xodr");
@@ -185,7 +185,7 @@ async fn a_young_map_is_read_again_for_whoever_asks_after_it_was_read() {
 }
 
 #[tokio::test]
-async fn a_map_that_many_need_at_once_is_published_once() {
+async fn map_needed_concurrently_is_published_once() {
     let farm = Farm::new();
     farm.put("town.xodr", MAP);
     let asked = Instant::now();
@@ -205,7 +205,7 @@ async fn a_map_that_many_need_at_once_is_published_once() {
 }
 
 #[tokio::test]
-async fn a_map_that_was_not_there_is_found_when_it_comes() {
+async fn missing_map_is_found_when_it_appears() {
     let farm = Farm::new();
     farm.scenario("a.xosc", "town.xodr");
     let missing = farm.prepare("a.xosc", Instant::now()).missing;
@@ -218,7 +218,7 @@ async fn a_map_that_was_not_there_is_found_when_it_comes() {
 }
 
 #[tokio::test]
-async fn what_is_only_kept_makes_room_for_what_is_needed() {
+async fn cached_documents_make_room_for_needed_ones() {
     let farm = Farm::with(HostOptions {
         active_documents: 4,
         ..HostOptions::default()
@@ -253,7 +253,7 @@ fn depends_on(prepared: &PreparedJob, path: &Path) -> bool {
 }
 
 #[tokio::test]
-async fn a_modular_scenario_brings_its_library_and_what_it_expands_to() {
+async fn modular_scenario_includes_library_and_expansion() {
     use DocumentRole::{Expanded, Listing, Root, Scenario};
     let farm = Farm::new();
     farm.put("main.xosc", &modular("library.xosc"));
@@ -288,7 +288,7 @@ async fn a_modular_scenario_brings_its_library_and_what_it_expands_to() {
 }
 
 #[tokio::test]
-async fn the_search_path_is_looked_through_and_awaited() {
+async fn search_path_is_searched_and_watched() {
     let farm = Farm::new();
     farm.put("main.xosc", &modular("library.xosc"));
     let search = SearchPath::parse("far;near".as_ref(), farm.dir.path());

@@ -26,7 +26,7 @@ CREATE TABLE IF NOT EXISTS files (
     rests_on TEXT NOT NULL DEFAULT ''    -- JSON list of [path, digest, verdict or null, errors]; empty: not known
 ) WITHOUT ROWID;
 
--- The roster: the bundles that must judge until somebody removes them, whether they are there or not.
+-- The registry: the bundles that must judge until they are removed, whether they are running or not.
 CREATE TABLE IF NOT EXISTS members (
     name      TEXT PRIMARY KEY,
     version   TEXT NOT NULL,        -- that joined last

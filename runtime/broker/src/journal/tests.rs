@@ -56,7 +56,7 @@ fn judged(job: u64) -> Judged {
 }
 
 #[test]
-fn what_was_written_is_remembered() {
+fn written_entries_are_remembered() {
     let dir = tempfile::tempdir().unwrap();
     let path: Arc<Path> = Path::new("/a.xosc").into();
     let expected = Arc::new(judged(5));
@@ -117,7 +117,7 @@ fn what_was_written_is_remembered() {
 }
 
 #[test]
-fn a_journal_of_schema_1_opens_and_its_stamps_fit_nothing() {
+fn journal_of_schema_1_opens_with_stale_stamps() {
     let dir = tempfile::tempdir().unwrap();
     let path: Arc<Path> = Path::new("/a.xosc").into();
     let written = judged(5);
@@ -170,7 +170,7 @@ fn a_journal_of_schema_1_opens_and_its_stamps_fit_nothing() {
 }
 
 #[test]
-fn what_was_not_read_and_what_has_no_result_are_remembered_so() {
+fn unread_inputs_and_missing_results_are_remembered() {
     let path: Arc<Path> = Path::new("/a.xosc").into();
     let mut expected = judged(5);
     expected.xqar = None;
@@ -205,7 +205,7 @@ fn what_was_not_read_and_what_has_no_result_are_remembered_so() {
 }
 
 #[test]
-fn who_must_judge_is_remembered_until_struck() {
+fn required_bundle_is_remembered_until_removed() {
     let dir = tempfile::tempdir().unwrap();
     let catalogue = Catalogue {
         alias: "mine".to_owned(),
@@ -234,7 +234,7 @@ fn who_must_judge_is_remembered_until_struck() {
 }
 
 #[test]
-fn a_broken_journal_says_so_and_what_to_do() {
+fn broken_journal_is_reported_with_remedy() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(
         dir.path().join("journal.sqlite"),
@@ -247,7 +247,7 @@ fn a_broken_journal_says_so_and_what_to_do() {
 }
 
 #[test]
-fn a_newer_journal_is_left_alone() {
+fn journal_of_newer_schema_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     drop(Journal::open(dir.path(), "test").unwrap());
     let connection = Connection::open(dir.path().join("journal.sqlite")).unwrap();

@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn removed_changed_and_replaced_outputs_are_told_once() {
+    fn removed_changed_and_replaced_outputs_are_reported_once() {
         let place = WrittenDir::new();
         let output = place.write("sub/a.xqar");
         assert!(!place.outputs.is_lost(&output));
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn outputs_below_a_directory_that_goes_are_told() {
+    fn outputs_below_moved_directory_are_reported() {
         let place = WrittenDir::new();
         let output = place.write("one/two/a.xqar");
         place.write("one/b.xqar");
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn output_that_the_broker_changes_itself_is_not_lost() {
+    fn output_changed_by_broker_is_not_lost() {
         let place = WrittenDir::new();
         let output = place.write("a.xqar");
         place.outputs.changing(&output);
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn output_that_was_lost_before_its_directory_is_watched_is_told() {
+    fn output_lost_before_watching_is_reported() {
         let outputs = Outputs::kept().unwrap();
         let dir = tempfile::tempdir().unwrap();
         let output = dir.path().join("a.xqar");

@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn words_are_the_shells() {
+    fn command_words_are_split_like_in_shell() {
         let list: &[(&str, &[&str])] = &[
             ("/opt/run --x 7", &["/opt/run", "--x", "7"]),
             (" '/opt/my run' \"a b\"c\\ d ", &["/opt/my run", "a bc d"]),
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn a_program_is_started_from_where_it_was_found() {
+    fn program_is_started_by_its_found_path() {
         let ready = |command: &str| ready(&shell_command(command));
         let shell = find("sh").unwrap();
         let words = ready("sh -c 'exit 3' x").unwrap();
@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn the_files_of_a_command_are_its_program_and_its_script() {
+    fn files_of_command_are_its_program_and_script() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
         std::fs::write(at("rules.py"), "pass").unwrap();
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn a_program_or_script_that_others_may_write_is_not_started() {
+    fn program_writable_by_others_is_not_started() {
         use std::os::unix::fs::PermissionsExt;
         let dir = tempfile::tempdir().unwrap();
         let script = dir.path().join("it's a script");

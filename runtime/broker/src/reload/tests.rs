@@ -51,7 +51,7 @@ fn manifest(name: &str, mode: &str) -> String {
 const CONFIG: &str = "<Config>\n  <CheckerBundle application=\"xodrBundle\"/>\n</Config>\n";
 
 #[test]
-fn a_start_reads_the_configuration_and_every_manifest() {
+fn start_reads_configuration_and_every_manifest() {
     let dir = tempfile::tempdir().unwrap();
     let mine = manifest("mine", "bus");
     let theirs = manifest("theirs", "once").replace("checker_bundle", "report_module");
@@ -69,7 +69,7 @@ fn a_start_reads_the_configuration_and_every_manifest() {
 }
 
 #[test]
-fn what_cannot_be_read_is_refused_as_a_whole() {
+fn unreadable_configuration_is_refused_as_a_whole() {
     let dir = tempfile::tempdir().unwrap();
     put(dir.path(), "<Config>", &[]);
     assert!(matches!(
@@ -84,7 +84,7 @@ fn what_cannot_be_read_is_refused_as_a_whole() {
 }
 
 #[test]
-fn what_has_changed_is_told_line_by_line() {
+fn changes_are_listed_line_by_line() {
     let dir = tempfile::tempdir().unwrap();
     let sources = sources(dir.path());
     let (mine, yours) = (manifest("mine", "bus"), manifest("yours", "bus"));
@@ -107,7 +107,7 @@ fn what_has_changed_is_told_line_by_line() {
 }
 
 #[test]
-fn who_names_nothing_any_more_demands_everything() {
+fn configuration_without_names_requires_everything() {
     let dir = tempfile::tempdir().unwrap();
     let sources = sources(dir.path());
     let chosen = "<Config>\n  <CheckerBundle application=\"xodrBundle\">\n    \
@@ -131,7 +131,7 @@ fn who_names_nothing_any_more_demands_everything() {
 }
 
 #[test]
-fn a_manifest_that_another_lists_is_looked_at_too() {
+fn manifest_listed_by_another_is_watched() {
     let dir = tempfile::tempdir().unwrap();
     let sources = sources(dir.path());
     let listed = dir.path().join("mine.manifest");
@@ -146,7 +146,7 @@ fn a_manifest_that_another_lists_is_looked_at_too() {
 }
 
 #[test]
-fn a_program_that_was_replaced_is_another_child() {
+fn child_with_replaced_program_counts_as_changed() {
     let dir = tempfile::tempdir().unwrap();
     let sources = sources(dir.path());
     let program = dir.path().join("mine");
@@ -176,7 +176,7 @@ fn a_program_that_was_replaced_is_another_child() {
 }
 
 #[test]
-fn a_directory_of_manifests_that_is_away_takes_no_bundle_along() {
+fn missing_manifest_directory_removes_no_bundle() {
     let dir = tempfile::tempdir().unwrap();
     let sources = sources(dir.path());
     let (bundles_d, aside) = (dir.path().join("bundles.d"), dir.path().join("aside"));
@@ -198,7 +198,7 @@ fn a_directory_of_manifests_that_is_away_takes_no_bundle_along() {
 }
 
 #[test]
-fn a_name_is_not_taken_twice() {
+fn duplicate_or_reserved_name_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let sources = sources(dir.path());
     let (mine, standard) = (manifest("mine", "bus"), manifest("xodrBundle", "bus"));
@@ -216,7 +216,7 @@ fn a_name_is_not_taken_twice() {
 }
 
 #[test]
-fn what_looks_like_a_manifest_and_is_none_is_said() {
+fn file_that_only_resembles_manifest_is_reported() {
     let dir = tempfile::tempdir().unwrap();
     let mine = manifest("mine", "bus");
     put(dir.path(), CONFIG, &[("mine.JSON", &mine), (".hidden", "")]);
@@ -232,7 +232,7 @@ fn what_looks_like_a_manifest_and_is_none_is_said() {
 }
 
 #[test]
-fn a_bundle_that_cannot_be_asked_is_refused() {
+fn bundle_without_bus_mode_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let once = manifest("mine", "once");
     put(dir.path(), CONFIG, &[("a.json", &once)]);

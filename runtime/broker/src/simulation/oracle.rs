@@ -181,7 +181,7 @@ impl World {
         if let Some(file) = open {
             let name = FILES[file];
             self.wrong(format!(
-                "{name} is doubted, nobody is at work, and it is behind the gate"
+                "{name} is stale, nobody is at work, and it is behind the gate"
             ));
         }
     }

@@ -59,7 +59,7 @@ fn report(seed: u64, wrong: &Wrong) -> String {
 }
 
 #[test]
-fn whatever_comes_in_whatever_order_all_pieces_agree_in_the_end() {
+fn all_parts_agree_after_any_event_order() {
     if let Some(seed) = number("QCBUS_SIM_SEED") {
         let played = on_stage(|stage| play(stage, seed, true));
         let (lines, what) = match played {
@@ -132,7 +132,7 @@ fn play_many(
 }
 
 #[test]
-fn a_seed_gives_the_same_schedule_every_time() {
+fn seed_gives_same_schedule_every_time() {
     on_stage(|stage| {
         for seed in 1..20 {
             let once = play(stage, seed, true).map_err(|it| it.what).unwrap();

@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reports_are_removed_if_they_are_ours() {
+    fn only_own_reports_are_removed() {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
         let ours = format!(

@@ -48,7 +48,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_read_is_told_from_what_is_there() {
+    fn input_is_refreshed_only_if_bytes_are_unchanged() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.xodr");
         rewrite(&path, b"one");

@@ -41,7 +41,7 @@ async fn end(inbox: &mut UnboundedReceiver<Event>) -> (Launch, ChildEnd) {
 }
 
 #[tokio::test]
-async fn how_a_child_ends_is_told() {
+async fn end_of_child_is_classified() {
     let (mut children, mut inbox) = children();
     type Told = fn(&ChildEnd) -> bool;
     let not_started: Told = |it| matches!(it, ChildEnd::NotStarted(_));
@@ -70,7 +70,7 @@ async fn how_a_child_ends_is_told() {
 
 /// A program may end before its handle is opened, for example on a busy machine.
 #[tokio::test]
-async fn child_that_ends_at_once_is_no_orphan() {
+async fn child_that_ends_at_once_still_counts_as_own() {
     let (mut children, mut inbox) = children();
     let spec = spec(&["sh", "-c", "exit 3", "sh"]);
     children.start_early(std::slice::from_ref(&spec));
@@ -110,7 +110,7 @@ async fn is_gone(pid: u32) {
 }
 
 #[tokio::test]
-async fn what_was_started_early_is_what_is_asked_for() {
+async fn early_started_process_is_used_when_requested() {
     let (mut children, mut inbox) = children();
     let spec = spec(&["sh", "-c", "exec sleep 1000", "sh"]);
     children.start_early(std::slice::from_ref(&spec));
@@ -125,7 +125,7 @@ async fn what_was_started_early_is_what_is_asked_for() {
 }
 
 #[tokio::test]
-async fn what_was_started_early_and_died_is_noticed() {
+async fn end_of_early_started_child_is_noticed() {
     let (mut children, mut inbox) = children();
     let spec = spec(&["sh", "-c", "exit 3", "sh"]);
     children.start_early(std::slice::from_ref(&spec));
@@ -137,7 +137,7 @@ async fn what_was_started_early_and_died_is_noticed() {
 }
 
 #[tokio::test]
-async fn what_cannot_be_started_early_is_told_when_it_is_asked_for() {
+async fn failed_early_start_is_reported_when_requested() {
     let (mut children, mut inbox) = children();
     let spec = spec(&["/nowhere/at/all"]);
     children.start_early(std::slice::from_ref(&spec));
@@ -149,7 +149,7 @@ async fn what_cannot_be_started_early_is_told_when_it_is_asked_for() {
 }
 
 #[tokio::test]
-async fn what_was_started_early_for_nothing_ends() {
+async fn unused_early_started_process_is_ended() {
     let (mut children, _inbox) = children();
     let spec = spec(&["sh", "-c", "exec sleep 1000", "sh"]);
     children.start_early(std::slice::from_ref(&spec));
@@ -161,7 +161,7 @@ async fn what_was_started_early_for_nothing_ends() {
 }
 
 #[tokio::test]
-async fn a_child_is_killed_with_what_it_has_started() {
+async fn child_is_killed_with_its_descendants() {
     let (mut children, mut inbox) = children();
     let dir = tempfile::tempdir().unwrap();
     let pid = dir.path().join("pid");
@@ -196,7 +196,7 @@ async fn a_child_is_killed_with_what_it_has_started() {
 }
 
 #[tokio::test]
-async fn only_what_a_broker_has_started_is_believed_and_killed() {
+async fn only_proven_children_are_accepted_and_killed() {
     let (mut children, mut inbox) = children();
     let start = || {
         let mut command = std::process::Command::new("sleep");

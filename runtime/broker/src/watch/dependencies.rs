@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn what_came_was_read_and_went_before_it_was_looked_at_is_told() {
+    fn dependency_removed_before_first_look_is_reported() {
         let (_dir, root) = farm();
         let part = shared(&root.join("part.xml"));
         let mut all = Dependencies::default();
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn events_tell_of_plain_files_alone() {
+    fn events_are_relied_on_only_for_plain_files() {
         let ((_dir, root), (_other, outside)) = (farm(), farm());
         std::fs::write(root.join("view.xml"), "").unwrap();
         std::fs::write(outside.join("map.xodr"), "").unwrap();
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_is_found_whether_events_should_have_told_or_not() {
+    fn dependency_change_is_found_with_or_without_events() {
         let (_dir, root) = farm();
         let (map, view) = (root.join("map.xodr"), root.join("view.xml"));
         std::fs::write(&view, "").unwrap();
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn all_of_which_events_tell_have_their_turn_and_few_at_once() {
+    fn event_covered_dependencies_are_checked_in_turns() {
         let (_dir, root) = farm();
         let paths: Vec<Arc<Path>> = (0..TURNS * 3)
             .map(|number| shared(&root.join(format!("{number}.xodr"))))
@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nothing_depends_on_any_more_is_not_looked_at() {
+    fn unneeded_dependency_is_not_checked() {
         let (_dir, root) = farm();
         let (map, view) = (shared(&root.join("map.xodr")), shared(&root.join("v.xml")));
         let mut all = Dependencies::default();
@@ -301,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn without_events_all_are_looked_at() {
+    fn all_dependencies_are_polled_without_events() {
         let (_dir, root) = farm();
         let view = shared(&root.join("view.xml"));
         let mut all = Dependencies::default();

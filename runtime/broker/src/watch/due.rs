@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn who_comes_again_and_again_waits_behind_the_others() {
+    fn repeatedly_pushed_directory_waits_behind_others() {
         let mut due = Due::new(Instant::now());
         for name in ["a", "b", "a", "a", "c"] {
             due.push(Path::new(name));
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pass_and_what_events_tell_take_turns() {
+    fn full_pass_and_events_take_turns() {
         let now = Instant::now();
         let mut due = Due::new(now);
         assert_eq!(due.next_pass(), Some(now));

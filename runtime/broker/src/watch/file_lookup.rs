@@ -200,7 +200,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_link_is_what_it_leads_to() {
+    fn link_is_classified_by_its_target() {
         let (inside, outside) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let root = inside.path().canonicalize().unwrap();
         let outside = outside.path().canonicalize().unwrap();

@@ -189,7 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_unfinished_copies_are_left_alone() {
+    fn unfinished_copies_are_ignored() {
         for name in [
             ".a.xodr",
             "a.xodr~",
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn hidden_directories_below_the_root_are_passed_over() {
+    fn hidden_directories_below_the_root_are_ignored() {
         let mut rules = IgnoreRules::new(Path::new("/home/.farm"));
         for path in [".git", "out/.qcbus", ".~tmp~", "cm/..2026_01", ".a/b"] {
             let directory = Path::new("/home/.farm").join(path);
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn hidden_directory_is_looked_into_when_a_rule_names_it() {
+    fn hidden_directory_is_scanned_when_a_rule_names_it() {
         let dir = tempfile::tempdir().unwrap();
         let root = dir.path();
         std::fs::create_dir_all(root.join("maps")).unwrap();
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn qcignore_speaks_gitignore_and_the_nearest_file_decides() {
+    fn qcignore_follows_gitignore_and_nearest_file_wins() {
         let dir = tempfile::tempdir().unwrap();
         let root = dir.path();
         std::fs::create_dir(root.join("maps")).unwrap();
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn file_is_excluded_by_rules_of_any_directory_above_and_not_by_its_name() {
+    fn file_is_excluded_by_rules_of_any_parent_directory() {
         let dir = tempfile::tempdir().unwrap();
         let root = dir.path();
         let deep = root.join("vendor/.hidden");
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rules_of_a_directory_go_with_it() {
+    fn rules_of_a_replaced_directory_are_dropped() {
         let dir = tempfile::tempdir().unwrap();
         let (old, beside) = (dir.path().join("maps"), dir.path().join("other"));
         for directory in [&old, &beside] {

@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_are_found_as_long_as_they_are_open_for_writing() {
+    fn files_open_for_writing_are_found() {
         let dir = tempfile::tempdir().unwrap();
         let root = dir.path().canonicalize().unwrap();
         let (path, link) = (root.join("a.xodr"), root.join("link"));

@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn looking_often_does_not_keep_a_file_from_settling() {
+    fn frequent_scans_do_not_delay_settling() {
         let start = NOW();
         let mut settling = Settling::default();
         settling.seen(path(), stamp(1), start);
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_grows_is_not_settled_and_said_once_to_wait() {
+    fn growing_file_is_reported_once_as_waiting() {
         let start = NOW();
         let mut settling = Settling::default();
         settling.touched(path(), Some(stamp(1)), start);
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn written_file_waits_for_its_close_and_no_longer_than_the_limit() {
+    fn written_file_waits_for_its_close_within_the_limit() {
         let start = NOW();
         let mut settling = Settling::default();
         settling.written(path(), Some(stamp(1)), start);
@@ -301,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn file_that_others_have_open_is_asked_about_again() {
+    fn file_open_in_another_process_is_checked_again() {
         let start = NOW();
         let mut settling = Settling::default();
         settling.seen(path(), stamp(1), start);
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn files_are_told_of_in_order() {
+    fn files_are_reported_in_order() {
         let start = NOW();
         let names: Vec<PathBuf> = (0..20).map(|it| format!("/{it:02}.xodr").into()).collect();
         let mut settling = Settling::default();
@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn time_that_is_asked_for_counts_after_a_close_too() {
+    fn requested_settle_time_also_counts_after_a_close() {
         let start = NOW();
         let rest = Duration::from_secs(30);
         let mut settling = Settling::new(Some(rest));
@@ -352,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn after_lost_events_the_close_may_have_been_among_them() {
+    fn lost_events_may_include_the_close() {
         let start = NOW();
         let mut settling = Settling::default();
         settling.written(path(), Some(stamp(1)), start);

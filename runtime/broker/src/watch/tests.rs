@@ -55,7 +55,7 @@ fn settle(scanner: &mut Scanner) {
 }
 
 #[test]
-fn a_file_behind_a_link_is_seen_through_all_that_happens_to_it() {
+fn every_change_of_a_linked_file_is_noticed() {
     let ((_dir, root), (_other, outside)) = (farm(), farm());
     let (link, target) = (root.join("a.xodr"), outside.join("target"));
     std::fs::write(&target, "one").unwrap();
@@ -94,7 +94,7 @@ fn a_file_behind_a_link_is_seen_through_all_that_happens_to_it() {
 }
 
 #[test]
-fn what_cannot_be_looked_at_is_said_once_and_when_it_can_be() {
+fn unseen_entries_are_reported_once_and_when_seen_again() {
     let ((_dir, root), (_other, outside)) = (farm(), farm());
     symlink(&outside, root.join("maps")).unwrap();
     symlink(root.join("loop"), root.join("loop")).unwrap();
@@ -118,7 +118,7 @@ fn what_cannot_be_looked_at_is_said_once_and_when_it_can_be() {
 }
 
 #[test]
-fn link_in_place_of_a_directory_is_named_as_long_as_it_is_there() {
+fn unseen_directory_link_is_reported_once() {
     let ((_dir, root), (_other, outside)) = (farm(), farm());
     symlink(&outside, root.join("maps")).unwrap();
     let (mut scanner, told) = scanner(&root);
@@ -129,7 +129,7 @@ fn link_in_place_of_a_directory_is_named_as_long_as_it_is_there() {
 }
 
 #[test]
-fn what_the_first_look_sees_is_there_before_it_has_settled() {
+fn file_of_the_first_scan_is_present_before_settling() {
     let (_dir, root) = farm();
     std::fs::write(root.join("young.xodr"), "").unwrap();
     let (mut scanner, told) = scanner(&root);
@@ -143,7 +143,7 @@ fn what_the_first_look_sees_is_there_before_it_has_settled() {
 }
 
 #[test]
-fn a_directory_that_becomes_a_link_to_another_takes_its_files_with_it() {
+fn directory_replaced_by_a_link_loses_its_files() {
     let ((_dir, root), (_other, outside)) = (farm(), farm());
     for directory in [&root, &outside] {
         std::fs::create_dir(directory.join("maps")).unwrap();
@@ -168,7 +168,7 @@ fn vanished(told: &Receiver<Seen>) -> Vec<PathBuf> {
 }
 
 #[test]
-fn a_file_that_cannot_be_looked_at_has_not_gone() {
+fn inaccessible_file_does_not_count_as_removed() {
     let dir = tempfile::tempdir().unwrap();
     let (below, aside) = (dir.path().join("maps"), dir.path().join("aside.d"));
     std::fs::create_dir(&below).unwrap();
@@ -186,7 +186,7 @@ fn a_file_that_cannot_be_looked_at_has_not_gone() {
 }
 
 #[test]
-fn looking_through_everything_reads_the_rules_afresh() {
+fn full_scan_reads_the_ignore_rules_again() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("a.xodr");
     std::fs::write(&file, "").unwrap();
@@ -200,7 +200,7 @@ fn looking_through_everything_reads_the_rules_afresh() {
 }
 
 #[test]
-fn a_young_file_that_goes_before_it_has_settled_is_told() {
+fn unsettled_file_that_is_removed_is_reported() {
     let (_dir, root) = farm();
     let file = root.join("a.xodr");
     std::fs::write(&file, "half of").unwrap();
@@ -213,7 +213,7 @@ fn a_young_file_that_goes_before_it_has_settled_is_told() {
 }
 
 #[test]
-fn what_the_broker_found_gone_is_told_again_if_it_is_there() {
+fn file_missed_by_the_broker_is_reported_again() {
     let (_dir, root) = farm();
     let file = root.join("a.xodr");
     let (mut scanner, told) = scanner(&root);
@@ -236,7 +236,7 @@ fn what_the_broker_found_gone_is_told_again_if_it_is_there() {
 }
 
 #[test]
-fn what_is_no_file_to_check_is_only_told_to_have_become_another() {
+fn ignored_dependency_is_only_reported_as_changed() {
     let (_dir, root) = farm();
     let (ignored, map) = (root.join(IGNORE_FILE), root.join("map.xodr"));
     std::fs::write(&ignored, "map.xodr\n").unwrap();
@@ -249,7 +249,7 @@ fn what_is_no_file_to_check_is_only_told_to_have_become_another() {
 }
 
 #[test]
-fn whoever_asks_for_another_look_is_told_what_is_there_or_has_gone() {
+fn requested_scan_reports_a_present_or_removed_file() {
     let (_dir, root) = farm();
     let path = root.join("a.xodr");
     std::fs::write(&path, "one").unwrap();
@@ -268,7 +268,7 @@ fn whoever_asks_for_another_look_is_told_what_is_there_or_has_gone() {
 }
 
 #[test]
-fn file_without_events_is_told_when_it_is_closed() {
+fn file_without_events_is_reported_when_it_is_closed() {
     let (_dir, root) = farm();
     let path = root.join("a.xodr");
     let writer = std::fs::File::create(&path).unwrap();
@@ -288,7 +288,7 @@ fn file_without_events_is_told_when_it_is_closed() {
 }
 
 #[test]
-fn unfinished_file_that_goes_is_told() {
+fn removed_unfinished_file_is_reported() {
     let (_dir, root) = farm();
     let path = root.join("a.xodr");
     let (mut scanner, told) = scanner(&root);

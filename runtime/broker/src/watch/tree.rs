@@ -226,7 +226,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn children_are_found_once_however_much_lies_below_them() {
+    fn direct_children_are_listed_once() {
         let paths = [
             "a", "a/b", "a/b/c", "a/b/d/e", "a/bc", "a/b-", "a/c/d/e", "b/c", "ab/c",
         ];
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn a_directory_may_have_two_paths_and_loses_them_one_by_one() {
+    fn directory_with_two_paths_loses_them_one_by_one() {
         let dir = tempfile::tempdir().unwrap();
         let (one, two) = (dir.path().join("one"), dir.path().join("two"));
         std::fs::create_dir(&one).unwrap();

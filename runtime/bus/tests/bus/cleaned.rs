@@ -41,7 +41,7 @@ async fn until(host: &mut Host, peer: &mut Peer, mut done: impl FnMut() -> bool)
 }
 
 #[test]
-fn without_current_a_session_goes_on_and_others_can_join_again() {
+fn session_survives_removal_of_the_current_file() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -58,7 +58,7 @@ fn without_current_a_session_goes_on_and_others_can_join_again() {
 }
 
 #[test]
-fn a_runtime_directory_that_was_removed_is_made_again() {
+fn removed_runtime_directory_is_created_again() {
     run(async {
         let site = Site::new();
         let mut host = site.host();

@@ -12,7 +12,7 @@ use crate::support::{
 };
 
 #[test]
-fn a_clean_stop_leaves_nothing() {
+fn clean_stop_leaves_nothing_behind() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -30,7 +30,7 @@ fn a_clean_stop_leaves_nothing() {
 }
 
 #[test]
-fn a_killed_peer_is_gone_and_leaves_nothing() {
+fn killed_peer_is_gone_and_leaves_nothing_behind() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -117,7 +117,7 @@ fn peers_survive_a_killed_broker_and_join_the_next() {
 }
 
 #[test]
-fn a_new_session_voids_the_old_one() {
+fn new_session_discards_the_old_one() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -144,7 +144,7 @@ fn a_new_session_voids_the_old_one() {
 }
 
 #[test]
-fn without_a_new_broker_a_peer_gives_up() {
+fn peer_without_a_new_broker_gives_up() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -154,7 +154,7 @@ fn without_a_new_broker_a_peer_gives_up() {
             grace: Duration::from_millis(100),
             ..PeerOptions::default()
         };
-        let (_, mut peer) = join_with(&mut host, &site, "orphan", options).await;
+        let (_, mut peer) = join_with(&mut host, &site, "leftover", options).await;
         drop(host);
         let event = peer.next().await;
         let PeerEvent::Closed { reason } = event else {
@@ -167,7 +167,7 @@ fn without_a_new_broker_a_peer_gives_up() {
 }
 
 #[test]
-fn what_a_killed_broker_left_is_swept_but_other_instances_are_not() {
+fn only_memory_of_the_killed_broker_is_removed() {
     run(async {
         let (site, neighbour) = (Site::new(), Site::new());
         let mut other = neighbour.host();

@@ -60,7 +60,7 @@ fn messages_arrive_in_order_both_ways() {
 }
 
 #[test]
-fn what_was_sent_before_leaving_arrives() {
+fn messages_sent_before_leaving_arrive() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -90,7 +90,7 @@ fn what_was_sent_before_leaving_arrives() {
 }
 
 #[test]
-fn a_stopped_reader_costs_nobody_else() {
+fn stopped_reader_does_not_affect_other_peers() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -144,7 +144,7 @@ fn a_stopped_reader_costs_nobody_else() {
 }
 
 #[test]
-fn a_flooder_does_not_starve_a_polite_peer() {
+fn flooding_peer_does_not_starve_other_peers() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -174,7 +174,7 @@ fn a_flooder_does_not_starve_a_polite_peer() {
 }
 
 #[test]
-fn disconnecting_a_silent_peer_gives_its_window_back() {
+fn disconnecting_a_silent_peer_frees_its_window() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -203,7 +203,7 @@ fn disconnecting_a_silent_peer_gives_its_window_back() {
 }
 
 #[test]
-fn a_process_has_one_session_at_a_time() {
+fn process_has_one_session_at_a_time() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -247,7 +247,7 @@ fn a_process_has_one_session_at_a_time() {
 }
 
 #[test]
-fn garbage_is_reported_and_harms_nobody() {
+fn garbage_is_reported_and_does_no_harm() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -281,7 +281,7 @@ fn garbage_is_reported_and_harms_nobody() {
 }
 
 #[test]
-fn a_refused_peer_reads_why() {
+fn refused_peer_gets_the_reason() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -300,7 +300,7 @@ fn a_refused_peer_reads_why() {
 }
 
 #[test]
-fn one_peer_too_many_is_told_so() {
+fn peer_above_the_limit_gets_the_reason() {
     run(async {
         let site = Site::new();
         let options = HostOptions {
@@ -323,7 +323,7 @@ fn one_peer_too_many_is_told_so() {
 }
 
 #[test]
-fn without_a_broker_there_is_a_clear_error() {
+fn joining_without_a_broker_gives_a_clear_error() {
     run(async {
         let site = Site::new();
         let options = PeerOptions {
@@ -344,7 +344,7 @@ fn without_a_broker_there_is_a_clear_error() {
 }
 
 #[test]
-fn another_version_is_refused_by_name() {
+fn other_protocol_version_is_refused() {
     run(async {
         let site = Site::new();
         let _host = site.host();
@@ -374,7 +374,7 @@ fn another_version_is_refused_by_name() {
 }
 
 #[test]
-fn a_second_broker_is_refused_and_names_the_first() {
+fn second_broker_is_refused_and_names_the_first() {
     run(async {
         let site = Site::new();
         let _host = site.host();
@@ -388,7 +388,7 @@ fn a_second_broker_is_refused_and_names_the_first() {
 }
 
 #[test]
-fn long_paths_are_no_obstacle() {
+fn long_instance_paths_are_supported() {
     run(async {
         let dir = tempfile::TempDir::new().unwrap();
         let long = dir.path().join("a".repeat(100)).join("b".repeat(80));
@@ -409,7 +409,7 @@ fn long_paths_are_no_obstacle() {
 }
 
 #[test]
-fn the_configuration_reaches_everyone_and_the_latest_wins() {
+fn latest_configuration_reaches_every_peer() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -437,7 +437,7 @@ fn the_configuration_reaches_everyone_and_the_latest_wins() {
 }
 
 #[test]
-fn a_bus_that_expects_no_configuration_still_has_a_small_one() {
+fn bus_without_expected_configuration_carries_a_small_one() {
     run(async {
         let site = Site::new();
         let options = HostOptions {

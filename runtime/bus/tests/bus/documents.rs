@@ -53,7 +53,7 @@ async fn arrival(host: &mut Host, peer: &mut Peer, doc: u64) -> MappedImage {
 }
 
 #[test]
-fn every_size_arrives_and_is_aligned() {
+fn documents_of_every_size_arrive_aligned() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -69,7 +69,7 @@ fn every_size_arrives_and_is_aligned() {
 }
 
 #[test]
-fn a_hundred_megabytes_reach_four_readers_in_place() {
+fn large_document_reaches_four_readers_in_place() {
     if !has_room(400_000_000) {
         return;
     }
@@ -99,7 +99,7 @@ fn a_hundred_megabytes_reach_four_readers_in_place() {
 }
 
 #[test]
-fn readers_have_no_copy() {
+fn readers_share_a_document_without_a_copy() {
     if !has_room(400_000_000) {
         return;
     }
@@ -161,7 +161,7 @@ fn free_shared_memory() -> u64 {
 }
 
 #[test]
-fn who_comes_late_gets_what_is_there() {
+fn late_reader_gets_the_published_documents() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -179,7 +179,7 @@ fn who_comes_late_gets_what_is_there() {
 }
 
 #[test]
-fn what_was_lost_is_published_again() {
+fn lost_document_is_published_again() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -198,7 +198,7 @@ fn what_was_lost_is_published_again() {
 }
 
 #[test]
-fn a_reader_never_runs_out_of_hands() {
+fn reader_never_runs_out_of_permits() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -221,7 +221,7 @@ fn a_reader_never_runs_out_of_hands() {
 }
 
 #[test]
-fn what_a_job_needs_stays_until_it_is_finished_with() {
+fn document_of_a_job_stays_until_forgotten() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -247,7 +247,7 @@ fn what_a_job_needs_stays_until_it_is_finished_with() {
 }
 
 #[test]
-fn no_more_is_held_than_the_slowest_reader_takes() {
+fn held_documents_are_bounded_by_the_slowest_reader() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -271,7 +271,7 @@ fn no_more_is_held_than_the_slowest_reader_takes() {
 }
 
 #[test]
-fn no_more_is_lent_than_there_is() {
+fn loans_are_bounded_by_the_available_memory() {
     run(async {
         let site = Site::new();
         let host = site.host();
@@ -302,7 +302,7 @@ fn no_more_is_lent_than_there_is() {
 }
 
 #[test]
-fn documents_outlive_the_broker_in_the_hands_of_a_reader() {
+fn reader_keeps_documents_after_the_broker_ends() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -320,7 +320,7 @@ fn documents_outlive_the_broker_in_the_hands_of_a_reader() {
 }
 
 #[test]
-fn a_killed_holder_gives_everything_back() {
+fn killed_reader_gives_everything_back() {
     run(async {
         let site = Site::new();
         let options = HostOptions {
@@ -363,7 +363,7 @@ fn a_killed_holder_gives_everything_back() {
 }
 
 #[test]
-fn writing_into_a_document_kills_the_writer_alone() {
+fn writing_into_a_document_kills_only_the_writer() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -391,7 +391,7 @@ fn writing_into_a_document_kills_the_writer_alone() {
 }
 
 #[test]
-fn a_small_shared_memory_is_given_back_and_used_again() {
+fn small_shared_memory_is_released_and_reused() {
     let site = Site::new();
     let role = "lives_in_a_small_memory";
     let Some(mut helper) = Helper::start_in_small_memory(role, &site.instance) else {

@@ -37,7 +37,7 @@ fn lend_more_and_more(documents: &Documents, over: &AtomicBool) {
 }
 
 #[test]
-fn what_others_make_while_a_broker_ends_does_not_stay() {
+fn resources_created_while_a_broker_ends_are_removed() {
     let site = Site::new();
     let mut identities = Vec::new();
     for end in 0..ENDS {

@@ -105,7 +105,7 @@ async fn admit(host: &mut Host) -> PeerId {
 }
 
 #[test]
-fn frames_that_bring_nothing_are_read_in_turns_and_not_for_ever() {
+fn repeated_frames_are_bounded_by_the_receive_budget() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -175,7 +175,7 @@ fn fill(rogue: &Rogue, header: &mut Header) -> u64 {
 }
 
 #[test]
-fn a_turn_reads_a_megabyte_and_the_next_begins_with_another_peer() {
+fn receive_budget_is_a_megabyte_and_rotates_between_peers() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -216,7 +216,7 @@ fn a_turn_reads_a_megabyte_and_the_next_begins_with_another_peer() {
 }
 
 #[test]
-fn a_polite_peer_is_served_beside_one_that_ignores_its_window() {
+fn peer_ignoring_its_window_does_not_delay_others() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -259,7 +259,7 @@ fn a_polite_peer_is_served_beside_one_that_ignores_its_window() {
 }
 
 #[test]
-fn a_frame_larger_than_any_ends_the_stream_unread() {
+fn oversized_frame_ends_the_stream_unread() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -276,7 +276,7 @@ fn a_frame_larger_than_any_ends_the_stream_unread() {
 }
 
 #[test]
-fn what_waits_to_be_fetched_is_bounded_by_bytes() {
+fn unfetched_messages_are_bounded_by_bytes() {
     run(async {
         const FRAMES: usize = 6;
         let site = Site::new();

@@ -14,7 +14,7 @@ const PATIENT: PeerOptions = PeerOptions {
 };
 
 #[tokio::test]
-async fn whose_process_a_peer_is_the_kernel_says() {
+async fn kernel_determines_the_process_of_a_peer() {
     watched(async {
         let site = Site::new();
         let mut host = Host::start(&site.instance, HostOptions::default()).unwrap();
@@ -41,7 +41,7 @@ async fn whose_process_a_peer_is_the_kernel_says() {
 }
 
 #[tokio::test]
-async fn who_proves_nothing_is_told_so_and_an_honest_one_joins_meanwhile() {
+async fn peer_without_proof_is_refused_and_others_still_join() {
     watched(async {
         let site = Site::new();
         let mut host = Host::start(&site.instance, HostOptions::default()).unwrap();

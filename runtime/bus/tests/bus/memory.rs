@@ -36,7 +36,7 @@ fn tree(directory: &Path) -> u64 {
 }
 
 #[test]
-fn the_table_says_how_much_the_bus_takes() {
+fn table_states_the_memory_use_of_the_bus() {
     for (peers, documents) in [(1, 64), (3, 64), (32, 64), (100, 16)] {
         run(async move {
             let site = Site::new();
@@ -69,7 +69,7 @@ fn the_table_says_how_much_the_bus_takes() {
 }
 
 #[test]
-fn there_is_room_for_who_is_expected() {
+fn memory_is_reserved_for_expected_peers() {
     run(async {
         let site = Site::new();
         let options = HostOptions {
@@ -97,7 +97,7 @@ fn there_is_room_for_who_is_expected() {
 }
 
 #[test]
-fn what_never_fits_is_told_from_what_may_fit_later() {
+fn permanent_lack_of_memory_differs_from_a_temporary_one() {
     let site = Site::new();
     let role = "asks_for_too_much";
     let Some(mut helper) = Helper::start_in_small_memory(role, &site.instance) else {
@@ -113,7 +113,7 @@ fn what_never_fits_is_told_from_what_may_fit_later() {
 }
 
 #[test]
-fn a_full_memory_kills_nobody_and_loses_no_message() {
+fn full_memory_kills_no_process_and_loses_no_message() {
     let site = Site::new();
     let role = "speaks_in_a_full_memory";
     let Some(mut helper) = Helper::start_in_small_memory(role, &site.instance) else {
@@ -126,7 +126,7 @@ fn a_full_memory_kills_nobody_and_loses_no_message() {
 }
 
 #[test]
-fn many_who_take_at_once_are_refused_and_not_killed() {
+fn concurrent_allocations_are_refused_and_not_killed() {
     let site = Site::new();
     let role = "many_take_at_once";
     let Some(mut helper) = Helper::start_in_small_memory(role, &site.instance) else {
@@ -138,7 +138,7 @@ fn many_who_take_at_once_are_refused_and_not_killed() {
 }
 
 #[test]
-fn a_start_without_room_says_what_would_do() {
+fn start_without_memory_suggests_a_sufficient_size() {
     let refused = |size, needed| StartError::NoSharedMemory {
         size,
         free: 0,

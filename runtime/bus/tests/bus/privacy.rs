@@ -57,7 +57,7 @@ fn open_to_nobody(paths: &[PathBuf]) -> String {
 }
 
 #[test]
-fn what_the_bus_makes_is_closed_to_others() {
+fn files_of_the_bus_are_closed_to_other_users() {
     run(async {
         let site = Site::new();
         let mut host = site.host();
@@ -98,7 +98,7 @@ fn what_the_bus_makes_is_closed_to_others() {
 }
 
 #[test]
-fn others_see_one_name_and_cannot_foresee_the_next() {
+fn next_name_in_shared_memory_is_unpredictable() {
     run(async {
         let site = Site::new();
         let helper = Helper::start("serves", &site.instance);
@@ -164,7 +164,7 @@ fn read_it_while_it_changes(mapped_image: &MappedImage, sound: &[u8]) -> usize {
 }
 
 #[test]
-fn a_slot_that_is_rewritten_while_it_is_read() {
+fn slot_rewritten_while_it_is_read_does_no_harm() {
     run(async {
         let site = Site::new();
         let mut host = site.host();

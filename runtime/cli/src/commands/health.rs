@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn each_reason_is_a_line() {
+    fn each_health_problem_is_one_line() {
         for state in ["down", "gave up", "silent", "starting"] {
             assert_eq!(of_one(peer(state, 0)).len(), 1, "{state}");
         }
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn only_recent_notices_of_trouble_count() {
+    fn only_recent_problem_notices_count() {
         let notice = |kind: &str, ago_s| NoticeStatus {
             kind: kind.into(),
             text: "no space left".into(),
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn many_unseen_things_are_few_lines() {
+    fn many_unseen_entries_become_few_lines() {
         let one = |number: u32| Unseen {
             path: format!("/farm/in/{number}").into(),
             why: "Permission denied".into(),

@@ -104,7 +104,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_no_broker_starts_is_for_the_parser() {
+    fn other_commands_are_left_to_the_parser() {
         let is_started = |line: &str| {
             let words = line.split_whitespace().map(OsString::from);
             started_bundle(words).is_some()

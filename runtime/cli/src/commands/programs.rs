@@ -165,7 +165,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn first_word_of_a_command_is_the_shells() {
+    fn first_word_of_a_command_follows_shell_quoting() {
         let cases = [
             ("qc_x", "qc_x", ""),
             ("qc_x -c $FILE", "qc_x", " -c $FILE"),
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn command_that_no_shell_takes_is_refused() {
+    fn command_with_invalid_shell_syntax_is_refused() {
         let cases = [
             ("'/a dir/x.sh -c", "a quote is not closed"),
             ("qc_x -c \"$FILE", "a quote is not closed"),

@@ -196,7 +196,7 @@ mod tests {
     use qcbus_messages::control::{FileCounts, NoticeStatus, QueueStatus, SandboxStatus, Unseen};
 
     #[test]
-    fn a_busy_broker_as_a_person_sees_it() {
+    fn status_of_a_busy_broker_as_text() {
         let status = Status {
             instance: "farm".into(),
             version: "0.1.0".into(),

@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_shadow_would_change_as_a_person_sees_it() {
+    fn trials_of_a_shadow_as_text() {
         let counts = TrialCounts {
             tried: 119,
             waiting: 1,
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_takes_half_a_trial_for_the_whole() {
+    fn incomplete_trial_is_undetermined() {
         let of = |counts: TrialCounts| exit(&counts);
         let tried = TrialCounts {
             tried: 3,

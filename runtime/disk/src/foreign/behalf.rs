@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_leads_nowhere_where_its_owner_may_not_look() {
+    fn link_is_followed_with_the_rights_of_its_owner() {
         if !rustix::process::geteuid().is_root() {
             eprintln!("skipped: only root can give files away");
             return;

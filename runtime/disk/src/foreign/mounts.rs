@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_nearest_mount_is_found_whatever_its_name_is() {
+    fn nearest_mount_is_found_for_any_name() {
         let table = b"22 1 8:1 / / rw - ext4 /dev/sda1 rw\n\
             30 22 0:40 / /farm rw shared:1 - nfs4 server:/farm rw\n\
             31 30 0:41 / /farm/with\\040space rw - nfs4 server:/more rw\n";

@@ -23,7 +23,7 @@ fn fifo(path: &Path) {
 }
 
 #[test]
-fn nothing_but_files_is_opened_and_nobody_waits() {
+fn only_regular_files_are_opened_without_waiting() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
     fifo(&at("pipe.xodr"));
@@ -57,7 +57,7 @@ fn nothing_but_files_is_opened_and_nobody_waits() {
 }
 
 #[test]
-fn a_file_is_read_as_far_as_allowed() {
+fn file_is_read_up_to_the_limit() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.xodr");
     let bytes: Vec<u8> = (0..9 << 20).map(|at: u32| at as u8).collect();
@@ -75,7 +75,7 @@ fn a_file_is_read_as_far_as_allowed() {
 }
 
 #[test]
-fn errors_of_the_moment_are_told_from_those_of_the_file() {
+fn temporary_errors_differ_from_errors_of_the_file() {
     let of = |error: Errno| is_of_the_moment(&error.into());
     for error in [
         Errno::MFILE,
@@ -131,7 +131,7 @@ impl Hanging {
 }
 
 #[test]
-fn who_cannot_be_replaced_is_named_and_goes_on_when_there_is_an_answer() {
+fn hanging_watcher_is_reported_and_resumes_on_an_answer() {
     let io_watchdog = Arc::new(IoWatchdog::default());
     let path = Path::new("/farm/hung");
     let watcher = hang(&io_watchdog, None, path);
@@ -149,7 +149,7 @@ fn who_cannot_be_replaced_is_named_and_goes_on_when_there_is_an_answer() {
 }
 
 #[test]
-fn who_looks_at_one_thing_while_at_another_is_seen_at_each() {
+fn nested_accesses_are_tracked_separately() {
     let io_watchdog = Arc::new(IoWatchdog::default());
     let attendance = io_watchdog.attend_for_good();
     let (directory, rules) = (Path::new("/farm"), Path::new("/farm/.qcignore"));
@@ -175,7 +175,7 @@ fn who_looks_at_one_thing_while_at_another_is_seen_at_each() {
 }
 
 #[test]
-fn who_waits_for_too_long_is_named_and_nobody_follows() {
+fn hanging_reader_is_reported_once_and_given_up() {
     let io_watchdog = Arc::new(IoWatchdog::default());
     let path = Path::new("/farm/hung/map.xodr");
     let patient = hang(&io_watchdog, Some(7), path);
@@ -214,7 +214,7 @@ fn who_waits_for_too_long_is_named_and_nobody_follows() {
 }
 
 #[test]
-fn a_directory_that_hangs_takes_few_threads() {
+fn hanging_directory_blocks_few_threads() {
     let io_watchdog = Arc::new(IoWatchdog::default());
     let at = |number: usize| PathBuf::from(format!("/farm/hung/{number}.xodr"));
     let hanging: Vec<_> = (0..io_watchdog::PER_DIRECTORY)
@@ -237,7 +237,7 @@ fn a_directory_that_hangs_takes_few_threads() {
 }
 
 #[test]
-fn a_file_system_that_hangs_takes_few_threads_wherever_they_look() {
+fn hanging_file_system_blocks_few_threads() {
     let io_watchdog = Arc::new(IoWatchdog::default());
     let at = |number| PathBuf::from(format!("/proc/directory-{number}/a.xodr"));
     let hanging: Vec<_> = (0..io_watchdog::PER_MOUNT)
@@ -257,7 +257,7 @@ fn a_file_system_that_hangs_takes_few_threads_wherever_they_look() {
 }
 
 #[test]
-fn a_disk_that_is_slow_is_not_overdue() {
+fn slow_disk_is_not_overdue() {
     let io_watchdog = Arc::new(IoWatchdog::default());
     let attendance = io_watchdog.attend(1);
     let access = Access::begin(Path::new("/farm/large.xodr")).unwrap();
@@ -269,7 +269,7 @@ fn a_disk_that_is_slow_is_not_overdue() {
 }
 
 #[test]
-fn what_went_wrong_for_now_is_remembered_as_long_as_somebody_attends() {
+fn first_temporary_error_is_remembered_while_attended() {
     let io_watchdog = Arc::new(IoWatchdog::default());
     let attendance = io_watchdog.attend(1);
     let meet =

@@ -39,7 +39,7 @@ fn may_give_away() -> bool {
 }
 
 #[test]
-fn what_is_ours_alone_is_read() {
+fn file_of_the_current_user_is_read() {
     let (dir, file) = place();
     assert_eq!(read(&file, 4).unwrap(), b"ours");
     let too_large = read(&file, 3).unwrap_err();
@@ -67,7 +67,7 @@ fn what_is_ours_alone_is_read() {
 }
 
 #[test]
-fn what_others_may_write_to_is_not_believed() {
+fn file_writable_by_others_is_not_trusted() {
     let (dir, file) = place();
     mode(&file, 0o666);
     assert_eq!(why(read(&file, 100)), (file.clone(), Foreign::World(0o666)));
@@ -93,7 +93,7 @@ fn what_others_may_write_to_is_not_believed() {
 }
 
 #[test]
-fn what_is_no_file_is_not_opened() {
+fn special_file_is_not_opened() {
     let (dir, _) = place();
     let pipe = dir.path().join("pipe");
     let made = std::process::Command::new("mkfifo").arg(&pipe).status();
@@ -124,7 +124,7 @@ fn only_a_private_group_may_write() {
 }
 
 #[test]
-fn what_belongs_to_somebody_else_is_not_believed() {
+fn file_of_another_user_is_not_trusted() {
     if !may_give_away() {
         return;
     }
@@ -158,7 +158,7 @@ fn what_belongs_to_somebody_else_is_not_believed() {
 }
 
 #[test]
-fn what_is_missing_is_made_and_nobody_else_can_write_to_it() {
+fn missing_directory_is_created_unwritable_by_others() {
     let (dir, _) = place();
     symlink("behind", dir.path().join("link")).unwrap();
     let deep = dir.path().join("link/a/b");
@@ -170,7 +170,7 @@ fn what_is_missing_is_made_and_nobody_else_can_write_to_it() {
 }
 
 #[test]
-fn a_private_directory_is_ours_and_closed() {
+fn private_directory_is_owned_and_closed() {
     let (dir, _) = place();
     let fresh = dir.path().join("run/one");
     make_private_directory(&fresh).unwrap();

@@ -181,7 +181,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_separators_part_a_search_path() {
+    fn both_separators_split_a_search_path() {
         let path = |text: &str| SearchPath::parse(OsStr::new(text), Path::new("/usr"));
         let plain = |all: &[&str]| SearchPath(all.iter().map(PathBuf::from).collect());
         assert_eq!(path("/a;b;;/a"), plain(&["/a", "/usr/b"]));
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_in_an_archive_can_be_named_from_outside_however_the_archive_is_called() {
+    fn archive_members_cannot_be_named_from_outside() {
         let from = Path::new("/d/main.xosc");
         for text in ["x.mosc!a.xosc", "X.MOSC!a.xosc", "x.mosc!y.mosc!a.xosc"] {
             assert_eq!(check(from, text), Err(Absence::Escapes), "{text}");
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn an_archive_looks_into_itself_and_then_outwards() {
+    fn archive_is_searched_inside_first_and_then_outside() {
         let search = SearchPath::parse(OsStr::new("/lib"), Path::new("/"));
         let found = places(
             Path::new("/d/x.mosc!in.mosc!sub/main.xosc"),

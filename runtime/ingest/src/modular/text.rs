@@ -179,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_declared_encoding_is_the_one_that_is_written() {
+    fn declared_encoding_becomes_utf8() {
         let edited = |text: &str| applied(text, 0..text.len(), encoding(text).into_iter());
         assert_eq!(
             edited("<?xml version='1.0' encoding='UTF-16' standalone='yes'?><a/>"),
@@ -195,14 +195,14 @@ mod tests {
     }
 
     #[test]
-    fn groups_in_one_place_are_indented_alike() {
+    fn indentation_is_taken_from_the_line_above() {
         assert_eq!(indentation("<a>\n  <b/>", 6), "\n  ");
         assert_eq!(indentation("<a>\n <c/> <b/>", 10), "");
         assert_eq!(indentation("<b/>", 0), "");
     }
 
     #[test]
-    fn a_tag_name_ends_where_the_tag_goes_on() {
+    fn tag_name_ends_before_the_attributes() {
         assert_eq!(tag_name("<a:Group name='x'>"), "a:Group");
         assert_eq!(tag_name("<Group/>"), "Group");
     }

@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names() {
+    fn valid_xml_names_are_recognised() {
         let is_name = |name: &str| name_with_colon(name).is_some();
         assert_eq!(
             (name_with_colon("a:b"), name_with_colon("ab")),

@@ -28,7 +28,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_value_is_read_back_as_it_was() {
+    fn escaped_value_is_read_back_unchanged() {
         for quote in ['"', '\''] {
             let mut out = String::new();
             escape_into(&mut out, "a<b> & \"c\" 'd'\t\n\u{1}ü", quote);

@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn includes_are_found_where_they_count() {
+    fn only_effective_includes_are_found() {
         let text = "\u{FEFF}<a><!-- <include file='no'/> --><include file='b &amp; c.xml'/>\
                     <![CDATA[<include file='no'/>]]><include/></a>";
         let found = includes_of(text);

@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bindings_end_with_their_element() {
+    fn namespace_bindings_end_with_their_element() {
         let mut prefixes = Prefixes::default();
         assert_eq!(prefixes.unbound("x:a"), Some("x"));
         assert!(prefixes.declare("xmlns:x"));

@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn attributes_with_all_sorts_of_spacing() {
+    fn attributes_with_any_spacing_are_read() {
         let (found, fault) = scan(" a=\"1\"\n\tb = '\"'  xml:c=\"x&amp;\ty\"d='' ");
         assert_eq!(fault, None);
         assert_eq!(
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_attribute_ends_the_tag() {
+    fn invalid_attribute_ends_the_tag() {
         let cases = [
             (
                 " a",

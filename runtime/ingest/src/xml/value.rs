@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn line_ends_are_line_feeds() {
+    fn line_ends_become_line_feeds() {
         let mut out = String::new();
         line_ends("a\r\nb\rc\n\r", &mut out);
         assert_eq!(out, "a\nb\nc\n\n");

@@ -4,7 +4,7 @@
 use qcbus_bus::Peer;
 use qcbus_messages::Job;
 
-use crate::keeper::{Animal, GOOD, Manners, Mood, answer};
+use crate::harness::{Animal, GOOD, Manners, Mood, answer};
 
 /// Word that crashes it.
 pub const POISON: &str = "poison";

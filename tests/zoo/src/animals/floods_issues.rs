@@ -4,7 +4,7 @@ use qcbus_bus::Peer;
 use qcbus_formats::xqar::{Issue, Level};
 use qcbus_messages::{FromPeer, Job};
 
-use crate::keeper::{Animal, CHECKERS, GOOD, Manners, Mood, checker_done};
+use crate::harness::{Animal, CHECKERS, GOOD, Manners, Mood, checker_done};
 
 pub(super) const ANIMAL: Animal = Animal {
     name: "floods_issues",

@@ -6,7 +6,7 @@ use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Metadata;
 use qcbus_messages::{CheckerEnd, FromPeer, Job};
 
-use crate::keeper::{Animal, CHECKERS, GOOD, Manners, Mood};
+use crate::harness::{Animal, CHECKERS, GOOD, Manners, Mood};
 
 pub(super) const ANIMAL: Animal = Animal {
     name: "floods_metadata",

@@ -4,7 +4,7 @@ use qcbus_bus::Peer;
 use qcbus_messages::Job;
 
 use super::floods_metadata;
-use crate::keeper::{Animal, GOOD, Manners, Mood};
+use crate::harness::{Animal, GOOD, Manners, Mood};
 
 pub(super) const ANIMAL: Animal = Animal {
     name: "floods_with_huge_messages",

@@ -2,7 +2,7 @@
 
 use qcbus_bus::Peer;
 
-use crate::keeper::{Animal, GOOD, Manners, Mood};
+use crate::harness::{Animal, GOOD, Manners, Mood};
 
 pub(super) const ANIMAL: Animal = Animal {
     name: "hangs_after_hello",

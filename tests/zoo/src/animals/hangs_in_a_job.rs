@@ -3,7 +3,7 @@
 use qcbus_bus::Peer;
 use qcbus_messages::Job;
 
-use crate::keeper::{Animal, GOOD, Manners, Mood};
+use crate::harness::{Animal, GOOD, Manners, Mood};
 
 pub(super) const ANIMAL: Animal = Animal {
     name: "hangs_in_a_job",

@@ -5,7 +5,7 @@ use qcbus_bus::Peer;
 use qcbus_formats::xqar::{Issue, Level};
 use qcbus_messages::{FromPeer, Job};
 
-use crate::keeper::{Animal, GOOD, Manners, Mood, answer};
+use crate::harness::{Animal, GOOD, Manners, Mood, answer};
 
 /// Word that it rejects.
 pub const MARK: &str = "forbidden";

@@ -4,7 +4,7 @@
 use qcbus_bus::Peer;
 use qcbus_messages::{FromPeer, Job, JobId};
 
-use crate::keeper::{Animal, GOOD, Manners, Mood, answer, checker_done};
+use crate::harness::{Animal, GOOD, Manners, Mood, answer, checker_done};
 
 pub(super) const ANIMAL: Animal = Animal {
     name: "lies_about_job_id",

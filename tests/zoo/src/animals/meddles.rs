@@ -11,7 +11,7 @@ use qcbus_messages::Job;
 use rustix::process::{Pid, Signal, kill_process};
 
 use crate::complain;
-use crate::keeper::{Animal, GOOD, Manners, Mood, answer};
+use crate::harness::{Animal, GOOD, Manners, Mood, answer};
 
 pub(super) const ANIMAL: Animal = Animal {
     name: "meddles",

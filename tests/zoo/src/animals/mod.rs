@@ -27,7 +27,7 @@ pub use dies_on_some_files::POISON;
 pub use judges_strictly::MARK;
 pub use speaks_another_protocol::PROTOCOL as ANOTHER_PROTOCOL;
 
-use crate::keeper::Animal;
+use crate::harness::Animal;
 
 /// All animals except the polite one, which is a real bundle.
 pub static ANIMALS: &[Animal] = &[
@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_unique_and_good_on_the_bus() {
+    fn animal_names_are_unique_and_valid_on_the_bus() {
         for (at, animal) in ANIMALS.iter().enumerate() {
             assert!(
                 ANIMALS[at + 1..]

@@ -3,7 +3,7 @@
 use qcbus_bus::Peer;
 use qcbus_messages::Job;
 
-use crate::keeper::{Animal, GOOD, Manners, Mood, checker_done};
+use crate::harness::{Animal, GOOD, Manners, Mood, checker_done};
 
 pub(super) const ANIMAL: Animal = Animal {
     name: "never_acknowledges",

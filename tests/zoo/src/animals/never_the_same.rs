@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use qcbus_bus::Peer;
 use qcbus_messages::{FromPeer, Job};
 
-use crate::keeper::{Animal, GOOD, Manners, Mood, answer, catalogue};
+use crate::harness::{Animal, GOOD, Manners, Mood, answer, catalogue};
 
 pub(super) const ANIMAL: Animal = Animal {
     name: "never_the_same",

@@ -2,7 +2,7 @@
 
 use qcbus_bus::Claims;
 
-use crate::keeper::{Animal, GOOD, HONEST};
+use crate::harness::{Animal, GOOD, HONEST};
 
 pub(super) const ANIMAL: Animal = Animal {
     name: "proves_nothing",

@@ -4,7 +4,7 @@
 use qcbus_bus::Peer;
 use qcbus_messages::{JobId, Role};
 
-use crate::keeper::{Animal, GOOD, Manners, Mood};
+use crate::harness::{Animal, GOOD, Manners, Mood};
 
 pub(super) const ANIMAL: Animal = Animal {
     name: "reporter_never_acknowledges",

@@ -9,7 +9,7 @@ use qcbus_bus::Peer;
 use qcbus_messages::Job;
 
 use crate::complain;
-use crate::keeper::{Animal, GOOD, Manners, Mood, answer};
+use crate::harness::{Animal, GOOD, Manners, Mood, answer};
 
 pub(super) const ANIMAL: Animal = Animal {
     name: "scribbles_on_others",

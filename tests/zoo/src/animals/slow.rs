@@ -1,6 +1,6 @@
 //! Takes `--millis` of time for every job and otherwise behaves correctly.
 
-use crate::keeper::{Animal, GOOD};
+use crate::harness::{Animal, GOOD};
 
 pub(super) const ANIMAL: Animal = Animal {
     name: "slow",

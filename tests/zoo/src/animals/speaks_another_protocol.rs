@@ -3,7 +3,7 @@
 use qcbus_bus::Claims;
 use qcbus_messages::PROTOCOL_VERSION;
 
-use crate::keeper::{Animal, GOOD, HONEST};
+use crate::harness::{Animal, GOOD, HONEST};
 
 /// Protocol version that it claims.
 pub const PROTOCOL: u32 = PROTOCOL_VERSION + 41;

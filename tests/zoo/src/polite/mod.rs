@@ -70,7 +70,7 @@ fn bus_arguments(args: Args) -> Vec<OsString> {
 #[cfg(test)]
 mod tests {
     #[test]
-    fn pages_hold() {
+    fn rule_pages_are_consistent() {
         qcbus_sdk::pages::assert_pages(
             &super::BUNDLE,
             concat!(env!("CARGO_MANIFEST_DIR"), "/src/polite"),

@@ -10,7 +10,7 @@ use super::judge::{Found, judge};
 use super::table;
 
 #[test]
-fn a_list_is_read() {
+fn seeded_fault_list_is_parsed() {
     let head = "@a = p:d/a.xosc\nid | sort | @a | warning\n";
     let entry = format!("{head}  A | set @b=c | in: ../m.xodr\n  at: A B\n  at: .\n  why: so\n");
     let all = table::read(&entry, "name").unwrap();
@@ -38,7 +38,7 @@ fn a_list_is_read() {
 }
 
 #[test]
-fn a_fault_is_found_where_it_is() {
+fn fault_is_found_only_at_its_place() {
     let list = "id | sort | p:a.xosc | error\n  Act#c | drop\n  why: so\n";
     let entries = table::read(list, "name").unwrap();
     let said = |level: Level, rows: &[u64]| Said {

@@ -457,7 +457,7 @@ mod tests {
     use super::{PI, TAU, above_zero, at_most, between, from_zero};
 
     #[test]
-    fn ranges_have_their_ends() {
+    fn range_ends_are_inclusive_unless_half_open() {
         let closed = between(0.0, 1.0, "A", "a", "", "");
         let holds = |row: &super::Row, values: [f64; 5]| values.map(|value| row.contains(value));
         let values = [-0.1, 0.0, 0.5, 1.0, f64::NAN];
@@ -478,7 +478,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges_are_said_in_words() {
+    fn ranges_are_described_in_words() {
         let turn = between(0.0, TAU, "A", "a", "rad", "").half_open();
         assert_eq!(
             super::wanted(&turn),

@@ -83,7 +83,7 @@ const STATUS: &str = "{\"request\":\"status\"}\n";
 const WAIT: &str = "{\"request\":\"wait\",\"file\":\"/x.xodr\",\"timeout_ms\":null}\n";
 
 #[tokio::test]
-async fn the_length_of_a_request_is_bounded_and_their_number_is_not() {
+async fn request_length_is_bounded_but_request_count_is_not() {
     let mut socket = Socket::new(bounds(8, 4));
     let mut client = socket.connect("").await;
     let padded = format!("{}{STATUS}", " ".repeat(MAX_REQUEST - STATUS.len()));
@@ -105,7 +105,7 @@ async fn the_length_of_a_request_is_bounded_and_their_number_is_not() {
 }
 
 #[tokio::test]
-async fn who_says_nothing_or_half_of_it_is_not_waited_for() {
+async fn silent_or_incomplete_client_is_disconnected() {
     let mut socket = Socket::new(Bounds {
         request_within: SHORT,
         ..bounds(8, 4)
@@ -123,7 +123,7 @@ async fn who_says_nothing_or_half_of_it_is_not_waited_for() {
 }
 
 #[tokio::test]
-async fn who_does_not_read_is_not_waited_for() {
+async fn client_that_does_not_read_is_disconnected() {
     let mut socket = Socket::new(Bounds {
         answer_within: SHORT,
         ..bounds(8, 4)
@@ -143,7 +143,7 @@ async fn who_does_not_read_is_not_waited_for() {
 }
 
 #[tokio::test]
-async fn the_silent_make_room_and_those_who_wait_stay() {
+async fn silent_clients_make_room_and_waiting_ones_stay() {
     let mut socket = Socket::new(bounds(8, 4));
     let mut waiting = Vec::new();
     for count in 1..=4 {
@@ -173,7 +173,7 @@ async fn the_silent_make_room_and_those_who_wait_stay() {
 }
 
 #[tokio::test]
-async fn of_a_client_that_has_left_nothing_stays() {
+async fn state_of_disconnected_client_is_released() {
     let mut socket = Socket::new(bounds(8, 4));
     let waiting = socket.connect(WAIT).await;
     // This client sends no further request, but it still waits.
@@ -199,7 +199,7 @@ async fn of_a_client_that_has_left_nothing_stays() {
 }
 
 #[tokio::test]
-async fn where_everybody_is_busy_the_next_is_told_so() {
+async fn client_is_refused_when_all_are_busy() {
     let mut socket = Socket::new(bounds(2, 2));
     let _waiting = [socket.connect(WAIT).await, socket.connect(WAIT).await];
     socket.until_kept(2).await;

@@ -35,7 +35,7 @@ fn child_version(world: &World) -> &str {
 }
 
 #[test]
-fn an_upgrade_takes_over_and_the_old_process_goes() {
+fn upgrade_takes_over_and_old_process_leaves() {
     let mut world = world_with_an_upgrade();
     world.child_joins();
     assert_eq!(child_version(&world), "2");
@@ -46,7 +46,7 @@ fn an_upgrade_takes_over_and_the_old_process_goes() {
 }
 
 #[test]
-fn a_bundle_that_another_command_starts_judges_anew() {
+fn bundle_started_by_other_command_judges_anew() {
     let mut world = world_with_a_child();
     world.write(0);
     world.settle();
@@ -71,7 +71,7 @@ fn a_bundle_that_another_command_starts_judges_anew() {
 }
 
 #[test]
-fn one_that_runs_programs_before_it_joins_may_take_longer() {
+fn slow_starting_child_may_join_later() {
     for (slow_start, patient) in [(false, false), (true, true)] {
         let mut world = World::new();
         let spec = ChildSpec {
@@ -89,7 +89,7 @@ fn one_that_runs_programs_before_it_joins_may_take_longer() {
 }
 
 #[test]
-fn a_process_that_a_newer_manifest_overtakes_before_it_joins_is_killed() {
+fn child_replaced_by_newer_manifest_before_joining_is_killed() {
     let first_start = || {
         let mut world = World::new();
         world.manifest(Some(1));
@@ -113,7 +113,7 @@ fn a_process_that_a_newer_manifest_overtakes_before_it_joins_is_killed() {
 }
 
 #[test]
-fn an_upgrade_that_dies_before_it_joins_is_said_and_tried_again() {
+fn upgrade_that_dies_before_joining_is_retried() {
     let mut world = world_with_an_upgrade();
     world.child_ends(ChildEnd::Failed("it crashed".to_owned()));
     assert!(notices(&world).contains(&"not-upgraded"));
@@ -127,7 +127,7 @@ fn an_upgrade_that_dies_before_it_joins_is_said_and_tried_again() {
 }
 
 #[test]
-fn an_upgrade_that_dies_again_and_again_is_tried_after_longer_and_longer_pauses() {
+fn repeated_upgrade_failures_lengthen_the_pauses() {
     let mut world = world_with_an_upgrade();
     let mut pauses = Vec::new();
     for _ in 0..3 {
@@ -146,7 +146,7 @@ fn an_upgrade_that_dies_again_and_again_is_tried_after_longer_and_longer_pauses(
 }
 
 #[test]
-fn an_upgrade_that_hangs_is_killed_and_tried_again() {
+fn hanging_upgrade_is_killed_and_retried() {
     let mut world = world_with_an_upgrade();
     let launch = world.launched[0].launch;
     world.pass(Duration::from_secs(16));
@@ -158,7 +158,7 @@ fn an_upgrade_that_hangs_is_killed_and_tried_again() {
 }
 
 #[test]
-fn a_file_is_undetermined_at_once_when_a_child_cannot_be_started() {
+fn file_is_undetermined_at_once_if_child_cannot_start() {
     let ends = [
         (1, ChildEnd::NotStarted("no such program".to_owned())),
         (1, ChildEnd::Done("it ended with exit code 0".to_owned())),
@@ -192,7 +192,7 @@ fn a_file_is_undetermined_at_once_when_a_child_cannot_be_started() {
 }
 
 #[test]
-fn a_child_that_never_joins_is_waited_for_once() {
+fn child_that_never_joins_is_awaited_once() {
     let mut world = World::new();
     world.join("First");
     world.manifest(Some(1));
@@ -217,7 +217,7 @@ fn a_child_that_never_joins_is_waited_for_once() {
 /// Checks the time limit of a child with a slow start. A module of ASAM's framework runs over
 /// samples before it joins, which takes long on a busy machine.
 #[test]
-fn child_that_starts_slowly_is_waited_for_as_long_as_it_may_take() {
+fn slow_starting_child_is_awaited_up_to_its_limit() {
     let starting = || {
         let mut world = World::new();
         world.join("First");
@@ -246,7 +246,7 @@ fn child_that_starts_slowly_is_waited_for_as_long_as_it_may_take() {
 }
 
 #[test]
-fn a_bundle_that_joined_by_hand_must_judge_after_a_restart() {
+fn manually_joined_bundle_stays_required_after_restart() {
     let mut world = World::new();
     world.join("First");
     world.join("Second");
@@ -273,7 +273,7 @@ fn a_bundle_that_joined_by_hand_must_judge_after_a_restart() {
 }
 
 #[test]
-fn a_manifest_that_changed_while_no_broker_ran_is_carried_out() {
+fn manifest_changed_without_broker_takes_effect() {
     let other_command = ChildSpec {
         command: vec!["other".to_owned()],
         ..child(2)
@@ -307,7 +307,7 @@ fn a_manifest_that_changed_while_no_broker_ran_is_carried_out() {
 }
 
 #[test]
-fn a_restart_judges_nothing_again_that_stands() {
+fn restart_keeps_standing_verdicts() {
     let mut world = World::new();
     world.join("First");
     world.join("Second");
@@ -327,7 +327,7 @@ fn a_restart_judges_nothing_again_that_stands() {
 }
 
 #[test]
-fn what_an_absent_bundle_would_check_is_in_the_result() {
+fn checkers_of_missing_bundle_are_in_result() {
     let mut world = World::new();
     world.versions.insert("Second", 3);
     world.join("Second");
@@ -341,7 +341,7 @@ fn what_an_absent_bundle_would_check_is_in_the_result() {
 }
 
 #[test]
-fn a_child_whose_manifest_went_while_no_broker_ran_need_not_judge() {
+fn child_without_manifest_after_restart_is_not_required() {
     let mut world = world_with_an_upgrade();
     world.child_joins();
     world.settle();
@@ -354,7 +354,7 @@ fn a_child_whose_manifest_went_while_no_broker_ran_need_not_judge() {
 }
 
 #[test]
-fn a_child_that_is_wanted_again_before_it_has_left_is_replaced() {
+fn child_wanted_again_before_leaving_is_replaced() {
     let mut world = world_with_a_child();
     world.manifest(None);
     world.manifest(Some(1));
@@ -368,7 +368,7 @@ fn a_child_that_is_wanted_again_before_it_has_left_is_replaced() {
 }
 
 #[test]
-fn a_process_that_is_replaced_and_does_not_go_is_killed() {
+fn replaced_process_that_does_not_leave_is_killed() {
     let mut world = world_with_an_upgrade();
     let old = world.state.bundles[CHILD].launch.unwrap();
     world.child_joins();
@@ -400,7 +400,7 @@ fn world_with(restart: Restart) -> World {
 }
 
 #[test]
-fn a_child_is_started_again_as_its_manifest_says() {
+fn child_is_restarted_according_to_manifest() {
     let leaves: fn(&mut World) = |world| world.leave(0);
     let dies: fn(&mut World) = |world| world.kill(0);
     let cases = [
@@ -425,7 +425,7 @@ fn a_child_is_started_again_as_its_manifest_says() {
 }
 
 #[test]
-fn pauses_between_starts_double_up_to_a_limit() {
+fn restart_pauses_double_up_to_limit() {
     let mut world = World::new();
     world.manifest(Some(1));
     world.pass(Duration::ZERO);
@@ -455,7 +455,7 @@ fn pauses_between_starts_double_up_to_a_limit() {
 }
 
 #[test]
-fn a_child_that_fails_now_and_then_is_not_given_up() {
+fn child_that_fails_occasionally_is_not_given_up() {
     let mut world = World::new();
     world.state.settings.max_restarts = 2;
     world.manifest(Some(1));

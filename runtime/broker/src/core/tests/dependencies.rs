@@ -17,7 +17,7 @@ fn world_with_dependencies(known: u8) -> World {
 }
 
 #[test]
-fn a_changed_dependency_has_its_file_judged_again() {
+fn changed_dependency_has_its_file_judged_again() {
     for (file, part) in [(1, 0), (1, 6), (2, 6), (3, 4), (5, 7)] {
         let mut world = world_with_dependencies(file);
         // The dependency changes, is removed and comes back. Each step leads to a new verdict.
@@ -41,7 +41,7 @@ fn a_changed_dependency_has_its_file_judged_again() {
 }
 
 #[test]
-fn a_dependency_that_is_looked_for_and_comes_later_has_its_file_judged_again() {
+fn dependency_that_appears_later_has_its_file_judged_again() {
     let mut world = World::new();
     world.join("First");
     world.write(2);
@@ -53,7 +53,7 @@ fn a_dependency_that_is_looked_for_and_comes_later_has_its_file_judged_again() {
 }
 
 #[test]
-fn a_dependency_that_has_only_a_new_stamp_costs_no_new_verdict() {
+fn dependency_with_only_new_stamp_costs_no_new_verdict() {
     for touched in [5, 7, 4] {
         let mut world = world_with_dependencies(5);
         let before = world.stored.len();
@@ -74,7 +74,7 @@ fn a_dependency_that_has_only_a_new_stamp_costs_no_new_verdict() {
 }
 
 #[test]
-fn a_dependency_that_changes_before_the_first_scan_sees_its_file_is_not_forgotten() {
+fn dependency_change_before_first_scan_is_not_forgotten() {
     let known = world_with_dependencies(2);
     let judged = known
         .state
@@ -97,7 +97,7 @@ fn a_dependency_that_changes_before_the_first_scan_sees_its_file_is_not_forgotte
 }
 
 #[test]
-fn a_file_that_goes_while_it_is_read_again_leaves_the_gate_at_once() {
+fn file_that_vanishes_while_read_leaves_gate_at_once() {
     let mut world = judged_world();
     assert!(world.gate.contains_key(&1));
     world.step(&Step::Reconfigure(1));
@@ -109,7 +109,7 @@ fn a_file_that_goes_while_it_is_read_again_leaves_the_gate_at_once() {
 }
 
 #[test]
-fn a_file_that_a_writer_finds_changed_is_read_again() {
+fn file_found_changed_by_writer_is_read_again() {
     let mut world = judged_world();
     world.write(1);
     world.prepare(0, true);
@@ -125,7 +125,7 @@ fn a_file_that_a_writer_finds_changed_is_read_again() {
 }
 
 #[test]
-fn a_file_that_is_put_back_is_published_again() {
+fn restored_file_is_published_again() {
     let mut world = judged_world();
     world.state.settings.max_active = 0;
     let (path, before) = (path_of(1), stamp(world.there[&path_of(1)]));
@@ -142,7 +142,7 @@ fn a_file_that_is_put_back_is_published_again() {
 }
 
 #[test]
-fn a_file_that_is_still_written_to_at_the_first_scan_keeps_its_result() {
+fn file_being_written_at_first_scan_keeps_its_result() {
     let mut world = judged_world();
     world.restart_after(4, true);
     world.settle();
@@ -157,7 +157,7 @@ fn written_again(world: &mut World) {
 }
 
 #[test]
-fn a_young_file_that_is_written_again_under_the_same_stamp_is_read_again() {
+fn young_file_rewritten_under_same_stamp_is_read_again() {
     for young in [true, false] {
         let mut world = World::new();
         world.young = young;
@@ -184,7 +184,7 @@ fn a_young_file_that_is_written_again_under_the_same_stamp_is_read_again() {
 }
 
 #[test]
-fn what_could_not_be_read_is_tried_again_and_said_once() {
+fn unreadable_file_is_retried_and_reported_once() {
     let mut world = World::new();
     world.join("First");
     world.write(0);
@@ -252,7 +252,7 @@ fn is_told_again(world: &mut World, file: u8) {
 /// Checks the reported age of a request. Data read from a map for one file may serve another only
 /// if that one had already arrived.
 #[test]
-fn who_reads_a_file_is_told_how_long_ago_it_came_changed_or_was_asked_for() {
+fn reader_gets_time_since_file_was_last_requested() {
     let second = Duration::from_secs(1);
     let deeds: [fn(&mut World, u8); 4] = [|_, _| {}, World::write, World::wait, is_told_again];
     for (deed, seconds) in deeds.into_iter().zip([3, 1, 1, 1]) {

@@ -17,7 +17,7 @@ fn run(once: bool) -> World {
 }
 
 #[test]
-fn files_are_read_before_those_are_there_who_judge() {
+fn files_are_read_before_bundles_join() {
     let mut world = run(true);
     assert_eq!(world.preparing.len(), 1, "it is being read");
     world.prepare(0, true);
@@ -30,7 +30,7 @@ fn files_are_read_before_those_are_there_who_judge() {
 }
 
 #[test]
-fn one_that_changes_before_anybody_looks_is_read_again() {
+fn file_changed_before_checking_is_read_again() {
     let mut world = run(true);
     world.prepare(0, true);
     world.write(0);
@@ -41,7 +41,7 @@ fn one_that_changes_before_anybody_looks_is_read_again() {
 }
 
 #[test]
-fn one_that_cannot_be_read_is_said_to_be_so_once_all_are_there() {
+fn unreadable_file_is_reported_once_all_bundles_joined() {
     let mut world = run(true);
     let (job, _) = world.preparing.remove(0);
     let result = Err(PrepareFailure::Unreadable("it is a directory".to_owned()));
@@ -53,7 +53,7 @@ fn one_that_cannot_be_read_is_said_to_be_so_once_all_are_there() {
 }
 
 #[test]
-fn a_run_that_is_to_end_waits_for_nobody_who_has_not_joined() {
+fn draining_run_does_not_wait_for_missing_bundles() {
     for read_before in [true, false] {
         let mut world = run(true);
         if read_before {
@@ -68,7 +68,7 @@ fn a_run_that_is_to_end_waits_for_nobody_who_has_not_joined() {
 }
 
 #[test]
-fn a_broker_that_goes_on_reads_nothing_before() {
+fn watching_broker_reads_nothing_before_bundles_join() {
     let world = run(false);
     assert!(world.preparing.is_empty());
 }

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn a_broker_that_is_told_to_stop_finishes_what_it_has_and_begins_nothing() {
+fn draining_broker_finishes_jobs_and_begins_none() {
     let mut world = World::at_work();
     world.event(Event::Drain);
     world.write(4);
@@ -18,7 +18,7 @@ fn a_broker_that_is_told_to_stop_finishes_what_it_has_and_begins_nothing() {
 }
 
 #[test]
-fn a_broker_that_cannot_finish_stops_nevertheless() {
+fn broker_that_cannot_finish_stops_after_drain_limit() {
     let mut world = World::at_work();
     world.state.settings.job_deadline = Duration::from_secs(1000);
     world.state.settings.silence_limit = Duration::from_secs(1000);
@@ -44,7 +44,7 @@ fn world_that_runs_once(scanned: bool) -> World {
 }
 
 #[test]
-fn a_broker_that_runs_once_stops_when_everything_was_judged() {
+fn run_stops_when_every_file_is_judged() {
     let mut world = world_that_runs_once(false);
     world.until_judged(2);
     world.pass(Duration::ZERO);
@@ -61,7 +61,7 @@ fn a_broker_that_runs_once_stops_when_everything_was_judged() {
 }
 
 #[test]
-fn a_broker_that_runs_once_does_not_leave_a_file_that_must_rest() {
+fn run_waits_for_file_that_must_pause() {
     let mut world = World::new();
     world.join("First");
     world.state.settings.once = true;
@@ -90,7 +90,7 @@ fn world_that_says_goodbye() -> (World, Launch) {
 }
 
 #[test]
-fn a_broker_that_stops_waits_until_what_it_started_has_left() {
+fn stopping_broker_waits_until_its_children_left() {
     let (mut world, launch) = world_that_says_goodbye();
     world.pass(Duration::from_secs(1));
     assert_eq!(world.stopped, 0);
@@ -101,7 +101,7 @@ fn a_broker_that_stops_waits_until_what_it_started_has_left() {
 }
 
 #[test]
-fn what_does_not_leave_at_the_end_is_killed() {
+fn child_that_does_not_leave_on_stop_is_killed() {
     let (mut world, launch) = world_that_says_goodbye();
     world.pass(Duration::from_secs(3));
     assert!(!world.killed.contains(&launch));
@@ -112,7 +112,7 @@ fn what_does_not_leave_at_the_end_is_killed() {
 }
 
 #[test]
-fn a_bundle_that_a_person_started_stays_when_the_broker_ends() {
+fn manually_started_bundle_stays_when_broker_stops() {
     let mut world = World::new();
     world.join("First");
     world.event(Event::Drain);
@@ -123,7 +123,7 @@ fn a_bundle_that_a_person_started_stays_when_the_broker_ends() {
 }
 
 #[test]
-fn nothing_is_read_before_those_who_may_come_have_had_their_time() {
+fn nothing_is_read_before_bundles_had_time_to_join() {
     let mut world = World::new();
     world.state.judged_once = false;
     world.state.settings.collect = Duration::from_secs(1);
@@ -143,7 +143,7 @@ fn nothing_is_read_before_those_who_may_come_have_had_their_time() {
 }
 
 #[test]
-fn the_newest_notices_are_kept() {
+fn newest_notices_are_kept() {
     let mut world = World::new();
     for number in 0..NOTICES + 10 {
         let notice = Notice::TurnedAway(number.to_string());

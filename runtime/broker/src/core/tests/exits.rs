@@ -22,7 +22,7 @@ fn pause(world: &mut World) -> Duration {
 }
 
 #[test]
-fn a_bundle_whose_process_has_ended_is_away_at_once() {
+fn bundle_of_ended_process_is_missing_at_once() {
     let mut world = world_that_starts(Restart::Always);
     world.child_joins();
     let launch = world.state.bundles[CHILD].launch.unwrap();
@@ -39,7 +39,7 @@ fn a_bundle_whose_process_has_ended_is_away_at_once() {
 }
 
 #[test]
-fn a_child_that_has_nothing_to_do_is_left_alone_for_long_unless_it_is_always_wanted() {
+fn child_without_work_restarts_late_unless_always_wanted() {
     let mut world = world_that_starts(Restart::OnFailure);
     world.child_ends(done());
     assert!(notices(&world).is_empty(), "that is no failure");
@@ -51,7 +51,7 @@ fn a_child_that_has_nothing_to_do_is_left_alone_for_long_unless_it_is_always_wan
 }
 
 #[test]
-fn what_ends_while_the_broker_stops_is_no_news() {
+fn child_end_during_drain_gives_no_notice() {
     let mut world = world_that_starts(Restart::Always);
     world.event(Event::Drain);
     world.child_ends(crashed());
@@ -59,7 +59,7 @@ fn what_ends_while_the_broker_stops_is_no_news() {
 }
 
 #[test]
-fn a_child_that_fails_is_hoped_for_twice() {
+fn failing_child_is_awaited_twice() {
     let mut world = World::new();
     world.join("First");
     world.manifest(Some(1));
@@ -77,7 +77,7 @@ fn a_child_that_fails_is_hoped_for_twice() {
 }
 
 #[test]
-fn a_child_that_fails_over_and_over_rests_for_a_window() {
+fn child_that_fails_repeatedly_pauses_for_window() {
     let mut world = world_that_starts(Restart::Always);
     world.state.settings.max_restarts = 3;
     world.state.settings.backoff_max = Duration::from_secs(1);

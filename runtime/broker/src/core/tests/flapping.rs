@@ -44,7 +44,7 @@ fn say(world: &mut World, session: SessionId, message: FromPeer) {
 }
 
 #[test]
-fn changes_without_end_are_believed_less_and_less_often_and_said() {
+fn flapping_bundle_is_accepted_less_often_and_reported() {
     let (mut world, session) = world();
     let before = world.state.epoch().0;
     let mut number = 0;
@@ -63,7 +63,7 @@ fn changes_without_end_are_believed_less_and_less_often_and_said() {
 }
 
 #[test]
-fn while_it_is_not_believed_others_are_judged_without_it_and_accepted_by_nobody() {
+fn flapping_bundle_delays_no_job_but_prevents_acceptance() {
     let (mut world, session) = world();
     for number in 0..4 {
         say(&mut world, session, changed(number));
@@ -83,7 +83,7 @@ fn while_it_is_not_believed_others_are_judged_without_it_and_accepted_by_nobody(
 }
 
 #[test]
-fn what_it_was_given_is_taken_back_and_it_judges_as_what_it_is_when_it_is_believed() {
+fn flapping_bundle_loses_its_jobs_until_accepted_again() {
     let (mut world, session) = world();
     for number in 0..3 {
         say(&mut world, session, changed(number));
@@ -103,7 +103,7 @@ fn what_it_was_given_is_taken_back_and_it_judges_as_what_it_is_when_it_is_believ
 }
 
 #[test]
-fn a_new_session_or_a_way_back_is_no_way_round() {
+fn new_session_does_not_bypass_flapping_pause() {
     let (mut world, session) = world();
     for number in 0..4 {
         say(&mut world, session, changed(number));
@@ -128,7 +128,7 @@ fn a_new_session_or_a_way_back_is_no_way_round() {
 }
 
 #[test]
-fn what_is_said_twice_is_no_change_and_costs_nothing() {
+fn repeated_registration_is_no_change() {
     let (mut world, session) = world();
     say(&mut world, session, changed(1));
     let epoch = world.state.epoch();
@@ -140,7 +140,7 @@ fn what_is_said_twice_is_no_change_and_costs_nothing() {
 }
 
 #[test]
-fn who_was_calm_for_long_is_believed_at_once() {
+fn long_stable_bundle_is_accepted_at_once() {
     let (mut world, session) = world();
     for number in 0..4 {
         say(&mut world, session, changed(number));
@@ -153,7 +153,7 @@ fn who_was_calm_for_long_is_believed_at_once() {
 }
 
 #[test]
-fn fresh_names_without_end_are_believed_less_often_too() {
+fn endless_new_names_are_accepted_less_often() {
     let mut world = World::new();
     world.state.settings.changes_forgiven = 2;
     let before = world.state.epoch().0;
@@ -182,7 +182,7 @@ enum Whim {
 proptest! {
     /// The required pauses lie between accepted changes, regardless of the bundle's behaviour.
     #[test]
-    fn between_changes_that_are_believed_lie_the_pauses_due(
+    fn accepted_changes_keep_the_required_pauses(
         whims in prop::collection::vec(
             prop_oneof![
                 4 => (0..5_u64).prop_map(Whim::Say),

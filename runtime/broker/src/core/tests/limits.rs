@@ -48,7 +48,7 @@ fn alive(world: &mut World) {
 }
 
 #[test]
-fn a_bundle_with_a_job_that_says_nothing_is_silent() {
+fn silent_bundle_with_job_is_ended() {
     let (mut world, ..) = busy();
     let limit = world.state.settings.silence_limit;
     let why = is_ended_after(&mut world, limit, |_| {});
@@ -56,7 +56,7 @@ fn a_bundle_with_a_job_that_says_nothing_is_silent() {
 }
 
 #[test]
-fn a_bundle_that_does_not_end_a_job_is_ended_at_the_deadline() {
+fn bundle_with_unfinished_job_is_ended_at_deadline() {
     let (mut world, ..) = busy();
     let limit = world.state.settings.job_deadline;
     let why = is_ended_after(&mut world, limit, alive);
@@ -64,7 +64,7 @@ fn a_bundle_that_does_not_end_a_job_is_ended_at_the_deadline() {
 }
 
 #[test]
-fn a_bundle_without_a_job_may_be_as_silent_as_it_likes() {
+fn idle_bundle_may_stay_silent() {
     let mut world = World::new();
     world.join("First");
     world.pass(Duration::from_secs(100_000));
@@ -72,7 +72,7 @@ fn a_bundle_without_a_job_may_be_as_silent_as_it_likes() {
 }
 
 #[test]
-fn a_bundle_that_never_says_what_it_checks_is_ended() {
+fn bundle_without_catalogue_is_ended() {
     let mut world = World::new();
     world.join("First");
     let session = world.nth_peer(0).unwrap();
@@ -85,7 +85,7 @@ fn a_bundle_that_never_says_what_it_checks_is_ended() {
 }
 
 #[test]
-fn a_job_that_is_overtaken_has_the_time_of_one_job() {
+fn forgotten_job_times_out_despite_later_jobs() {
     let (mut world, session, _) = busy();
     world.write(4);
     world.prepare(0, true);
@@ -108,7 +108,7 @@ fn a_job_that_is_overtaken_has_the_time_of_one_job() {
 }
 
 #[test]
-fn a_bundle_that_was_told_to_go_has_its_time() {
+fn drained_bundle_is_ended_after_leave_limit() {
     let mut world = World::new();
     world.join("First");
     world.state.drain_peer("First", &mut Vec::new());
@@ -118,7 +118,7 @@ fn a_bundle_that_was_told_to_go_has_its_time() {
 }
 
 #[test]
-fn so_many_lies_are_forgiven_and_no_more() {
+fn protocol_violations_beyond_limit_end_session() {
     let (mut world, session, _) = busy();
     let lie = |world: &mut World| {
         let job = JobId(1 << 40);
@@ -133,7 +133,7 @@ fn so_many_lies_are_forgiven_and_no_more() {
 }
 
 #[test]
-fn words_on_a_checker_that_was_not_offered_or_a_job_that_is_over_count_for_nothing() {
+fn findings_for_unknown_checker_or_ended_job_are_ignored() {
     let (mut world, session, job) = busy();
     let issues = |checker| FromPeer::Issues {
         job,
@@ -153,7 +153,7 @@ fn words_on_a_checker_that_was_not_offered_or_a_job_that_is_over_count_for_nothi
 }
 
 #[test]
-fn what_a_bundle_may_report_is_bounded_by_number_and_by_weight() {
+fn reported_findings_are_bounded_by_number_and_weight() {
     let each = weight(&finding());
     for (issues, bytes, kept) in [
         (3, usize::MAX, 3),
@@ -179,7 +179,7 @@ fn what_a_bundle_may_report_is_bounded_by_number_and_by_weight() {
 }
 
 #[test]
-fn what_a_bundle_has_done_is_counted() {
+fn finished_jobs_of_bundle_are_counted() {
     let mut world = World::new();
     world.join("First");
     for file in [0, 4] {
@@ -216,7 +216,7 @@ fn kept(world: &World, job: JobId, checker: u32) -> (Ending, usize) {
 }
 
 #[test]
-fn a_checker_with_more_to_say_of_its_run_than_is_kept_has_failed() {
+fn checker_with_too_much_metadata_fails() {
     let one = facts_weight(&[], &[Metadata::default()]) + "key".len();
     for (text, facts, is_kept) in [
         ("", 0, true),
@@ -244,7 +244,7 @@ fn a_checker_with_more_to_say_of_its_run_than_is_kept_has_failed() {
 }
 
 #[test]
-fn what_all_checkers_say_of_their_end_is_bounded_with_the_findings() {
+fn checker_endings_count_to_memory_limit() {
     let (mut world, session, job) = busy();
     let fact = facts_weight(&[], &[Metadata::default()]) + "key".len();
     world.state.settings.max_pending_bytes = 3 * fact;
@@ -266,7 +266,7 @@ fn what_all_checkers_say_of_their_end_is_bounded_with_the_findings() {
 }
 
 #[test]
-fn reasons_and_who_is_in_the_way_count_too() {
+fn reasons_and_blocking_checkers_count_to_weight() {
     let (mut world, session, job) = busy();
     world.state.settings.max_pending_bytes = 100_000;
     for by in [vec!["x".repeat(4000); 60], vec!["x".repeat(4000); 6000]] {
@@ -293,7 +293,7 @@ fn reasons_and_who_is_in_the_way_count_too() {
 }
 
 #[test]
-fn a_document_that_is_asked_for_all_the_time_is_published_now_and_then() {
+fn repeatedly_requested_document_is_published_rarely() {
     let (mut world, session, job) = busy();
     let doc = qcbus_messages::DocId(job.0);
     let mut published = 0;
@@ -311,7 +311,7 @@ fn a_document_that_is_asked_for_all_the_time_is_published_now_and_then() {
 }
 
 #[test]
-fn a_catalogue_beyond_all_bounds_is_no_catalogue() {
+fn catalogue_beyond_limits_is_refused() {
     type Change = fn(&mut Catalogue);
     let changes: [(&str, Change); 9] = [
         ("names", |it| {
@@ -347,7 +347,7 @@ fn a_catalogue_beyond_all_bounds_is_no_catalogue() {
 }
 
 #[test]
-fn there_is_an_end_to_the_names_that_are_known() {
+fn number_of_known_names_is_limited() {
     let mut world = World::new();
     let mut is_refused = |name: &str, role: Role| {
         let session = SessionId(99);

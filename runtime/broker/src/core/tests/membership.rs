@@ -23,7 +23,7 @@ pub fn world_with_a_file_at_the_writers() -> World {
 }
 
 #[test]
-fn a_file_at_work_while_a_bundle_joins_gets_its_judgement_too() {
+fn file_in_progress_is_also_judged_by_joining_bundle() {
     let mut world = World::new();
     world.join("First");
     world.write(1);
@@ -40,7 +40,7 @@ fn a_file_at_work_while_a_bundle_joins_gets_its_judgement_too() {
 }
 
 #[test]
-fn a_file_at_the_writers_while_a_bundle_joins_is_judged_again() {
+fn file_being_written_when_bundle_joins_is_judged_again() {
     let mut world = world_with_a_file_at_the_writers();
     world.join("Second");
     world.store(0, true);
@@ -61,7 +61,7 @@ fn world_that_is_busy() -> World {
 }
 
 #[test]
-fn who_waits_is_not_told_a_verdict_of_former_judges() {
+fn waiting_client_gets_no_verdict_without_new_bundle() {
     let mut world = world_that_is_busy();
     world.join("Second");
     for file in 0..6 {
@@ -73,7 +73,7 @@ fn who_waits_is_not_told_a_verdict_of_former_judges() {
 }
 
 #[test]
-fn who_waits_after_a_reload_is_not_told_the_verdict_of_the_old_configuration() {
+fn waiting_client_gets_no_verdict_of_old_configuration() {
     let mut world = world_that_is_busy();
     world.step(&Step::Reconfigure(2));
     for file in 0..6 {
@@ -85,7 +85,7 @@ fn who_waits_after_a_reload_is_not_told_the_verdict_of_the_old_configuration() {
 }
 
 #[test]
-fn late_words_on_many_cancelled_jobs_are_no_offence() {
+fn late_messages_on_cancelled_jobs_are_no_violation() {
     let mut world = World::new();
     world.join("First");
     world.write(0);
@@ -107,7 +107,7 @@ fn late_words_on_many_cancelled_jobs_are_no_offence() {
 }
 
 #[test]
-fn words_on_jobs_that_were_never_given_are_offences() {
+fn messages_on_unknown_jobs_are_violations() {
     let mut world = World::new();
     world.join("First");
     let session = session_of(&world, "First");
@@ -119,7 +119,7 @@ fn words_on_jobs_that_were_never_given_are_offences() {
 }
 
 #[test]
-fn a_job_that_is_forgotten_while_others_are_finished_is_noticed() {
+fn forgotten_job_is_noticed_while_others_finish() {
     let mut world = World::new();
     world.join("First");
     let session = session_of(&world, "First");
@@ -165,7 +165,7 @@ impl Demand for Naming {
 }
 
 #[test]
-fn a_bundle_that_only_the_configuration_names_is_missed_at_once() {
+fn bundle_named_only_in_configuration_is_required_at_once() {
     let mut world = World::new();
     world.join("First");
     world.write(0);
@@ -199,7 +199,7 @@ fn comes(world: &mut World, name: &'static str, offer: Option<Catalogue>) {
 }
 
 #[test]
-fn what_was_found_is_kept_when_a_bundle_joins_before_it_is_written() {
+fn findings_are_kept_when_bundle_joins_before_writing() {
     let mut world = World::new();
     world.join("First");
     world.write(0);
@@ -217,7 +217,7 @@ fn what_was_found_is_kept_when_a_bundle_joins_before_it_is_written() {
 }
 
 #[test]
-fn who_has_not_said_what_it_checks_gets_no_job() {
+fn bundle_without_catalogue_gets_no_job() {
     let mut world = World::new();
     world.join("Second");
     world.restart();
@@ -243,7 +243,7 @@ fn who_has_not_said_what_it_checks_gets_no_job() {
 }
 
 #[test]
-fn who_has_not_said_what_it_checks_is_not_missed() {
+fn bundle_without_catalogue_is_not_required() {
     let mut world = World::new();
     comes(&mut world, "Mute", None);
     world.join("First");
@@ -253,7 +253,7 @@ fn who_has_not_said_what_it_checks_is_not_missed() {
 }
 
 #[test]
-fn a_bundle_that_is_named_for_files_that_it_does_not_take_does_not_apply() {
+fn configured_bundle_for_other_file_kind_is_not_applicable() {
     let mut world = World::new();
     world.reconfigured = 1;
     let event = Event::Configured {

@@ -52,7 +52,7 @@ fn jobs_of(world: &World, name: &str) -> usize {
 }
 
 #[test]
-fn a_client_gets_what_the_bundles_that_it_names_find_in_a_file_that_nobody_watches() {
+fn client_gets_findings_of_named_bundles_in_unwatched_file() {
     let (mut world, request_id) = world_with_a_client();
     world.prepare(0, true);
     assert_eq!(jobs_of(&world, CHILD), 1);
@@ -65,7 +65,7 @@ fn a_client_gets_what_the_bundles_that_it_names_find_in_a_file_that_nobody_watch
 }
 
 #[test]
-fn a_watched_file_is_judged_by_all_beside_the_errand_of_a_client() {
+fn watched_file_is_judged_despite_on_demand_check() {
     let mut world = world_that_can_be_asked();
     world.write(0);
     let request_id = world.ask(0);
@@ -76,7 +76,7 @@ fn a_watched_file_is_judged_by_all_beside_the_errand_of_a_client() {
 }
 
 #[test]
-fn files_of_clients_do_not_count() {
+fn files_of_on_demand_checks_are_not_counted() {
     let (mut world, _) = world_with_a_client();
     world.write(0);
     world.ask(0);
@@ -88,7 +88,7 @@ fn files_of_clients_do_not_count() {
 }
 
 #[test]
-fn who_names_a_bundle_that_is_not_there_as_it_is_started_makes_a_run_of_its_own() {
+fn on_demand_check_with_unavailable_bundle_is_refused() {
     let joined_manually: fn(&mut World) -> RequestId = |world| world.ask_by(8, &[CHILD, "First"]);
     let unknown: fn(&mut World) -> RequestId = |world| world.ask_by(8, &["Nobody"]);
     let of_an_older_manifest: fn(&mut World) -> RequestId = |world| {
@@ -124,7 +124,7 @@ fn who_names_a_bundle_that_is_not_there_as_it_is_started_makes_a_run_of_its_own(
 }
 
 #[test]
-fn who_asks_for_what_is_no_file_to_check_or_is_not_there_is_told_so() {
+fn on_demand_check_of_unsuitable_file_is_refused() {
     let mut world = world_that_can_be_asked();
     let part = world.ask(10);
     assert!(!is_checked(&world, part));
@@ -136,7 +136,7 @@ fn who_asks_for_what_is_no_file_to_check_or_is_not_there_is_told_so() {
 }
 
 #[test]
-fn a_file_that_changes_while_it_is_checked_for_a_client_is_checked_again() {
+fn file_changed_during_on_demand_check_is_checked_again() {
     let (mut world, request_id) = world_with_a_client();
     world.prepare(0, true);
     world.write(8);
@@ -148,7 +148,7 @@ fn a_file_that_changes_while_it_is_checked_for_a_client_is_checked_again() {
 }
 
 #[test]
-fn what_cannot_be_read_for_a_client_it_is_to_read_itself() {
+fn unreadable_file_is_left_to_client_to_read() {
     let failures = [
         PrepareFailure::Unreadable("no right".to_owned()),
         PrepareFailure::Moment("too many open files".to_owned()),
@@ -174,7 +174,7 @@ fn what_cannot_be_read_for_a_client_it_is_to_read_itself() {
 }
 
 #[test]
-fn a_client_may_read_what_the_broker_may_not() {
+fn missing_document_of_on_demand_check_fails_it() {
     let (mut world, request_id) = world_with_a_client();
     let (job, file) = world.preparing.remove(0);
     let inputs = world.inputs(file);
@@ -205,7 +205,7 @@ fn a_client_may_read_what_the_broker_may_not() {
 }
 
 #[test]
-fn a_bundle_that_dies_of_what_a_client_asks_for_dies_of_it_once() {
+fn bundle_crash_fails_only_its_on_demand_check() {
     let (mut world, request_id) = world_with_a_client();
     let waits = world.ask(8);
     world.prepare(0, true);
@@ -217,7 +217,7 @@ fn a_bundle_that_dies_of_what_a_client_asks_for_dies_of_it_once() {
 }
 
 #[test]
-fn a_bundle_that_does_not_come_back_finds_nothing_for_a_client() {
+fn on_demand_check_fails_if_bundle_does_not_return() {
     let (mut world, request_id) = world_with_a_client();
     world.kill(1);
     world.prepare(0, true);
@@ -229,7 +229,7 @@ fn a_bundle_that_does_not_come_back_finds_nothing_for_a_client() {
 }
 
 #[test]
-fn what_became_another_bundle_before_it_was_pooled_found_nothing() {
+fn on_demand_check_fails_if_bundle_changed_before_pooling() {
     let (mut world, request_id) = world_with_a_client();
     world.prepare(0, true);
     world.answer(1);
@@ -242,7 +242,7 @@ fn what_became_another_bundle_before_it_was_pooled_found_nothing() {
 }
 
 #[test]
-fn what_was_found_for_a_client_stays_when_others_join_meanwhile() {
+fn on_demand_findings_are_kept_when_others_join() {
     let (mut world, request_id) = world_with_a_client();
     world.prepare(0, true);
     world.answer(1);
@@ -257,7 +257,7 @@ fn what_was_found_for_a_client_stays_when_others_join_meanwhile() {
 }
 
 #[test]
-fn what_a_client_asked_for_counts_for_nothing_under_another_configuration() {
+fn on_demand_check_fails_under_new_configuration() {
     for rounds in 0..3 {
         let (mut world, request_id) = world_with_a_client();
         if rounds > 0 {
@@ -274,7 +274,7 @@ fn what_a_client_asked_for_counts_for_nothing_under_another_configuration() {
 }
 
 #[test]
-fn nothing_is_done_for_a_client_that_has_left() {
+fn on_demand_check_of_disconnected_client_is_cancelled() {
     // The client leaves while its file waits, is read, is checked, or is pooled.
     for rounds in 0..4 {
         let mut world = world_that_can_be_asked();
@@ -298,7 +298,7 @@ fn nothing_is_done_for_a_client_that_has_left() {
 }
 
 #[test]
-fn a_broker_that_stops_finishes_errands_and_begins_none() {
+fn draining_broker_finishes_on_demand_checks_and_begins_none() {
     let (mut world, begun) = world_with_a_client();
     world.prepare(0, true);
     world.state.settings.max_preparing = 0;
@@ -315,7 +315,7 @@ fn a_broker_that_stops_finishes_errands_and_begins_none() {
 }
 
 #[test]
-fn nobody_is_left_without_an_answer_by_a_broker_that_cannot_finish() {
+fn on_demand_client_is_answered_when_broker_cannot_finish() {
     let (mut world, request_id) = world_with_a_client();
     world.state.settings.job_deadline = Duration::from_secs(1000);
     world.state.settings.silence_limit = Duration::from_secs(1000);
@@ -357,7 +357,7 @@ fn keep_asking(world: &mut World) {
 }
 
 #[test]
-fn a_watched_file_gets_its_turn_however_many_clients_ask() {
+fn watched_file_is_judged_despite_many_on_demand_checks() {
     let mut world = world_of_busy_clients();
     for bundle in world.state.bundles.values_mut() {
         bundle.capacity = 1;
@@ -374,7 +374,7 @@ fn a_watched_file_gets_its_turn_however_many_clients_ask() {
 }
 
 #[test]
-fn no_client_waits_for_ever_behind_those_that_came_after_it() {
+fn no_client_waits_forever_behind_later_ones() {
     let mut world = world_of_busy_clients();
     world.state.bundles.get_mut(CHILD).unwrap().capacity = 1;
     let first: Vec<RequestId> = world.clients.open.keys().copied().collect();

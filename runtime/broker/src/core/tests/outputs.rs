@@ -18,7 +18,7 @@ impl World {
 }
 
 #[test]
-fn lost_result_is_written_again_though_no_byte_has_changed() {
+fn lost_result_is_written_again_without_changed_bytes() {
     let mut world = judged_world();
     let before = world.stored.len();
     assert!(world.gate.contains_key(&1));
@@ -30,7 +30,7 @@ fn lost_result_is_written_again_though_no_byte_has_changed() {
 }
 
 #[test]
-fn result_that_is_lost_while_it_is_read_again_is_written() {
+fn result_lost_during_rereading_is_written() {
     let mut world = judged_world();
     let before = world.stored.len();
     world.step(&Step::Touch(1));
@@ -40,7 +40,7 @@ fn result_that_is_lost_while_it_is_read_again_is_written() {
 }
 
 #[test]
-fn lost_result_whose_file_is_touched_at_the_last_moment_is_written() {
+fn lost_result_of_file_touched_while_written_is_written() {
     let mut world = judged_world();
     world.lose(1);
     while world.storing.is_empty() {
@@ -56,7 +56,7 @@ fn lost_result_whose_file_is_touched_at_the_last_moment_is_written() {
 }
 
 #[test]
-fn result_that_is_lost_before_its_verdict_is_told_is_written_once_more() {
+fn result_lost_before_verdict_is_written_again() {
     let mut world = world_with_a_file_at_the_writers();
     world.write_out(0, true);
     world.lose(1);
@@ -65,7 +65,7 @@ fn result_that_is_lost_before_its_verdict_is_told_is_written_once_more() {
 }
 
 #[test]
-fn loss_of_a_file_that_has_gone_changes_nothing() {
+fn lost_result_of_removed_file_changes_nothing() {
     let mut world = judged_world();
     world.event(Event::Vanished { path: path_of(1) });
     world.settle();
@@ -75,7 +75,7 @@ fn loss_of_a_file_that_has_gone_changes_nothing() {
 }
 
 #[test]
-fn acceptance_that_a_start_does_not_find_behind_the_gate_is_published_when_it_stands() {
+fn accepted_file_missing_from_gate_is_published_at_start() {
     let mut world = judged_world();
     let before = world.stored.len();
     world.gate.remove(&1);
@@ -86,7 +86,7 @@ fn acceptance_that_a_start_does_not_find_behind_the_gate_is_published_when_it_st
 }
 
 #[test]
-fn acceptance_that_a_start_does_not_find_behind_the_gate_waits_for_all_that_must_judge() {
+fn file_missing_from_gate_waits_for_all_required_bundles() {
     let mut world = judged_world();
     world.gate.remove(&1);
     world.manifest = Some(1);

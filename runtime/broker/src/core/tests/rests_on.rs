@@ -22,7 +22,7 @@ fn both_are_read() -> World {
 }
 
 #[test]
-fn a_rejected_map_is_named_whichever_comes_first() {
+fn rejected_map_is_named_in_any_order() {
     for order in [[0, 1], [1, 0]] {
         for together in [true, false] {
             let mut world = world();
@@ -43,7 +43,7 @@ fn a_rejected_map_is_named_whichever_comes_first() {
 /// A scenario is read first and takes all document places of the bus. Its map must be read
 /// nevertheless.
 #[test]
-fn who_waits_for_a_verdict_leaves_room_to_those_that_are_to_come() {
+fn waiting_scenario_leaves_room_for_its_map() {
     let mut world = world();
     world.state.settings.max_documents = 2;
     world.lay(0, 100);
@@ -60,7 +60,7 @@ fn who_waits_for_a_verdict_leaves_room_to_those_that_are_to_come() {
 }
 
 #[test]
-fn a_map_that_is_mended_is_named_no_more() {
+fn repaired_map_is_no_longer_named() {
     let mut world = world();
     world.rejected.insert(0);
     world.write(0);
@@ -74,7 +74,7 @@ fn a_map_that_is_mended_is_named_no_more() {
 }
 
 #[test]
-fn a_map_whose_verdict_is_the_same_has_nobody_judged_again() {
+fn unchanged_map_verdict_triggers_no_new_judgement() {
     let mut world = world();
     world.write(0);
     world.write(1);
@@ -100,7 +100,7 @@ fn answer(world: &mut World) {
 }
 
 #[test]
-fn a_scenario_waits_for_its_map_and_not_for_ever() {
+fn scenario_waits_for_its_map_up_to_limit() {
     let mut world = both_are_read();
     // The writer is slow with the map.
     answer(&mut world);
@@ -123,7 +123,7 @@ fn run() -> World {
 }
 
 #[test]
-fn a_run_tells_the_verdict_on_a_scenario_once_however_late_its_map_is_found() {
+fn run_reports_scenario_once_despite_late_map() {
     let mut world = run();
     world.rejected.insert(0);
     world.lay(0, 100);
@@ -141,7 +141,7 @@ fn a_run_tells_the_verdict_on_a_scenario_once_however_late_its_map_is_found() {
 }
 
 #[test]
-fn a_run_judges_a_map_that_is_none_of_its_files() {
+fn run_judges_map_outside_its_files() {
     let mut world = run();
     world.rejected.insert(0);
     world.lay(0, 100);
@@ -153,7 +153,7 @@ fn a_run_judges_a_map_that_is_none_of_its_files() {
 }
 
 #[test]
-fn a_run_for_own_verdicts_waits_for_no_map_that_is_none_of_its_files() {
+fn own_verdict_run_does_not_wait_for_outside_map() {
     let mut world = run();
     world.state.settings.own_verdicts = true;
     world.lay(0, 100);
@@ -166,7 +166,7 @@ fn a_run_for_own_verdicts_waits_for_no_map_that_is_none_of_its_files() {
 }
 
 #[test]
-fn client_hears_of_a_scenario_only_after_its_map() {
+fn client_gets_scenario_verdict_only_after_its_map() {
     let mut world = both_are_read();
     world.wait(1);
     answer(&mut world);
@@ -182,7 +182,7 @@ fn client_hears_of_a_scenario_only_after_its_map() {
 }
 
 #[test]
-fn verdict_that_a_killed_broker_left_behind_is_given_anew() {
+fn outdated_verdict_of_killed_broker_is_renewed() {
     let mut world = world();
     world.write(0);
     world.write(1);

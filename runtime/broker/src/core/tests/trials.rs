@@ -116,7 +116,7 @@ fn world_with_a_shadow() -> World {
 }
 
 #[test]
-fn a_shadow_looks_at_what_is_there_and_at_what_comes_and_no_verdict_waits_for_it() {
+fn shadow_checks_all_files_without_delaying_verdicts() {
     let mut world = World::new();
     world.join("First");
     world.write(0);
@@ -145,7 +145,7 @@ fn a_shadow_looks_at_what_is_there_and_at_what_comes_and_no_verdict_waits_for_it
 }
 
 #[test]
-fn it_is_asked_about_one_file_at_a_time_and_after_its_verdict() {
+fn shadow_gets_single_file_at_once_after_its_verdict() {
     let mut world = world_with_a_shadow();
     for file in 0..6 {
         world.write(file);
@@ -164,7 +164,7 @@ fn it_is_asked_about_one_file_at_a_time_and_after_its_verdict() {
 }
 
 #[test]
-fn a_shadow_that_hangs_holds_up_neither_verdicts_nor_the_end() {
+fn hanging_shadow_delays_neither_verdicts_nor_drain() {
     let mut world = world_with_a_shadow();
     world.write(0);
     world.until_judged(1);
@@ -185,7 +185,7 @@ fn a_shadow_that_hangs_holds_up_neither_verdicts_nor_the_end() {
 }
 
 #[test]
-fn one_that_dies_with_a_file_is_asked_once_more_and_then_not_again() {
+fn shadow_that_dies_with_file_is_retried_once() {
     let mut world = world_with_a_shadow();
     world.write(0);
     world.until_judged(1);
@@ -213,7 +213,7 @@ fn one_that_dies_with_a_file_is_asked_once_more_and_then_not_again() {
 }
 
 #[test]
-fn what_it_would_change_is_told_and_follows_the_files() {
+fn verdicts_changed_by_shadow_are_reported() {
     let mut world = world_with_a_shadow();
     for file in [0, 2] {
         world.write(file);
@@ -248,7 +248,7 @@ fn what_it_would_change_is_told_and_follows_the_files() {
 }
 
 #[test]
-fn a_newer_shadow_tries_everything_again_and_the_same_one_nothing() {
+fn newer_shadow_tries_everything_again_and_same_one_nothing() {
     let mut world = world_with_a_shadow();
     world.write(0);
     world.comes_to_rest();
@@ -265,7 +265,7 @@ fn a_newer_shadow_tries_everything_again_and_the_same_one_nothing() {
 }
 
 #[test]
-fn a_shadow_that_comes_has_no_other_try_anything_again() {
+fn joining_shadow_triggers_no_trials_of_others() {
     let mut world = world_with_a_shadow();
     world.write(0);
     world.comes_to_rest();
@@ -281,7 +281,7 @@ fn a_shadow_that_comes_has_no_other_try_anything_again() {
 /// After a restart a shadow may be ready before the watcher has seen the files. The journal already
 /// knows their verdicts.
 #[test]
-fn shadow_that_is_ready_before_the_files_are_seen_tries_them() {
+fn early_shadow_tries_files_seen_later() {
     let seen: [fn(Arc<Path>, Stamp) -> Event; 2] = [
         |path, stamp| Event::Settled { path, stamp },
         |path, _| Event::Present { path },
@@ -310,7 +310,7 @@ fn shadow_that_is_ready_before_the_files_are_seen_tries_them() {
 }
 
 #[test]
-fn who_becomes_a_shadow_need_not_judge_and_who_is_none_any_more_must() {
+fn bundle_is_required_only_while_it_is_no_shadow() {
     let mut world = world_with_a_shadow();
     world.write(0);
     world.comes_to_rest();
@@ -341,7 +341,7 @@ fn who_becomes_a_shadow_need_not_judge_and_who_is_none_any_more_must() {
 }
 
 #[test]
-fn a_shadow_is_restless_to_nobody() {
+fn shadow_is_never_treated_as_flapping() {
     let mut world = world_with_a_shadow();
     world.state.settings.changes_forgiven = 2;
     world.write(0);

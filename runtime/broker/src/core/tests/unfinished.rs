@@ -22,7 +22,7 @@ fn unpublishes(actions: &[Action], file: u8) -> bool {
 }
 
 #[test]
-fn what_is_being_written_is_not_behind_the_gate_and_not_told() {
+fn file_being_written_leaves_gate_and_has_no_verdict() {
     let mut world = judged_world();
     assert!(unpublishes(&write_slowly(&mut world), 1));
     assert!(!unpublishes(&write_slowly(&mut world), 1), "once");
@@ -42,7 +42,7 @@ fn finished_file_is_judged_once() {
 }
 
 #[test]
-fn file_that_was_opened_and_not_written_to_keeps_its_verdict() {
+fn file_opened_without_writing_keeps_its_verdict() {
     let mut world = judged_world();
     let (path, stamp) = (path_of(1), stamp(world.there[&path_of(1)]));
     assert!(world.state.is_settled(&path, stamp));
@@ -56,7 +56,7 @@ fn file_that_was_opened_and_not_written_to_keeps_its_verdict() {
 }
 
 #[test]
-fn who_waits_for_a_file_that_goes_unfinished_is_told_so() {
+fn client_learns_that_unfinished_file_vanished() {
     let mut world = judged_world();
     let path = path_of(4);
     assert!(!world.state.is_settled(&path, stamp(1)));
@@ -79,7 +79,7 @@ fn asked_for_1(world: &mut World) -> Vec<Action> {
 }
 
 #[test]
-fn verdict_that_depends_on_an_unfinished_file_is_not_told() {
+fn verdict_depending_on_unfinished_file_is_withheld() {
     let mut world = two_judged();
     let (path, slow) = (path_of(0), Some(stamp(world.stamps + 1)));
     world.event(Event::Unfinished { path, stamp: slow });
@@ -87,7 +87,7 @@ fn verdict_that_depends_on_an_unfinished_file_is_not_told() {
 }
 
 #[test]
-fn verdict_stands_when_an_unfinished_file_becomes_what_it_was() {
+fn verdict_stands_when_unfinished_file_is_restored() {
     let mut world = two_judged();
     let (before, stored) = (stamp(world.there[&path_of(0)]), world.stored.len());
     let (path, slow) = (path_of(0), Some(stamp(world.stamps + 1)));

@@ -22,7 +22,7 @@ fn is_refused(actions: &[Action]) -> bool {
 }
 
 #[test]
-fn who_cannot_take_part_is_turned_away() {
+fn hello_with_invalid_name_or_protocol_is_refused() {
     let strange = Hello {
         protocol: PROTOCOL_VERSION + 1,
         ..a_hello("Mine")
@@ -49,7 +49,7 @@ fn who_cannot_take_part_is_turned_away() {
 }
 
 #[test]
-fn processes_that_cannot_be_seen_from_here_are_not_the_same() {
+fn second_process_with_invisible_pid_is_refused() {
     let mut world = World::new();
     for (session, refused) in [(98, false), (99, true)] {
         let session = SessionId(session);
@@ -66,7 +66,7 @@ fn processes_that_cannot_be_seen_from_here_are_not_the_same() {
 }
 
 #[test]
-fn a_process_that_says_hello_again_takes_its_own_place() {
+fn process_that_rejoins_takes_its_own_place() {
     let mut world = World::new();
     world.join("First");
     let (incarnation, pid) = (
@@ -90,7 +90,7 @@ fn a_process_that_says_hello_again_takes_its_own_place() {
 }
 
 #[test]
-fn a_catalogue_that_names_a_checker_twice_is_no_catalogue() {
+fn catalogue_with_duplicate_checker_is_refused() {
     let mut unsound = [catalogue("First"), catalogue("First")];
     unsound[0].checkers[1].id = unsound[0].checkers[0].id.clone();
     unsound[1].checkers[0].id = "".into();
@@ -105,7 +105,7 @@ fn a_catalogue_that_names_a_checker_twice_is_no_catalogue() {
 }
 
 #[test]
-fn a_document_is_published_again_for_who_has_its_job() {
+fn document_is_published_again_only_for_its_job() {
     let mut world = World::new();
     world.join("First");
     world.write(0);
@@ -122,7 +122,7 @@ fn a_document_is_published_again_for_who_has_its_job() {
 }
 
 #[test]
-fn what_is_no_message_ends_a_session() {
+fn invalid_message_ends_the_session() {
     let mut world = World::new();
     world.join("First");
     let (session, _) = world.peers.first_key_value().unwrap();
@@ -142,7 +142,7 @@ fn what_is_no_message_ends_a_session() {
 }
 
 #[test]
-fn a_file_that_cannot_be_read_is_undetermined() {
+fn unreadable_file_is_undetermined() {
     let mut world = World::new();
     world.join("First");
     world.write(0);
@@ -159,7 +159,7 @@ fn a_file_that_cannot_be_read_is_undetermined() {
 }
 
 #[test]
-fn a_file_without_room_on_the_bus_is_tried_again_after_a_pause() {
+fn file_without_room_on_bus_is_retried_after_pause() {
     let failures = [
         PrepareFailure::Busy,
         PrepareFailure::NoRoom("full".to_owned()),
@@ -184,7 +184,7 @@ fn a_file_without_room_on_the_bus_is_tried_again_after_a_pause() {
 }
 
 #[test]
-fn a_file_that_is_back_to_what_was_judged_is_written_again_if_another_result_was_begun() {
+fn restored_file_is_rewritten_if_another_result_was_begun() {
     let mut world = World::new();
     world.join("First");
     let (content, other) = (1, 2);
@@ -209,7 +209,7 @@ fn a_file_that_is_back_to_what_was_judged_is_written_again_if_another_result_was
 }
 
 #[test]
-fn with_each_job_that_ends_one_file_without_a_place_on_the_bus_is_tried_again() {
+fn ended_job_retries_one_file_waiting_for_bus() {
     let mut world = World::at_work();
     for file in [1, 2] {
         world.write(file);
@@ -231,7 +231,7 @@ fn with_each_job_that_ends_one_file_without_a_place_on_the_bus_is_tried_again() 
 }
 
 #[test]
-fn what_a_moment_hinders_is_tried_again_with_growing_pauses_and_then_said() {
+fn temporary_read_error_is_retried_and_then_reported() {
     let mut world = World::new();
     world.join("First");
     world.write(0);
@@ -266,7 +266,7 @@ fn what_a_moment_hinders_is_tried_again_with_growing_pauses_and_then_said() {
 }
 
 #[test]
-fn a_file_without_room_is_undetermined_when_nothing_moves_for_long() {
+fn file_without_room_is_undetermined_after_long_standstill() {
     let mut world = World::new();
     world.join("First");
     world.write(0);
@@ -297,7 +297,7 @@ fn a_file_without_room_is_undetermined_when_nothing_moves_for_long() {
 }
 
 #[test]
-fn a_file_without_room_waits_while_another_is_checked() {
+fn file_without_room_waits_while_another_is_checked() {
     let mut world = World::new();
     world.join("First");
     world.write(0);
@@ -315,7 +315,7 @@ fn a_file_without_room_waits_while_another_is_checked() {
 }
 
 #[test]
-fn more_findings_than_a_checker_may_report_are_no_judgement() {
+fn checker_with_too_many_findings_is_not_completed() {
     let mut world = World::new();
     world.state.settings.max_issues = 1;
     world.join("First");
@@ -355,7 +355,7 @@ pub(super) fn waits(file: u8, unwatched: Option<String>, stamp: Option<Stamp>) -
 }
 
 #[test]
-fn who_waits_for_a_file_that_nobody_checks_is_told_so() {
+fn client_waiting_for_unchecked_file_is_informed() {
     let mut world = judged_world();
     let why = Some("it is ignored".to_owned());
     let actions = comes_of(&mut world, waits(4, why, None));
@@ -379,7 +379,7 @@ fn who_waits_for_a_file_that_nobody_checks_is_told_so() {
 }
 
 #[test]
-fn who_waits_for_a_file_that_goes_while_it_is_read_anew_is_not_told_what_it_was() {
+fn client_waiting_for_vanished_file_gets_no_old_verdict() {
     let mut world = judged_world();
     world.write(1);
     world.wait(1);
@@ -398,7 +398,7 @@ fn who_waits_for_a_file_that_goes_while_it_is_read_anew_is_not_told_what_it_was(
 /// While a result is being written, a client's request looks at the inputs of this result, and not
 /// at those of the previous one.
 #[test]
-fn what_a_verdict_on_its_way_rests_on_is_known() {
+fn inputs_of_result_being_written_are_known() {
     let mut world = World::new();
     world.join("First");
     for file in [6, 2] {
@@ -420,7 +420,7 @@ fn what_a_verdict_on_its_way_rests_on_is_known() {
 }
 
 #[test]
-fn who_waits_for_a_file_that_is_back_is_not_told_that_it_has_gone() {
+fn client_waiting_for_restored_file_gets_no_vanished_answer() {
     let mut world = judged_world();
     world.write(1);
     let (job, _) = world.preparing.remove(0);
@@ -435,7 +435,7 @@ fn who_waits_for_a_file_that_is_back_is_not_told_that_it_has_gone() {
 }
 
 #[test]
-fn who_waits_for_a_verdict_that_stands_is_answered_at_once() {
+fn client_waiting_for_standing_verdict_is_answered_at_once() {
     let mut world = judged_world();
     let now = stamp(world.there[&path_of(1)]);
     let actions = comes_of(&mut world, waits(1, None, Some(now)));
@@ -446,7 +446,7 @@ fn who_waits_for_a_verdict_that_stands_is_answered_at_once() {
 }
 
 #[test]
-fn whoever_waits_comes_before_those_for_whom_nobody_does() {
+fn files_with_waiting_clients_are_checked_first() {
     let mut world = World::new();
     world.state.settings.max_active = 1;
     world.join("First");
@@ -466,7 +466,7 @@ fn whoever_waits_comes_before_those_for_whom_nobody_does() {
 }
 
 #[test]
-fn who_waits_for_what_is_not_there_is_not_told_what_was() {
+fn client_waiting_for_missing_file_gets_no_old_verdict() {
     let came_back: fn(&mut World) = |world| {
         let (path, stamp) = (path_of(1), stamp(world.there[&path_of(1)]));
         world.event(Event::Settled { path, stamp });
@@ -495,7 +495,7 @@ fn who_waits_for_what_is_not_there_is_not_told_what_was() {
 }
 
 #[test]
-fn what_a_process_said_before_it_died_is_not_said_twice() {
+fn findings_of_killed_process_are_discarded() {
     let mut world = World::new();
     world.join("First");
     world.write(0);
@@ -511,7 +511,7 @@ fn what_a_process_said_before_it_died_is_not_said_twice() {
 }
 
 #[test]
-fn no_more_is_read_than_there_is_room_for() {
+fn reading_is_limited_by_room_for_documents() {
     // Limit of documents, and files that are in work at the same time.
     for (documents, at_once) in [(48, 4), (3, 3)] {
         let mut world = World::new();
@@ -531,7 +531,7 @@ fn no_more_is_read_than_there_is_room_for() {
 }
 
 #[test]
-fn that_there_is_no_room_is_said_once_in_a_while() {
+fn missing_room_is_reported_only_occasionally() {
     let mut world = World::new();
     world.join("First");
     let said = |world: &World| {
@@ -547,7 +547,7 @@ fn that_there_is_no_room_is_said_once_in_a_while() {
 }
 
 #[test]
-fn a_file_that_changes_while_it_is_read_is_given_to_nobody() {
+fn file_changed_while_read_is_given_to_no_bundle() {
     let mut world = World::new();
     world.join("First");
     world.write(0);
@@ -559,7 +559,7 @@ fn a_file_that_changes_while_it_is_read_is_given_to_nobody() {
 }
 
 #[test]
-fn a_run_does_not_wait_for_a_reporter_that_cannot_start() {
+fn run_does_not_wait_for_reporter_that_cannot_start() {
     let mut world = World::with_a_reporter();
     world.state.settings.once = true;
     world.join("First");
@@ -575,7 +575,7 @@ fn a_run_does_not_wait_for_a_reporter_that_cannot_start() {
 }
 
 #[test]
-fn a_verdict_that_stands_after_all_is_not_told_of_what_is_not_there() {
+fn confirmed_verdict_of_missing_file_is_not_sent() {
     let mut world = judged_world();
     let waits = Event::Wait {
         request_id: RequestId(7),

@@ -41,7 +41,7 @@ fn lists(journal: &Journal) -> i64 {
 }
 
 #[test]
-fn what_jobs_skip_is_kept_once_and_read_with_each() {
+fn list_of_skipped_checkers_is_stored_once() {
     let mut journal = Journal::in_memory().unwrap();
     for (job, skipped) in [
         (1, ["new", "old"]),
@@ -77,7 +77,7 @@ fn what_jobs_skip_is_kept_once_and_read_with_each() {
 }
 
 #[test]
-fn a_list_counts_as_written_once_its_job_is() {
+fn checker_list_counts_as_written_only_with_its_job() {
     let dir = tempfile::tempdir().unwrap();
     let mut journal = Journal::open(dir.path(), "test").unwrap();
     let refuse = |journal: &Journal, sql: &str| journal.connection.execute_batch(sql).unwrap();
@@ -95,7 +95,7 @@ fn a_list_counts_as_written_once_its_job_is() {
 }
 
 #[test]
-fn the_history_of_schema_3_is_kept() {
+fn history_of_schema_3_is_kept() {
     let dir = tempfile::tempdir().unwrap();
     let journal = Journal::open(dir.path(), "test").unwrap();
     journal
@@ -138,7 +138,7 @@ fn verdicts_of_schema_5_are_kept() {
 }
 
 #[test]
-fn what_waits_is_written_by_who_comes_first_and_fails_for_itself_alone() {
+fn waiting_entries_are_written_together_and_fail_alone() {
     let journal = Journal::in_memory().unwrap();
     journal
         .connection
@@ -176,7 +176,7 @@ fn what_waits_is_written_by_who_comes_first_and_fails_for_itself_alone() {
 }
 
 #[test]
-fn many_threads_write_together_and_each_is_there_when_it_is_told_so() {
+fn concurrent_entries_are_written_before_confirmation() {
     let dir = tempfile::tempdir().unwrap();
     let shared = SharedJournal::from(Journal::open(dir.path(), "test").unwrap());
     let names = Connection::open(dir.path().join("journal.sqlite")).unwrap();

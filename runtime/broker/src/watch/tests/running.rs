@@ -102,7 +102,7 @@ fn put(path: &Path) {
 }
 
 #[test]
-fn files_in_directories_that_have_just_come_are_all_told() {
+fn files_in_new_directories_are_all_reported() {
     let ((_dir, root), (_other, aside)) = (farm(), farm());
     let mut watched = Watched::start(&root);
     for round in 0..100 {
@@ -137,7 +137,7 @@ fn files_in_directories_that_have_just_come_are_all_told() {
 }
 
 #[test]
-fn a_tree_that_is_written_by_many_at_once_is_told_as_a_whole() {
+fn tree_with_many_writers_is_reported_completely() {
     let (_dir, root) = farm();
     let mut watched = Watched::start(&root);
     let names: Vec<PathBuf> = (0..2_000)
@@ -159,7 +159,7 @@ fn a_tree_that_is_written_by_many_at_once_is_told_as_a_whole() {
 }
 
 #[test]
-fn a_root_that_is_replaced_is_watched_anew() {
+fn replaced_root_is_watched_again() {
     let (_dir, base) = farm();
     let root = base.join("above/inbox");
     fs::create_dir_all(&root).unwrap();
@@ -202,7 +202,7 @@ fn a_root_that_is_replaced_is_watched_anew() {
 }
 
 #[test]
-fn what_is_above_a_root_may_be_away_for_long() {
+fn parent_of_a_root_may_be_missing_for_long() {
     let (_dir, base) = farm();
     let root = base.join("above/inbox");
     fs::create_dir_all(root.join("maps")).unwrap();
@@ -227,7 +227,7 @@ fn what_is_above_a_root_may_be_away_for_long() {
 
 /// The watcher reports this once and not every second. It does not scan again and again.
 #[test]
-fn a_root_that_becomes_a_link_is_away_until_it_is_a_directory() {
+fn linked_root_is_gone_until_replaced_by_a_directory() {
     let (_dir, base) = farm();
     let (root, aside) = (base.join("inbox"), base.join("aside"));
     fs::create_dir(&root).unwrap();
@@ -268,7 +268,7 @@ fn outside() -> (tempfile::TempDir, PathBuf) {
 /// The watcher ignores everything behind a link to a directory. The time of the link's creation and
 /// events behind the link do not matter.
 #[test]
-fn links_to_directories_are_never_followed_however_they_came() {
+fn links_to_directories_are_never_followed() {
     let ((_dir, root), (_other, outside)) = (farm(), outside());
     fs::create_dir(root.join("2026-11-20")).unwrap();
     put(&root.join("2026-11-20/a.xodr"));
@@ -316,7 +316,7 @@ fn links_to_directories_are_never_followed_however_they_came() {
 
 /// Something happens in a directory while a link to another directory replaces it, over and over.
 #[test]
-fn a_directory_that_flips_to_a_link_is_not_followed_in_between() {
+fn directory_swapped_for_a_link_is_not_followed() {
     let ((_dir, root), (_other, outside)) = (farm(), outside());
     let mut watched = Watched::start(&root);
     let (maps, aside) = (root.join("maps"), root.join("aside"));
@@ -341,7 +341,7 @@ fn a_directory_that_flips_to_a_link_is_not_followed_in_between() {
 }
 
 #[test]
-fn a_directory_that_is_closed_and_a_link_to_everything_cost_themselves() {
+fn links_to_large_trees_do_not_affect_other_directories() {
     let (_dir, root) = farm();
     symlink("/", root.join("everything")).unwrap();
     symlink("/proc/self/cwd", root.join("magic")).unwrap();
@@ -372,7 +372,7 @@ fn storm(root: &Path, is_over: &AtomicBool) {
 }
 
 #[test]
-fn who_storms_in_one_place_keeps_no_other_from_being_told() {
+fn event_storm_does_not_delay_other_directories() {
     let (_dir, root) = farm();
     let wide = root.join("here/wide");
     for number in 0..1_500 {
@@ -419,7 +419,7 @@ fn fill_up(root: &Path) {
 }
 
 #[test]
-fn what_lies_too_deep_is_said_and_the_rest_is_told() {
+fn too_deep_directory_is_reported_and_the_rest_watched() {
     let (_dir, root) = farm();
     fill_up(&root);
     put(&root.join("a.xodr"));
@@ -438,7 +438,7 @@ fn what_lies_too_deep_is_said_and_the_rest_is_told() {
 }
 
 #[test]
-fn many_things_that_cannot_be_looked_at_are_not_each_said() {
+fn many_unseen_entries_are_reported_up_to_a_limit() {
     let (_dir, root) = farm();
     for number in 0..3_000 {
         symlink("nowhere", root.join(format!("{number}.xodr"))).unwrap();
@@ -454,7 +454,7 @@ fn many_things_that_cannot_be_looked_at_are_not_each_said() {
 }
 
 #[test]
-fn names_of_the_longest_kind_are_told() {
+fn files_with_the_longest_names_are_reported() {
     let (_dir, root) = farm();
     let mut watched = Watched::start(&root);
     let directory = "m".repeat(255);

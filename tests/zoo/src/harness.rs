@@ -141,7 +141,7 @@ pub fn catalogue() -> Catalogue {
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
 /// Runs an animal until the broker releases it or its behaviour ends it.
-pub fn keep(animal: &'static Animal, args: &Args) -> ExitCode {
+pub fn run(animal: &'static Animal, args: &Args) -> ExitCode {
     if args.die_with_parent {
         use rustix::process::{Signal, set_parent_process_death_signal};
         if let Err(error) = set_parent_process_death_signal(Some(Signal::KILL)) {
