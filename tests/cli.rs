@@ -191,7 +191,7 @@ fn unknown_names_in_a_configuration_are_always_reported() {
     cli.write("a.xodr", Content::Good(1).bytes());
     cli.write("config.xml", ODD);
     let said = cli.qcbus(&["config", "check", "config.xml"]);
-    refused(&said, &cli, 2, "not in order, 4 warnings");
+    refused(&said, &cli, 2, "not valid, 4 warnings");
     says_it_all(&said.stdout);
 
     // The unknown checker and the unknown bundle are demanded, but cannot be run.
@@ -266,11 +266,11 @@ fn own_bundle_is_known_by_its_manifest() {
     let text = r#"<Config><CheckerBundle application="mine"><Checker checkerId="c"/></CheckerBundle></Config>"#;
     cli.write("config.xml", text);
     let check = ["config", "check", "config.xml"];
-    refused(&cli.qcbus(&check), &cli, 2, "not in order, 1 warning:");
+    refused(&cli.qcbus(&check), &cli, 2, "not valid, 1 warning:");
     let said = cli.qcbus(&[&check[..], &["--bundles-d", "d"]].concat());
     assert_eq!(said.code, Some(0), "{}", said.whole(&cli));
     assert!(
-        said.stdout.contains("is known only when it has joined"),
+        said.stdout.contains("only known once it has joined"),
         "{}",
         said.stdout
     );

@@ -113,7 +113,10 @@ fn number_of_unrequested_checkers_is_reported() {
     let said = check_with(&cli, "xodrBundle", &[IDS], &good);
     let whole = said.whole(&cli);
     assert_eq!(said.code, Some(0), "{whole}");
-    let line = said.stdout.lines().find(|line| line.contains("not asked"));
+    let line = said
+        .stdout
+        .lines()
+        .find(|line| line.contains("not requested"));
     let line = line.unwrap_or_else(|| panic!("{whole}")).trim();
     let (_, numbers) = line
         .split_once("not requested, so the verdicts do not cover it: ")
@@ -126,5 +129,5 @@ fn number_of_unrequested_checkers_is_reported() {
     assert!(out + 1 == all && all > 200, "{line}");
 
     let plain = cli.qcbus(&["check", &good.to_string_lossy()]);
-    assert!(!plain.stdout.contains("not asked"), "{}", plain.stdout);
+    assert!(!plain.stdout.contains("not requested"), "{}", plain.stdout);
 }

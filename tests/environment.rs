@@ -162,7 +162,7 @@ fn first_line_of_a_script_selects_the_interpreter() {
     let (code, text) = add("#!/nowhere/python3");
     assert_eq!(code, Some(2), "{text}");
     assert!(text.contains("cannot run /nowhere/python3"), "{text}");
-    assert!(text.contains("mine.py begins"), "{text}");
+    assert!(text.contains("mine.py)"), "{text}");
 }
 
 #[test]

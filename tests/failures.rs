@@ -99,7 +99,7 @@ fn bundle_of_another_version_is_refused() {
     let farm = Farm::new();
     let _broker = farm.serve_ready();
     farm.let_in("speaks_another_protocol", "");
-    let said = notice(&farm, "turned away");
+    let said = notice(&farm, "refused: ");
     let ours = qcbus_messages::PROTOCOL_VERSION;
     // The bundle's version is far from the broker's. The test does not depend on either number.
     let words: Vec<&str> = said.split(' ').collect();

@@ -333,7 +333,7 @@ fn unreadable_directory_prevents_acceptance() {
     rights(&closed, 0o700);
     assert_eq!(said.code, Some(3), "{}", said.whole(&cli));
     let told = cli.tidy(&said.stderr);
-    let note = "note: not scanned: [DIR]/maps/closed: cannot look into this directory";
+    let note = "note: not scanned: [DIR]/maps/closed: cannot read this directory";
     assert_eq!(told.matches(note).count(), 1, "{told}");
 }
 
@@ -429,7 +429,10 @@ fn only_directories_without_watches_are_polled() {
         return;
     };
     // The watched directory and three in it use all available watches.
-    wait_for_mode(&farm, "events; 7 directories every 2 s");
+    wait_for_mode(
+        &farm,
+        "events; 7 directories that cannot be watched are scanned every 2 s",
+    );
     for number in 0..10 {
         farm.write(&format!("{number}/a.xodr"), &Content::Good(number).bytes());
     }
@@ -456,7 +459,7 @@ fn missing_events_lead_to_polling_and_advice() {
     let Some(_broker) = serve_with(test, limit, &farm) else {
         return;
     };
-    wait_for_mode(&farm, "poll every 2 s, because events cannot be had");
+    wait_for_mode(&farm, "poll every 2 s, because events are not available");
     std::fs::create_dir(farm.root().join("maps")).unwrap();
     farm.write("maps/a.xodr", &Content::Good(1).bytes());
     farm.settle(1);

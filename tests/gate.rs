@@ -370,7 +370,7 @@ fn results_and_gate_must_be_separate() {
             .arg(farm.root())
             .current_dir(farm.base());
         let said = refused(command.args(["--gate", gate, "--out", out]));
-        assert!(said.contains("directory of its own"), "{said}");
+        assert!(said.contains("separate directory for the gate"), "{said}");
     }
 }
 

@@ -397,7 +397,7 @@ fn unusable_module_is_removed_after_adding() {
     std::fs::write(&program, "#!/bin/sh\nexit 0\n").unwrap();
     let (code, text) = add(&farm, "guest", &program);
     assert_eq!(code, Some(2), "{text}");
-    assert!(text.contains("it was taken out again"), "{text}");
+    assert!(text.contains("it was removed again"), "{text}");
     until_or(
         "the log says why",
         || farm.log().contains("no result").then_some(()),
@@ -506,7 +506,7 @@ fn shadow_can_be_a_one_shot_module() {
     let said = farm.qcbus(&["bundle", "add", "--shadow", "guest", "--asam", &command]);
     let text = String::from_utf8([said.stdout, said.stderr].concat()).unwrap();
     assert!(
-        text.contains("a shadow: without weight in any verdict"),
+        text.contains("a shadow and does not affect verdicts"),
         "{text}"
     );
     farm.write("a.xodr", &Content::Good(1).bytes());

@@ -134,7 +134,7 @@ fn waiting_for_a_special_file_gives_the_reason() {
         assert!(said.contains(why), "{name}: {said}");
     }
     // A missing file may still appear.
-    farm.wait_in_vain(&at("gone.xodr"), &[], "there is no such file");
+    farm.wait_in_vain(&at("gone.xodr"), &[], "the file does not exist");
     assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
     assert!(broker.wait().success());
 }

@@ -80,7 +80,7 @@ async fn bundle_of_another_instance_is_not_killed() {
         panic!("it was let in: {:?}", refused.err());
     };
     assert!(why.contains("does not prove it"), "{why}");
-    is_said(&here, "`liar` says that a broker has started it");
+    is_said(&here, "`liar` states that a broker has started it");
     // The process may join by hand, and the broker knows which process it is.
     let mut liar = lie(&here, hello("liar", victim.pid, None)).await.unwrap();
     until_or(
@@ -154,7 +154,7 @@ fn child_joins_only_under_its_manifest_name() {
     let _broker = farm.serve_ready();
     // This bundle comes from a manifest and claims to be a standard bundle.
     farm.let_in("slow", "--name xodrBundle");
-    is_said(&farm, "`xodrBundle` says that a broker has started it");
+    is_said(&farm, "`xodrBundle` states that a broker has started it");
     farm.write("bad.xodr", &Content::NoHeader(1).bytes());
     farm.send_away("slow");
     assert_eq!(farm.verdict("bad.xodr").verdict, Verdict::Rejected);

@@ -224,8 +224,8 @@ fn hanging_stale_child_is_killed_by_the_next_broker() {
     let _broker = farm.serve_ready();
     has_gone(&farm, &frozen);
     // The first of the two that is killed ends the other one, too.
-    let words = [frozen.pid, launcher]
-        .map(|pid| format!("process {pid}, which an earlier broker had started"));
+    let words =
+        [frozen.pid, launcher].map(|pid| format!("process {pid}, which an earlier broker started"));
     let is_said = || words.iter().any(|it| farm.log().contains(it));
     until_or("it is said", || is_said().then_some(()), || farm.log());
 }

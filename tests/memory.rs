@@ -112,7 +112,10 @@ fn map_that_never_fits_is_undetermined_at_once() {
         assert_eq!(code, Some(3), "{said}");
         assert!(said.contains("undetermined: large.xodr"), "{said}");
         assert!(said.contains("small.xodr: "), "{said}");
-        assert!(said.contains("/dev/shm has 33554432 in all"), "{said}");
+        assert!(
+            said.contains("/dev/shm has only 33554432 in total"),
+            "{said}"
+        );
         assert!(said.contains("docker run --shm-size="), "{said}");
     });
 }
@@ -139,7 +142,7 @@ fn map_that_may_fit_later_waits_for_limited_time() {
         let bounded = ["check", "map.xodr", "--out", "out", "--room-limit", "1s"];
         let (code, said) = place.run(&bounded);
         assert_eq!(code, Some(3), "{said}");
-        assert!(said.contains("nothing became free for 1 seconds"), "{said}");
+        assert!(said.contains("no room became free for 1 seconds"), "{said}");
 
         // The memory is so full that a broker cannot start.
         fill(60);
@@ -147,7 +150,7 @@ fn map_that_may_fit_later_waits_for_limited_time() {
         assert_eq!(code, Some(5), "{said}");
         assert!(said.contains("waiting for shared memory"), "{said}");
         assert!(
-            said.contains("until nothing had moved for 1 seconds"),
+            said.contains("until nothing had changed for 1 seconds"),
             "{said}"
         );
 
@@ -233,8 +236,8 @@ fn check_ended_by_a_signal_names_the_unchecked_files() {
                     let rest = rest.join("\n");
                     assert_eq!(check.wait().unwrap().code(), Some(3), "{signal}: {rest}");
                     assert!(rest.contains("stopped by a signal"), "{signal}: {rest}");
-                    let named =
-                        rest.contains("  large.xodr") || rest.contains("nothing was looked at");
+                    let named = rest.contains("  large.xodr")
+                        || rest.contains("known: nothing was checked");
                     assert!(
                         named && !rest.contains("nothing to check"),
                         "{signal}: {rest}"

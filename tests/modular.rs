@@ -118,7 +118,11 @@ fn inputs_of_a_scenario_are_not_overwritten() {
     for (file, output) in [(MAIN, MAIN), (MAIN, LIBRARY), (PACKED, PACKED)] {
         let said = cli.qcbus(&["expand", file, "-o", output]);
         assert_eq!(said.code, Some(2), "{}", said.whole(&cli));
-        assert!(said.stderr.contains("made of it"), "{}", said.stderr);
+        assert!(
+            said.stderr.contains("a source file of the scenario"),
+            "{}",
+            said.stderr
+        );
         let now = std::fs::read(cli.path().join(output)).unwrap();
         assert!(now == sample(output), "{output}");
     }
@@ -141,8 +145,8 @@ fn failed_packing_leaves_nothing_behind() {
             &["pack", MAIN, "gone.xosc", "-o", "x.mosc"],
             "cannot read gone.xosc",
         ),
-        (&["pack", MAIN, "-o", "x.zip"], "ends in .mosc"),
-        (&["pack", MAP, "-o", "x.mosc"], "ends in .xosc"),
+        (&["pack", MAIN, "-o", "x.zip"], "must end in .mosc"),
+        (&["pack", MAP, "-o", "x.mosc"], "must end in .xosc"),
         (&["expand", "gone.mosc", "-o", "x.xosc"], "no such file"),
     ];
     for (arguments, part) in cases {
@@ -349,7 +353,7 @@ fn scenario_that_cannot_be_expanded_is_never_accepted() {
     let whole = said.whole(&cli);
     assert_eq!(said.code, Some(1), "{whole}");
     assert!(said.stdout.contains("cannot be expanded"), "{whole}");
-    assert!(said.stdout.contains("says `8` and `9`"), "{whole}");
+    assert!(said.stdout.contains("gives it `8` and `9`"), "{whole}");
 }
 
 #[test]

@@ -152,7 +152,7 @@ fn manifest_planted_in_the_inbox_is_not_run() {
             &evil(&inbox.trace()),
         );
         let because = match inbox_mode {
-            0o777 => "everybody may write to",
+            0o777 => "everyone may write to",
             _ => "qcbus-out belongs to user 12345",
         };
         inbox.is_refused(&[], &[because, "qcbus-out/.qcbus/bundles.d", "--state"]);
@@ -267,7 +267,7 @@ fn manifest_planted_later_is_reported_and_not_run() {
     std::fs::remove_file(&path).unwrap();
     // From now on every user may write to this directory.
     mode(&farm.bundles_d(), 0o777);
-    is_said("everybody may write to");
+    is_said("everyone may write to");
     let older = |it: &qcbus_messages::control::NoticeStatus| it.text.contains("user 12345");
     let notices = farm.status().unwrap().notices;
     assert!(
@@ -302,7 +302,7 @@ fn program_writable_by_others_is_not_restarted() {
     std::fs::write(&program, format!("#!/bin/sh\ntouch {}\n", trace.display())).unwrap();
     until_or(
         "it is not started",
-        || note("everybody may write to"),
+        || note("everyone may write to"),
         explain,
     );
     assert!(!trace.exists(), "it was started");
@@ -370,7 +370,7 @@ fn user_without_privileges_has_a_runtime_directory() {
     mode(dir.path(), 0o1777);
     let said = status_as(NOBODY, &[("TMPDIR", dir.path())]);
     let text = String::from_utf8_lossy(&said.stderr).into_owned();
-    assert!(text.contains("no broker runs"), "{text}");
+    assert!(text.contains("no broker serves"), "{text}");
     assert_eq!(mode_of(&dir.path().join("qcbus-65534")), 0o700);
 }
 
@@ -388,6 +388,9 @@ fn results_writable_by_others_are_reported() {
     let said = notices.iter().find(|it| it.kind == "storing").unwrap();
     let gate = farm.gate();
     assert!(said.text.contains(gate.to_str().unwrap()), "{notices:?}");
-    assert!(said.text.contains("is not ours alone"), "{notices:?}");
+    assert!(
+        said.text.contains("is not under this user's sole control"),
+        "{notices:?}"
+    );
     assert!(!said.text.contains(farm.out().to_str().unwrap()));
 }

@@ -97,7 +97,7 @@ fn cases() -> Vec<Case> {
             "simulators_own",
             "Town05",
             "accepted",
-            "a map that the simulator knows",
+            "a map of the simulator",
         ),
         map("missing", "../maps/gone.xodr", "rejected", NOT_THERE),
         map(

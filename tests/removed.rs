@@ -156,7 +156,7 @@ fn replaced_result_and_gate_directories_are_filled_again() {
     other.arguments = vec!["--gate".to_owned(), gate, "--state".to_owned(), state];
     let refused = other.serve_command().output().unwrap();
     let said = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(said.contains("of another broker that runs"), "{said}");
+    assert!(said.contains("of another running broker"), "{said}");
 }
 
 #[test]
@@ -175,7 +175,7 @@ fn directory_taken_by_another_broker_is_left_to_it() {
     other.verdict("other.xodr");
     there(&other, &[other.gate().join("other.xodr")]);
     farm.write("late.xodr", &Content::Good(3).bytes());
-    until_failing(&farm, "another broker");
+    until_failing(&farm, "another running broker");
     let there: Vec<_> = std::fs::read_dir(other.gate()).unwrap().collect();
     assert_eq!(there.len(), 2, "its mark and its file: {there:?}");
 }

@@ -259,7 +259,7 @@ fn results_of_a_deleted_file_are_removed() {
     until_so("result and reports are withdrawn", || of_a().is_empty());
     farm.settle(1);
     // The file could come back, but it does not within the time limit.
-    farm.wait_in_vain(&farm.root().join("a.xodr"), &[], "there is no such file");
+    farm.wait_in_vain(&farm.root().join("a.xodr"), &[], "the file does not exist");
     assert!(farm.out().join("stays.xodr.xqar").exists());
 }
 

@@ -36,7 +36,7 @@ fn add_strict(farm: &Farm) {
     let (code, text) = bundle(farm, &["add", "--shadow", STRICT, zoo, STRICT]);
     assert_eq!(code, Some(0), "{text}");
     assert!(
-        text.contains("a shadow: without weight in any verdict"),
+        text.contains("a shadow and does not affect verdicts"),
         "{text}"
     );
 }
@@ -113,12 +113,12 @@ fn shadow_reports_its_effect_and_changes_no_verdict() {
 
     let (code, text) = bundle(&farm, &["upgrade", STRICT, "--no-shadow"]);
     assert_eq!(code, Some(0), "{text}");
-    assert!(text.contains("it judges from now on"), "{text}");
+    assert!(text.contains("it affects verdicts from now on"), "{text}");
     assert_eq!(verdict("before.xodr"), Verdict::Rejected);
     assert_eq!(verdict("clean.xodr"), Verdict::Accepted);
     let (code, text) = bundle(&farm, &["trials", STRICT]);
     assert_eq!(code, Some(2), "{text}");
-    assert!(text.contains("is no shadow here"), "{text}");
+    assert!(text.contains("is not a shadow here"), "{text}");
 
     let (code, text) = bundle(&farm, &["upgrade", STRICT, "--shadow"]);
     assert_eq!(code, Some(0), "{text}");
@@ -225,7 +225,7 @@ fn check_skips_shadows_and_reports_this() {
     ]));
     assert_eq!(code, Some(0), "{text}");
     assert!(
-        text.contains("is a shadow: it takes no part in a run"),
+        text.contains("is a shadow: it is not used in a run"),
         "{text}"
     );
 }

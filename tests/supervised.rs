@@ -154,7 +154,7 @@ fn other_user_learns_the_owner_of_the_broker() {
     let said = status_for_nobody(&program, &missing).unwrap();
     let why = String::from_utf8(said.stderr).unwrap();
     assert_eq!(said.status.code(), Some(4), "{why}");
-    assert!(why.contains("no broker runs as this instance"), "{why}");
+    assert!(why.contains("no broker serves this instance"), "{why}");
 }
 
 #[test]
@@ -236,11 +236,7 @@ fn configuration_not_in_force_is_unhealthy() {
     let _broker = farm.serve_ready();
     until_health(&farm, 0, "healthy\n");
     std::fs::write(&config, "<Config>").unwrap();
-    until_health(
-        &farm,
-        1,
-        "the configuration in force is not the one on disk",
-    );
+    until_health(&farm, 1, "the configuration on disk is not in force");
     std::fs::write(&config, good).unwrap();
     until_health(&farm, 0, "healthy\n");
 }
@@ -263,7 +259,7 @@ fn missing_required_bundle_is_unhealthy() {
     let _broker = farm.serve_ready();
     until_health(&farm, 0, "healthy\n");
     std::fs::write(&config, names("nixBundle")).unwrap();
-    until_health(&farm, 1, "demands nixBundle, which has not joined\n");
+    until_health(&farm, 1, "requires nixBundle, which has not joined\n");
 }
 
 #[test]

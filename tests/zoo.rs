@@ -157,7 +157,7 @@ fn floods_issues() {
     let (farm, broker) = beside_within(PATIENT, "floods_issues", "");
     let reasons = reasons_of(&farm, "0.xodr", "floods_issues");
     assert!(
-        reasons.iter().any(|it| it.contains("were cut off")),
+        reasons.iter().any(|it| it.contains("were dropped")),
         "{reasons:#?}"
     );
     // Many floods at once use no more memory of the broker than a few, because waiting jobs stay in
@@ -182,7 +182,7 @@ fn results_are_small(farm: &Farm) {
 
 #[test]
 fn floods_metadata() {
-    let reason = "its parameters and metadata take 3145";
+    let reason = "too many parameters and metadata: they take 3145";
     let (farm, broker) = beside_within(PATIENT, "floods_metadata", reason);
     results_are_small(&farm);
     let peak = peak_private_kib(broker.pid()).unwrap();
@@ -230,7 +230,7 @@ fn lies_about_job_id() {
     let (farm, _broker) = beside("lies_about_job_id", "");
     assert!(!reasons_of(&farm, "0.xodr", "lies_about_job_id").is_empty());
     until_so("it is said", || {
-        notices(&farm).contains("it speaks of jobs or checkers")
+        notices(&farm).contains("it refers to jobs or checkers")
     });
 }
 
@@ -266,7 +266,7 @@ fn reporter_that_never_acknowledges_is_reported() {
 #[test]
 fn another_protocol_is_refused_with_both_versions() {
     let (farm, _broker) = beside("speaks_another_protocol", "");
-    until_so("it is said", || notices(&farm).contains("speaks protocol"));
+    until_so("it is said", || notices(&farm).contains("uses protocol"));
     assert_eq!(
         farm.verdict("0.xodr").verdict,
         Verdict::Undetermined,
@@ -314,7 +314,7 @@ fn only_the_harmful_file_is_undetermined() {
     assert!(
         reasons
             .iter()
-            .all(|it| it.contains("alone in a fresh process")),
+            .all(|it| it.contains("in a new process with only this file")),
         "{reasons:#?}"
     );
     assert_eq!(farm.verdict("0.xodr").verdict, Verdict::Accepted);

@@ -30,7 +30,7 @@ pub struct Judgement {
 const GATE_MARK: &str = ".qcbus-gate";
 
 /// Words that the broker uses when it condemns a file.
-const CONDEMNED: &str = "times on this file alone in a fresh process";
+const CONDEMNED: &str = "times in a new process with only this file";
 
 /// Checks the whole farm. `strangers` are bundles with checkers that may be in error.
 pub fn judge(farm: &Farm, files: &Files, strangers: &[&str]) -> Judgement {

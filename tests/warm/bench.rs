@@ -14,9 +14,9 @@ use crate::support::processes::signal_pid;
 use crate::support::watchdog::until_or;
 
 /// Note under `-v` that a broker made the check.
-const WARM: &str = "note: checked by the broker that runs";
+const WARM: &str = "note: checked by the running broker";
 /// Note under `-v` that a broker should have made the check but did not.
-const COLD: &str = "note: checked without the broker that runs";
+const COLD: &str = "note: checked without the running broker";
 /// Output directory of checks, relative to the cli.
 const OUT: &str = "out";
 

@@ -210,9 +210,9 @@ fn result_older_than_its_run_is_failure() {
 
 #[test]
 fn result_that_is_no_regular_file_is_failure() {
-    Guest::doing("mkfifo \"$result\"").is_open(&[], &["no file"]);
-    Guest::doing("polite; mv \"$result\" x; ln -s x \"$result\"").is_open(&[], &["no file"]);
-    Guest::doing("mkdir \"$result\"").is_open(&[], &["no file"]);
+    Guest::doing("mkfifo \"$result\"").is_open(&[], &["not a file"]);
+    Guest::doing("polite; mv \"$result\" x; ln -s x \"$result\"").is_open(&[], &["not a file"]);
+    Guest::doing("mkdir \"$result\"").is_open(&[], &["not a file"]);
 }
 
 #[test]
@@ -226,10 +226,11 @@ fn crash_is_reported_with_last_output() {
 #[test]
 fn module_beyond_time_limit_is_killed() {
     Guest::doing("polite; while :; do :; done")
-        .is_open(&["--seconds", "1"], &["not done after 1 s"]);
-    Guest::doing("polite; kill -STOP $$").is_open(&["--seconds", "1"], &["not done after 1 s"]);
+        .is_open(&["--seconds", "1"], &["did not finish within 1 s"]);
+    Guest::doing("polite; kill -STOP $$")
+        .is_open(&["--seconds", "1"], &["did not finish within 1 s"]);
     let deaf = "polite; trap '' TERM INT HUP; while :; do sleep 1; done";
-    Guest::doing(deaf).is_open(&["--seconds", "1"], &["not done after 1 s"]);
+    Guest::doing(deaf).is_open(&["--seconds", "1"], &["did not finish within 1 s"]);
 }
 
 #[test]
@@ -346,7 +347,7 @@ fn module_that_describes_no_checkers_is_refused() {
         let (code, said) = guest.judge(&[]);
         assert_eq!(code, Some(5), "{said}");
         assert!(
-            said.contains("of no use as a bundle") && said.contains("because"),
+            said.contains("cannot be used as a bundle") && said.contains("because"),
             "{said}"
         );
         assert!(

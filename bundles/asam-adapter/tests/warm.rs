@@ -287,10 +287,10 @@ fn unsupported_command_is_refused_with_reason() {
     shop.module("loops.py", "import loops_too\n");
     shop.module("loops_too.py", "import loops\n");
     for (command, why) in [
-        ("shell", "/bin/shell` is no Python program"),
-        ("/bin/ls", "/bin/ls` is no Python program"),
+        ("shell", "/bin/shell` is not a Python program"),
+        ("/bin/ls", "/bin/ls` is not a Python program"),
         ("no-such-program", "`no-such-program` is not on the PATH"),
-        ("./late", "name it by its whole path"),
+        ("./late", "use its absolute path"),
         (
             "late",
             "/bin/late` does not begin with imports, so that nothing of it can be loaded ahead",
@@ -300,7 +300,7 @@ fn unsupported_command_is_refused_with_reason() {
             "spaced",
             "its interpreter has the option `-s -E`, which only a plain run supports",
         ),
-        ("split", "/bin/split` is no Python program"),
+        ("split", "/bin/split` is not a Python program"),
         (
             "shim",
             "is a script, which may choose an interpreter for each job",
@@ -467,7 +467,7 @@ fn killed_fork_server_leaves_its_jobs_to_subreaper() {
     assert_eq!(gone.kind(), std::io::ErrorKind::UnexpectedEof);
     assert!(
         gone.to_string()
-            .ends_with("has ended, with 1 jobs under way"),
+            .ends_with("has ended, with 1 jobs still running"),
         "{gone}"
     );
     assert_eq!(server.running(), [pid]);

@@ -155,14 +155,14 @@ fn invalid_archive_is_reported_at_its_reference() {
         &found("none", vec![root.clone(), broken.clone()]),
         &[(
             "error archive_main_present",
-            "`library.mosc`: the file is no zip archive",
+            "`library.mosc`: the file is not a zip archive",
         )],
     );
     expect(
         &found("none_itself", vec![broken]),
         &[(
             "error archive_main_present",
-            "`library.mosc`: the file is no zip archive",
+            "`library.mosc`: the file is not a zip archive",
         )],
     );
     let (name, mut bytes) = archive("library.mosc", vec![file("main.xosc", library())]);
@@ -234,27 +234,27 @@ fn duplicate_member_names_are_reported_once_per_archive() {
     }
     expect(
         &found("twice", vec![(name, bytes)]),
-        &[("error archive_path_safety", "one name, `aa.xosc`")],
+        &[("error archive_path_safety", "the same name, `aa.xosc`")],
     );
 }
 
 #[test]
 fn escaping_member_names_are_not_also_reported_as_unused() {
     for (test, name, what) in [
-        ("up", "../x.xosc", "leads out of the archive"),
+        ("up", "../x.xosc", "points outside the archive"),
         (
             "up_back",
             "..\\x.xosc",
-            "`..\\x.xosc` leads out of the archive",
+            "`..\\x.xosc` points outside the archive",
         ),
-        ("root", "/x.xosc", "leads out of the archive"),
-        ("drive", "C:x.xosc", "leads out of the archive"),
+        ("root", "/x.xosc", "points outside the archive"),
+        ("drive", "C:x.xosc", "points outside the archive"),
         (
             "back",
             "a\\x.xosc",
             "`a\\x.xosc` has a backslash in its name",
         ),
-        ("control", "../\tx", "`../\\tx` leads out of the archive"),
+        ("control", "../\tx", "`../\\tx` points outside the archive"),
     ] {
         let members = vec![file("main.xosc", library()), file(name, library())];
         expect(
@@ -273,7 +273,7 @@ fn bare_doctype_is_information_and_commented_out_is_ignored() {
         (
             "doctype_bare",
             bare,
-            &[("information xml_no_doctype", "does no harm")][..],
+            &[("information xml_no_doctype", "it is harmless")][..],
         ),
         (
             "doctype_comment",

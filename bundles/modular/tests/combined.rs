@@ -291,7 +291,7 @@ fn two_values_for_same_key_are_ambiguous_and_duplicate() {
     ];
     let tie = found("tie", &files, "key_ambiguous");
     assert!(
-        tie.len() == 1 && tie[0].0.contains("can have one value only"),
+        tie.len() == 1 && tie[0].0.contains("can have only one value"),
         "{tie:?}"
     );
     let twice = found("tie", &files, "key_duplicate");
@@ -351,7 +351,7 @@ fn malformed_parameter_attribute_list_is_reported_as_such() {
     ];
     let said = found("misread", &files, "key_matches");
     let text =
-        "names `x` in `parameterAttributes`, but not as its name alone between commas: `x ; y`";
+        "lists `x` in `parameterAttributes`, but not as a single name between commas: `x ; y`";
     assert!(said.len() == 1 && said[0].0.ends_with(text), "{said:?}");
 }
 

@@ -35,7 +35,7 @@ def test_a_table_of_elements():
         "element": "b",
         "keys": ["s", "length", "no"],
     }
-    with pytest.raises(KeyError, match="`x` was asked for"):
+    with pytest.raises(KeyError, match="`x` was not requested"):
         look(MAP, lambda doc: doc.table("road", "length")["x"])
     with pytest.raises(IndexError):
         look(MAP, lambda doc: doc.table("road")[2])
@@ -121,7 +121,7 @@ def test_samples():
     rows = list(zip(widths["road"], widths["s"], widths["lane"], widths["width"]))
     assert rows == [(0, 0.0, 1, 3.0), (0, 0.0, -1, 2.0), (0, 10.0, 1, 4.0), (0, 10.0, -1, 2.0)]
     for step in (0.0, -1.0, math.nan, math.inf):
-        with pytest.raises(ValueError, match="leads nowhere"):
+        with pytest.raises(ValueError, match="must be a finite number"):
             look(RING, lambda doc: doc.poses(step))
     with pytest.raises(ValueError, match="samples; at most"):
         look(RING, lambda doc: doc.poses(1e-9))

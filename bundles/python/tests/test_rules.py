@@ -126,9 +126,9 @@ def test_what_a_finding_cannot_be():
         _, [(_, why)] = run(bundle_of(check), MAP)
         assert re.search(text, why), why
 
-    fails(lambda doc, found: found.issue("road", "x"), "points at an element, a road, .* of its job, not at str")
-    fails(lambda doc, found: found.issue(doc, "x", level="fatal"), "`fatal` is no level")
-    fails(lambda doc, found: found.issue(doc, "x", uid="a.b:xodr:1.0.0:c"), "is no UID of this rule, whose are `example")
+    fails(lambda doc, found: found.issue("road", "x"), "must point at an element, a road, .* of its job, not at str")
+    fails(lambda doc, found: found.issue(doc, "x", level="fatal"), "`fatal` is not a level")
+    fails(lambda doc, found: found.issue(doc, "x", uid="a.b:xodr:1.0.0:c"), "is not a UID of this rule; its UIDs are `example")
     fails(lambda doc, found: found.issue(doc, 5), "TypeError")
     fails(lambda doc, found: found.param("no"), "declares no parameter `no`")
 
@@ -175,16 +175,16 @@ def test_what_no_bundle_can_be():
 
     with pytest.raises(ValueError, match="is no name of a bundle"):
         qcbus.Bundle("a b", version="1.0")
-    with pytest.raises(ValueError, match="`pdf` is no kind of file; there are"):
+    with pytest.raises(ValueError, match="`pdf` is not a file kind; the kinds are"):
         qcbus.Bundle("a", version="1.0", kinds=["pdf"])
     with pytest.raises(ValueError, match="takes at least one kind"):
         qcbus.Bundle("a", version="1.0", kinds=[])
     with pytest.raises(ValueError, match="needs a UID"):
         bundle.rule()(check)
     for uid in ("named", "a.b:xodr:1.0.0", "a-b.c:xodr:1.0.0:d", "a.b:xodr:1.0.0:d e", "a.b:x:y:z", ""):
-        with pytest.raises(ValueError, match="is no UID: it has a domain"):
+        with pytest.raises(ValueError, match="is not a UID: it must have a domain"):
             bundle.rule(uid)(check)
-    with pytest.raises(ValueError, match="`bad` is no level"):
+    with pytest.raises(ValueError, match="`bad` is not a level"):
         bundle.rule("a.b:xodr:1.0.0:c", level="bad")(check)
     with pytest.raises(ValueError, match="does not say what it demands"):
         bundle.rule("a.b:xodr:1.0.0:c")(lambda doc, found: None)

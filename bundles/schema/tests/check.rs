@@ -434,7 +434,7 @@ fn violation_message_explains_attribute_conflict() {
     };
     let both = object("radius=\"1\" width=\"2\"", "");
     assert!(
-        both.contains("it has radius and width, but an object has either radius"),
+        both.contains("it has radius and width; an object must have either radius"),
         "{both}"
     );
     let repeat = "<repeat s=\"0\" length=\"9\" distance=\"0\" tStart=\"1\" tEnd=\"1\" heightStart=\"1\" \
@@ -443,7 +443,7 @@ fn violation_message_explains_attribute_conflict() {
     assert!(dense.contains("it must be greater than 0"), "{dense}");
     let long = object("heading=\"1\"", "");
     assert!(
-        long.contains("no attribute `heading` of `object`; did you mean \"hdg\"?"),
+        long.contains("no attribute `heading` for `object`; did you mean \"hdg\"?"),
         "{long}"
     );
     let dangling = weighed(
@@ -452,7 +452,7 @@ fn violation_message_explains_attribute_conflict() {
     );
     let mut texts = dangling.iter().map(|(_, _, text)| text);
     assert!(
-        texts.any(|text| text.contains("refers to nothing: no <road> has it as its id")),
+        texts.any(|text| text.contains("is not defined: no <road> has it as its id")),
         "{dangling:?}"
     );
 }

@@ -39,7 +39,7 @@ fn unsupported_schema_construct_is_named_with_line() {
         ),
         (
             "<xs:element name='a'><xs:complexType><xs:assert test='matches(@b, \"x\")'/></xs:complexType></xs:element>",
-            "understand the XPath",
+            "parse the XPath",
         ),
         (
             "<xs:element name='a'><xs:simpleType><xs:restriction base='xs:string'><xs:pattern value='\\p{L}'/></xs:restriction></xs:simpleType></xs:element>",

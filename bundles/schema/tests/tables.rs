@@ -34,8 +34,8 @@ fn broken_table_is_refused_with_its_line() {
         ("qcbus-schema 1", "qcbus-schema 9", "line 1"),
         ("simple 0 =", "simple 7 =", "numbered in order"),
         ("state 0", "state 5", "numbered in order"),
-        ("edition", "addition", "no statement"),
-        ("child header c", "child header c9", "not there"),
+        ("edition", "addition", "unknown statement"),
+        ("child header c", "child header c9", "undefined"),
     ] {
         let error = Schema::from_notation(&good.replacen(from, to, 1)).expect_err(from);
         assert!(error.to_string().contains(expected), "{from}: {error}");

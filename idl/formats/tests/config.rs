@@ -427,7 +427,7 @@ fn unverifiable_names_of_bundle_are_reported_as_unknown() {
     assert!(oddities[0].text.contains("tolerence"), "{oddities:?}");
     let line = oddities[1].line(std::path::Path::new("c.xml"));
     assert!(
-        line.starts_with("c.xml:3:3: information: what `mine` offers"),
+        line.starts_with("c.xml:3:3: information: the checkers and parameters of `mine`"),
         "{line}"
     );
 }

@@ -167,7 +167,7 @@ fn module_permissions_are_read_or_refused() {
         (r#""may": true"#, "`module[0].may` is not an object"),
         (
             r#""may": {"netwrok": true}"#,
-            "`module[0].may.netwrok` is none of",
+            "`module[0].may.netwrok` is not one of",
         ),
         (r#""may": {"network": "yes"}"#, "is neither true nor false"),
         (r#""may": {"read": "/a"}"#, "is not a list of paths"),

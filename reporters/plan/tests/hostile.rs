@@ -48,7 +48,7 @@ fn roads_without_place_are_listed_and_reported() {
     ];
     assert_eq!(drawn, expected);
     assert_eq!(plan.origin, [7.0, 8.0]);
-    let said = "Not drawn (no finite place within 1,000 km of the second roads): roads 'empty', 'nan', 'nan', 'nan', 'far' and 6 more.";
+    let said = "Not drawn (no finite place within 1,000 km of the other roads): roads 'empty', 'nan', 'nan', 'nan', 'far' and 6 more.";
     assert_eq!(plan.cuts, [said]);
 }
 

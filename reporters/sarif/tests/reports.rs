@@ -209,7 +209,7 @@ fn undetermined_file_is_never_shown_as_success() {
     );
     for (result, reason) in [
         (undetermined("b.xodr"), "2 "),
-        (nobody, "no checker has looked"),
+        (nobody, "no checker has checked"),
     ] {
         assert_eq!(result.verdict, Verdict::Undetermined);
         let run = run(std::slice::from_ref(&result));

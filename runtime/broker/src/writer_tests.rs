@@ -140,7 +140,7 @@ fn withdrawal_from_the_gate_needs_no_journal() {
     until(|| !published.exists());
     assert_eq!(writers.troubles().len(), 1);
     let said = format!("{:?}", told.try_recv());
-    assert!(said.contains("it is tried again"), "{said}");
+    assert!(said.contains("it is retried"), "{said}");
     journal.execute_batch("ROLLBACK").unwrap();
     until(|| writers.troubles().is_empty());
     assert!(writers.finish(Duration::from_secs(60)).is_empty());

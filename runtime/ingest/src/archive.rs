@@ -462,7 +462,7 @@ mod tests {
             (&bytes[..], &codes[..]),
             (&b"<a/>"[..], &[Code::ArchiveDuplicate][..])
         );
-        assert!(text.contains("one name, `a.xosc`; the last"), "{text}");
+        assert!(text.contains("the same name, `a.xosc`; the last"), "{text}");
     }
 
     #[test]

@@ -394,7 +394,7 @@ mod tests {
                 "is not known",
                 30,
             ),
-            (&marked, Code::EncodingMismatch, "the mark is believed", 33),
+            (&marked, Code::EncodingMismatch, "it is read as UTF-8", 33),
             (
                 &with_declaration("UTF-8", b"Stra\xDFe"),
                 Code::EncodingMalformed,

@@ -174,16 +174,19 @@ fn reason_for_a_stopped_expansion_is_given() {
     let cases = [
         (
             referring("li.xosc", &named("G", "")),
-            "neither in the archive",
+            "not found in the archive",
         ),
-        (referring("lib.XOSC", &named("G", "")), "ends in `.xosc`"),
+        (
+            referring("lib.XOSC", &named("G", "")),
+            "must end in `.xosc`",
+        ),
         (
             referring("in.mosc!lib.xosc", &named("G", "")),
-            "leads into an archive",
+            "points into an archive",
         ),
         (
             referring("../lib.xosc", &named("G", "")),
-            "leads out of the archive",
+            "points outside the archive",
         ),
         (referring("lib.xosc", &named("g", "")), "did you mean `G`?"),
         (
@@ -196,11 +199,11 @@ fn reason_for_a_stopped_expansion_is_given() {
         ),
         (
             referring("lib.xosc", &named("G", &(key("x", "1") + &key("x", "2")))),
-            "says `1` and `2`",
+            "gives it `1` and `2`",
         ),
         (
             "<ScenarioReference scenarioFileName='lib.xosc'/>".to_owned(),
-            "belongs in a `ManeuverGroup`",
+            "must be in a `ManeuverGroup`",
         ),
     ];
     for (groups, part) in cases {

@@ -409,7 +409,7 @@ mod tests {
         for command in ["$(a)", "${A:-b}", "a $1", "a $", "a $$", "${A"] {
             let got = filled(command).unwrap_err();
             assert!(
-                got.ends_with("more than $NAME or ${NAME}"),
+                got.ends_with("that is not $NAME or ${NAME}"),
                 "{command}: {got}"
             );
         }

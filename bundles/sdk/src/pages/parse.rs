@@ -272,8 +272,11 @@ mod tests {
     #[test]
     fn page_errors_are_reported_with_their_line() {
         let of = |page: &str| Page::parse(page).unwrap_err().to_string();
-        assert!(of("no title").starts_with("line 1: a page begins"));
-        assert!(of("# T\n\nS.\n\n```xml bda\n```\n").contains("line 5: `bda`"));
+        assert!(of("no title").starts_with("line 1: a page must begin"));
+        assert!(
+            of("# T\n\nS.\n\n```xml bda\n```\n")
+                .contains("line 5: expected `good`, `bad`, `skipped` or `also`, found `bda`")
+        );
         assert!(of("# T\n\nS.\n\n```xml bad color=red\n```\n").contains("`color=red`"));
         assert!(of("# T\n\nS.\n\n```xml bad\n").contains("not closed"));
         assert!(of("# T\n\nS.\n\n```issues\n```\n").contains("must follow"));

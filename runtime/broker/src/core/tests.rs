@@ -219,7 +219,7 @@ proptest! {
             prop_assert_eq!(judged.verdict, world.verdict_with_all(*file, judged.own));
             // When all bundles are present, only a file that kills bundles may prevent a verdict.
             let why = &world.failures[file];
-            prop_assert!(why.iter().all(|it| it.contains("alone in a fresh process")), "{:?}", why);
+            prop_assert!(why.iter().all(|it| it.contains("new process with only this file")), "{:?}", why);
         }
         world.all_know_the_same();
         world.all_is_tried();

@@ -242,7 +242,7 @@ fn broken_journal_is_reported_with_remedy() {
     )
     .unwrap();
     let error = Journal::open(dir.path(), "test").unwrap_err().to_string();
-    assert!(error.contains("move it away"), "{error}");
+    assert!(error.contains("Move it away"), "{error}");
     assert!(Journal::examine(dir.path()).is_some());
 }
 

@@ -101,7 +101,7 @@ fn changes_are_listed_line_by_line() {
         "added yours",
         "removed mine",
         "xodrBundle is no longer required",
-        "xoscBundle is demanded",
+        "xoscBundle is required",
     ];
     assert_eq!(lines, expected);
 }
@@ -223,7 +223,7 @@ fn file_that_only_resembles_manifest_is_reported() {
     let notices = sources(dir.path()).load().unwrap().notices;
     let said: Vec<&String> = notices
         .iter()
-        .filter(|it| it.contains("no manifest"))
+        .filter(|it| it.contains("not a manifest"))
         .collect();
     assert!(
         matches!(said[..], [one] if one.contains("mine.JSON")),

@@ -293,7 +293,8 @@ impl World {
         }
         // This concerns the file itself or the map that it depends on.
         let given_up = judged.why.iter().any(|it| {
-            it.contains("alone in a fresh process") || it.contains("is undetermined: see")
+            it.contains("in a new process with only this file")
+                || it.contains("is undetermined: see")
         });
         if given_up && self.peers.deaths >= 2 {
             return Ok(false);

@@ -247,7 +247,7 @@ mod tests {
             }],
             unseen: vec![Unseen {
                 path: "/farm/closed".into(),
-                why: "cannot read the directory this directory: Permission denied".into(),
+                why: "cannot read this directory: Permission denied".into(),
             }],
             ..Status::default()
         };

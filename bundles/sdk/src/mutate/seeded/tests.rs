@@ -20,17 +20,20 @@ fn seeded_fault_list_is_parsed() {
     for (wrong, why) in [
         (format!("{head}  why: so\n"), "no edit"),
         (format!("{head}  A | drop\n"), "no reason"),
-        (format!("{head}  A drop\n  why: so\n"), "neither"),
+        (
+            format!("{head}  A drop\n  why: so\n"),
+            "expected an edit or a place",
+        ),
         (
             format!("{head}  A | drop | in: ../../m\n  why: so\n"),
-            "not in",
+            "leads out of",
         ),
         (
             format!("{entry}{}", entry.replace("@a = p:d/a.xosc", "")),
             "twice",
         ),
-        ("id | sort | @b | error\n".to_owned(), "no alias"),
-        ("id | sort | p:b | grave\n".to_owned(), "no level"),
+        ("id | sort | @b | error\n".to_owned(), "unknown alias"),
+        ("id | sort | p:b | grave\n".to_owned(), "unknown level"),
     ] {
         let error = table::read(&wrong, "name").unwrap_err();
         assert!(error.contains(why), "{wrong}: {error}");

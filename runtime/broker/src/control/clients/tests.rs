@@ -97,7 +97,7 @@ async fn request_length_is_bounded_but_request_count_is_not() {
     assert_eq!(socket.hear(&mut client).await, "", "it was closed");
     let mut client = socket.connect("what?\n").await;
     let said = socket.hear(&mut client).await;
-    assert!(said.contains("not a request"), "{said}");
+    assert!(said.contains("invalid request"), "{said}");
     // `echo … | nc -U` does the same.
     let mut client = socket.connect(STATUS.trim()).await;
     client.shutdown().await.unwrap();
@@ -113,13 +113,18 @@ async fn silent_or_incomplete_client_is_disconnected() {
     for said in ["", "{\"request\"", "{\"request\":\"status\"}"] {
         let mut client = socket.connect(said).await;
         let heard = socket.hear(&mut client).await;
-        assert!(heard.contains("no request came"), "{said}: {heard}");
+        assert!(heard.contains("no request was received"), "{said}: {heard}");
         assert_eq!(socket.hear(&mut client).await, "", "it was closed");
     }
     // A client that was answered may not stay either.
     let mut client = socket.connect(STATUS).await;
     assert!(socket.hear(&mut client).await.contains("timed-out"));
-    assert!(socket.hear(&mut client).await.contains("no request came"));
+    assert!(
+        socket
+            .hear(&mut client)
+            .await
+            .contains("no request was received")
+    );
 }
 
 #[tokio::test]
@@ -153,7 +158,7 @@ async fn silent_clients_make_room_and_waiting_ones_stay() {
     let mut refused = socket.connect(WAIT).await;
     let said = socket.hear(&mut refused).await;
     assert!(
-        said.contains("4 clients wait for verdicts already"),
+        said.contains("4 clients already wait for verdicts"),
         "{said}"
     );
     let mut silent = Vec::new();
@@ -163,7 +168,10 @@ async fn silent_clients_make_room_and_waiting_ones_stay() {
         assert!(socket.hear(&mut honest).await.contains("timed-out"));
     }
     let said = socket.hear(&mut silent[0]).await;
-    assert!(said.contains("whoever says nothing makes room"), "{said}");
+    assert!(
+        said.contains("disconnects silent ones to make room"),
+        "{said}"
+    );
     for asked in std::mem::take(&mut socket.kept) {
         asked.answer.send(Response::Stopped).unwrap();
     }
@@ -205,5 +213,5 @@ async fn client_is_refused_when_all_are_busy() {
     socket.until_kept(2).await;
     let mut refused = socket.connect(STATUS).await;
     let said = socket.hear(&mut refused).await;
-    assert!(said.contains("serves 2 clients already"), "{said}");
+    assert!(said.contains("already serves 2 clients"), "{said}");
 }

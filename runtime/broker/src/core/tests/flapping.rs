@@ -59,7 +59,7 @@ fn flapping_bundle_is_accepted_less_often_and_reported() {
     assert!(world.state.notices.iter().filter(flapping).count() >= 8);
     let status = world.state.status();
     let first = status.peers.iter().find(|it| it.name == "First").unwrap();
-    assert!(first.note.contains("believed again in"), "{}", first.note);
+    assert!(first.note.contains("accepted again in"), "{}", first.note);
 }
 
 #[test]
@@ -79,7 +79,7 @@ fn flapping_bundle_delays_no_job_but_prevents_acceptance() {
     let finished = world.storing.first().expect("nobody waits for it");
     let first = finished.bundles.iter().find(|it| it.name == "First");
     let why = first.unwrap().failure.clone().unwrap();
-    assert!(why.contains("not asked for the time being"), "{why}");
+    assert!(why.contains("gets no tasks for now"), "{why}");
 }
 
 #[test]

@@ -52,7 +52,7 @@ fn silent_bundle_with_job_is_ended() {
     let (mut world, ..) = busy();
     let limit = world.state.settings.silence_limit;
     let why = is_ended_after(&mut world, limit, |_| {});
-    assert!(why.contains("said nothing"), "{why}");
+    assert!(why.contains("sent nothing"), "{why}");
 }
 
 #[test]
@@ -60,7 +60,7 @@ fn bundle_with_unfinished_job_is_ended_at_deadline() {
     let (mut world, ..) = busy();
     let limit = world.state.settings.job_deadline;
     let why = is_ended_after(&mut world, limit, alive);
-    assert!(why.contains("did not end a job"), "{why}");
+    assert!(why.contains("did not finish a job"), "{why}");
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn bundle_without_catalogue_is_ended() {
     world.state.bundles.get_mut("First").unwrap().ready = false;
     let limit = world.state.settings.silence_limit;
     let why = is_ended_after(&mut world, limit, |_| {});
-    assert!(why.contains("never said what it checks"), "{why}");
+    assert!(why.contains("did not register its checkers"), "{why}");
     assert!(!world.state.sessions.contains_key(&session));
 }
 
@@ -114,7 +114,7 @@ fn drained_bundle_is_ended_after_leave_limit() {
     world.state.drain_peer("First", &mut Vec::new());
     let limit = draining::LEAVE_LIMIT;
     let why = is_ended_after(&mut world, limit, alive);
-    assert!(why.contains("told to go"), "{why}");
+    assert!(why.contains("asked to leave"), "{why}");
 }
 
 #[test]
@@ -330,7 +330,9 @@ fn catalogue_beyond_limits_is_refused() {
         ("checkers", |it| {
             it.checkers = vec![it.checkers[0].clone(); 4097];
         }),
-        ("twice", |it| it.checkers[1].id = it.checkers[0].id.clone()),
+        ("duplicate", |it| {
+            it.checkers[1].id = it.checkers[0].id.clone()
+        }),
     ];
     for (word, change) in changes {
         let mut world = World::new();
