@@ -1,4 +1,4 @@
-// What is known about one finding: the line of the source, its places, its facts, and why it is one.
+// Details of one finding: the source line, its places, its facts and the page of its rule.
 
 /**
  * @typedef {object} DetailActions
@@ -6,9 +6,9 @@
  * @property {(road: number) => void} road
  */
 
-/** The line with what is meant underlined. Characters are counted as code points. @param {SourceLine} line */
+/** Returns the source line with the marked part underlined. Positions count code points. @param {SourceLine} line */
 function sourceLineElement(line) {
-  // Indentation would take the room of what matters.
+  // Indentation is cut, because it takes space from the text.
   const all = Array.from(line.text);
   const indent = Math.min(
     all.findIndex((character) => character !== ' ' && character !== '\t'),
@@ -49,7 +49,7 @@ function placeElement(place, plan, actions) {
     spots.push(`road ${plain(place.road[0], 60)}, s ${fixed(place.road[1])} m, t ${fixed(place.road[2])} m`);
   if (place.at) spots.push(`x ${coordinate(place.at.x)}, y ${coordinate(place.at.y)}`);
   if (place.time !== null) spots.push(`at ${fixed(place.time, 3)} s`);
-  if (place.at && plan && !place.anchor) spots.push('too far away for the map');
+  if (place.at && plan && !place.anchor) spots.push('too far away to be shown on the map');
   if (spots.length > 0) parts.push(make('div', 'spot muted', spots.join(' · ')));
   for (const target of place.on) {
     const road = plan?.roads[target.road ?? -1];
@@ -80,7 +80,7 @@ function ruleElement(rule) {
   return make('details', 'why', make('summary', '', 'Why this is a finding'), body);
 }
 
-/** The text again where the row has room for its beginning only. @param {string} text */
+/** Returns the whole text if the row shows only its beginning. @param {string} text */
 function wholeText(text) {
   return text.length > 90 || text.includes('\n') ? make('p', 'detail-text', ...withCode(text)) : null;
 }
@@ -97,7 +97,7 @@ function findingDetail(finding, rules, checkers, plan, actions) {
   });
   if (finding.places.length > 100)
     detail.append(make('p', 'muted', `and ${counted(finding.places.length - 100, 'further place')}`));
-  if (finding.places.length === 0) detail.append(make('p', 'muted', 'This finding comes without a place.'));
+  if (finding.places.length === 0) detail.append(make('p', 'muted', 'This finding has no place in a file.'));
   if (finding.facts.length > 0) {
     const facts = finding.facts
       .slice(0, 200)
@@ -115,7 +115,7 @@ function findingDetail(finding, rules, checkers, plan, actions) {
 }
 
 /**
- * The row of a finding in the list.
+ * Returns the row of a finding in the list.
  *
  * @param {Finding} finding
  * @param {RuleInfo|undefined} rule
@@ -138,7 +138,7 @@ function findingRow(finding, rule, selected, hasMap, choose) {
 }
 
 /**
- * What there is to choose from where several findings lie at one place.
+ * Returns a list to choose from if several findings are at one place.
  *
  * @param {number[]} members
  * @param {readonly Finding[]} findings
@@ -154,11 +154,11 @@ function chooserContent(members, findings, choose) {
   });
   const content = [make('h2', '', `${counted(members.length, 'finding')} here`), make('ul', '', ...items)];
   const more = members.length - items.length;
-  if (more > 0) content.push(make('p', 'muted', `and ${COUNT_FORMAT.format(more)} more; the filters make them fewer`));
+  if (more > 0) content.push(make('p', 'muted', `and ${COUNT_FORMAT.format(more)} more; use the filters to see fewer`));
   return content;
 }
 
-/** How the checkers ended, the ones with trouble first. @param {readonly any[]} checkers */
+/** Returns a table with the status of each checker, those without an answer first. @param {readonly any[]} checkers */
 function checkersNote(checkers) {
   if (checkers.length === 0) return null;
   const rank = (/** @type {any} */ checker) =>
@@ -184,6 +184,6 @@ function checkersNote(checkers) {
       );
     });
   const trouble = checkers.filter((checker) => rank(checker) < 3).length;
-  const label = `${counted(checkers.length, 'checker')}${trouble > 0 ? `, ${trouble} with trouble` : ''}`;
+  const label = `${counted(checkers.length, 'checker')}${trouble > 0 ? `, ${trouble} without an answer` : ''}`;
   return make('details', 'note checkers', make('summary', '', label), make('table', '', make('tbody', '', ...rows)));
 }

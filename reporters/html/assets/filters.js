@@ -1,5 +1,5 @@
-// Filters over findings: levels, facets of which one value is chosen (rule, file, verdict), words, and a switch. Counts
-// beside each choice say how many findings it would show with the other filters as they are.
+// Filters of findings: levels, facets with one chosen value (rule, file, verdict), words, and a switch. The count
+// beside each choice is the number of findings that it would show with the other filters unchanged.
 
 /** @typedef {{level: Level, search: string}} Filterable */
 
@@ -7,12 +7,12 @@
  * @template {Filterable} F
  * @typedef {object} Facet
  * @property {string} name
- * @property {string} all the choice of everything
+ * @property {string} all label of the choice without a filter
  * @property {string[]} values
- * @property {(finding: F) => number} of index into the values
+ * @property {(finding: F) => number} of returns the index into the values
  */
 
-/** A facet of more values has no counts beside them: they would take longer than the filter itself. */
+/** Maximum number of values with counts. Counting more takes longer than the filter itself. */
 const MOST_COUNTED = 600;
 
 /** @template {Filterable} F */
@@ -30,7 +30,7 @@ class Filters {
     this.levels = new Set(LEVELS);
     /** @type {string[]} */
     this.words = [];
-    /** Indices of what passes. @type {number[]} */
+    /** Indices of the findings that pass. @type {number[]} */
     this.shown = [];
     this.search = withAttributes(make('input', 'search'), {
       type: 'search',
@@ -108,7 +108,7 @@ class Filters {
     );
   }
 
-  /** @param {string} name of a facet @param {number} value -1: all */
+  /** @param {string} name name of a facet @param {number} value -1: all */
   choose(name, value) {
     for (const facet of this.facets) {
       if (facet.name !== name) continue;

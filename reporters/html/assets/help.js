@@ -1,4 +1,4 @@
-// The overlay that lists the keys.
+// Overlay with the list of keys.
 
 /** @type {readonly [string, string][]} */
 const KEYS = [

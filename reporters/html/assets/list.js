@@ -1,15 +1,15 @@
-// A list of any length of which only the rows in sight are elements. All rows are equally high; one of them, the
-// opened one, has a detail below it, which is measured.
+// List of any length with elements only for the visible rows. All rows have the same height. One row can be open and
+// has a detail below it, which is measured.
 
-/** Rows above and below the ones in sight that are elements, too. */
+/** Number of rows above and below the visible ones that have elements too. */
 const SPARE_ROWS = 8;
 
 /**
  * @typedef {object} ListSource
  * @property {number} rowHeight CSS pixels
- * @property {string} label what the list is, for screen readers
- * @property {(position: number) => HTMLElement} row the element of a row
- * @property {(position: number) => HTMLElement|null} [detail] what is shown below an opened row
+ * @property {string} label name of the list for screen readers
+ * @property {(position: number) => HTMLElement} row returns the element of a row
+ * @property {(position: number) => HTMLElement|null} [detail] returns the element below an open row
  */
 
 class VirtualList {
@@ -29,19 +29,19 @@ class VirtualList {
     new ResizeObserver(() => this.schedule()).observe(this.element);
   }
 
-  /** Other rows: everything is made anew. @param {number} count @param {number} opened */
+  /** Replaces all rows. @param {number} count @param {number} opened */
   reset(count, opened) {
     const focused = this.drawnFocus()?.querySelector('button')?.dataset.finding;
     this.count = count;
     this.drop();
     this.open(opened);
     if (focused === undefined) return;
-    // The focus goes with its row, or else to the list: the keyboard must not fall back to the top of the page.
+    // The focus follows its row or moves to the list. Otherwise the keyboard would restart at the top of the page.
     const rows = [...this.rows.values()].map((row) => row.querySelector('button'));
     (rows.find((button) => button?.dataset.finding === focused) ?? this.element).focus({ preventScroll: true });
   }
 
-  /** The row that has the focus. */
+  /** Position of the row that has the focus. */
   drawnFocus() {
     const active = document.activeElement;
     return active === null ? undefined : [...this.rows.values()].find((row) => row.contains(active));
@@ -61,7 +61,7 @@ class VirtualList {
     if (focused !== undefined) this.focus(focused);
   }
 
-  /** Brings a row into sight, with as much of its detail as fits. @param {number} position */
+  /** Scrolls to a row, with as much of its detail as fits. @param {number} position */
   reveal(position) {
     if (position < 0) return;
     const top = this.top(position);
@@ -105,7 +105,7 @@ class VirtualList {
     const first = Math.max(0, Math.floor((scrollTop - this.detailHeight) / rowHeight) - SPARE_ROWS);
     const last = Math.min(this.count - 1, Math.ceil((scrollTop + clientHeight) / rowHeight) + SPARE_ROWS);
     for (const [position, row] of this.rows) {
-      // A row with the focus stays, or the keyboard would lose its place while the list scrolls.
+      // The row with the focus stays, because otherwise scrolling would remove the focus.
       if ((position >= first && position <= last) || row.contains(document.activeElement)) continue;
       row.remove();
       this.rows.delete(position);

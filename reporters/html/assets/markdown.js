@@ -1,8 +1,8 @@
-// The pages of rules, as elements. A small part of Markdown: headings, paragraphs, lists, fenced code, tables as they
-// are written, and in lines code, emphasis and links. Links are shown as text with their address: a page of a bundle
-// must not lead anybody anywhere with a click.
+// Pages of rules as elements. Supports a part of Markdown: headings, paragraphs, lists, fenced code, tables as plain
+// text, and inline code, emphasis and links. Links are shown as text with their address, because a page of an untrusted
+// bundle must not contain clickable links.
 
-/** `code`, **strong**, *emphasis*, [text](address); whatever else is text. */
+/** `code`, **strong**, *emphasis*, [text](address); everything else is text. */
 const INLINE = /`([^`]+)`|\*\*([^*]+)\*\*|\*([^*\s][^*]*)\*|\[([^\]]*)\]\(([^)\s]*)\)/g;
 
 /** @param {string} text @returns {(Node|string)[]} */
@@ -23,7 +23,7 @@ function inlineMarkdown(text) {
   return parts;
 }
 
-/** The kind of a line outside of fenced code. @param {string} line */
+/** Returns the kind of a line outside of fenced code. @param {string} line */
 function markdownLine(line) {
   const heading = /^(#{1,6})\s+(.*?)\s*#*$/.exec(line);
   if (heading) return { kind: 'heading', depth: (heading[1] ?? '#').length, text: heading[2] ?? '' };
@@ -36,7 +36,7 @@ function markdownLine(line) {
   return { kind: 'text', depth: 0, text: line.trim() };
 }
 
-/** Takes lines and makes blocks of them; one block is open at a time. */
+/** Groups lines into blocks. One block is open at a time. */
 class MarkdownBuilder {
   constructor() {
     this.page = make('div', 'markdown');

@@ -1,12 +1,12 @@
-// The findings of a result in the form that the page works with. What is missing or no number becomes nothing: data
-// may be from another version, and nothing in it is trusted.
+// Model of the findings of a result. Missing values and values of a wrong type become null or empty, because the data
+// may be from another version and are not trusted.
 
 /** @typedef {{text: string, skipped: number, more: boolean, mark: [number, number]|null}} SourceLine */
 
 /**
  * @typedef {object} FindingPlace
- * @property {string} file path for people
- * @property {boolean} own whether that is the checked file
+ * @property {string} file path to display
+ * @property {boolean} own whether it is the checked file
  * @property {number|null} row
  * @property {number|null} column
  * @property {string} xpath
@@ -32,13 +32,13 @@
  * @property {[string, string][]} facts
  * @property {string} where path:row:column of the first place
  * @property {{x: number, y: number}|null} anchor
- * @property {boolean} wholeElement whether it is about an element and not a spot
+ * @property {boolean} wholeElement whether the finding is about a whole element and not a point
  * @property {string} search
  */
 
 /** @typedef {{uid: string, checker: string, about: string, page: string, link: string}} RuleInfo */
 
-/** Farther from the origin than any plan reaches, in cm: 2,000 km. */
+/** Maximum distance from the origin in cm (2,000 km); no plan is larger. */
 const FARTHEST = 2e8;
 
 /** @param {unknown} value @returns {number|null} */
@@ -122,14 +122,14 @@ function whereOf(place) {
   return `${place.file}${row}`;
 }
 
-/** A place as the list says it: the checked file is named in the head. @param {FindingPlace|undefined} place */
+/** Returns a place as the list shows it. The head already names the checked file. @param {FindingPlace|undefined} place */
 function shortWhereOf(place) {
   if (!place) return 'no place';
   return place.own ? whereOf({ ...place, file: '' }) || 'this file' : whereOf(place);
 }
 
 /**
- * Whether a place lies on a road that cannot be drawn: nothing but the mark is to be seen on the map then.
+ * Checks whether a place is on a road that cannot be drawn. The map then shows only the marker.
  *
  * @param {FindingPlace} place
  * @param {Plan|null} plan
@@ -157,7 +157,7 @@ function rulesOf(data) {
 }
 
 /**
- * Findings, worst first, else in the order of the result.
+ * Returns the findings, worst first, otherwise in the order of the result.
  *
  * @param {Record<string, any>} data
  * @param {readonly RuleInfo[]} rules
@@ -192,7 +192,7 @@ function findingsOf(data, rules, plan) {
         text,
         where,
         rules[rule]?.uid,
-        ...places.map(({ xpath, text: said }) => `${xpath} ${said}`),
+        ...places.map(({ xpath, text: placeText }) => `${xpath} ${placeText}`),
         ...facts.flat(),
       ]
         .join('\n')
@@ -207,7 +207,7 @@ function findingsOf(data, rules, plan) {
 }
 
 /**
- * Why a verdict is what it is, in a few words.
+ * Returns a short reason for the verdict.
  *
  * @param {Record<string, any>} data
  * @param {readonly Finding[]} findings
@@ -215,19 +215,19 @@ function findingsOf(data, rules, plan) {
 function verdictReason(data, findings) {
   const errors = findings.filter(({ level }) => level === 'error').length;
   if (data.file?.verdict === 'rejected')
-    return errors > 0 ? `${counted(errors, 'error')} must be mended` : 'an error was found';
-  if (data.file?.verdict === 'accepted') return 'everything that was demanded has been checked, without an error';
+    return errors > 0 ? `${counted(errors, 'error')} to fix` : 'an error was found';
+  if (data.file?.verdict === 'accepted') return 'all required checks are complete, without an error';
   const checkers = listOf(data.checkers);
   const failed = checkers.filter((checker) => checker?.status === 'error').length;
   const blocked = checkers.filter((checker) => checker?.blocked === true).length;
   const silent = checkers.filter((checker) => checker?.status === null || checker?.status === undefined).length;
   const reasons = [
     failed > 0 ? `${counted(failed, 'checker')} failed` : '',
-    blocked > 0 ? `${counted(blocked, 'checker')} could not look, as something that they rest on was not in order` : '',
-    silent > 0 ? `${counted(silent, 'checker')} did not say how they ended` : '',
+    blocked > 0 ? `${counted(blocked, 'checker')} did not run because of failed preconditions` : '',
+    silent > 0 ? `${counted(silent, 'checker')} reported no status` : '',
   ].filter((reason) => reason !== '');
-  if (reasons.length > 0) return `no error was found, but ${reasons.join(', and ')}`;
+  if (reasons.length > 0) return `no error found, but ${reasons.join(', and ')}`;
   return checkers.some((checker) => checker?.status === 'completed')
-    ? 'not everything could be checked'
-    : 'no checker has looked at this file';
+    ? 'the file was not checked completely'
+    : 'no checker has checked this file';
 }

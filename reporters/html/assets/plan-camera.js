@@ -1,7 +1,7 @@
-// What part of the map is seen, how it is moved by pointer and wheel, and flights to a place.
+// Camera of the map: the visible part, movement by pointer and wheel, and flights to a place.
 
 const LEAST_SCALE = 1e-7;
-/** Pixels per centimetre: a lane is then as wide as a desk. */
+/** Maximum scale in pixels per centimetre. */
 const GREATEST_SCALE = 8;
 const FLIGHT_MILLISECONDS = 320;
 
@@ -14,7 +14,7 @@ class Camera {
     this.k = 0.01;
     this.width = 1;
     this.height = 1;
-    /** Pixels on the right that a panel hides. */
+    /** Pixels on the right that are hidden by a panel. */
     this.hidden = 0;
     this.changed = changed;
     /** @type {{from: {x: number, y: number, k: number}, to: {x: number, y: number, k: number}, began: number, done: () => void}|null} */
@@ -23,7 +23,7 @@ class Camera {
   }
 
   /**
-   * The frame of the whole canvas, of which `x` and `y` are the middle of the part that is not hidden.
+   * Returns the frame of the whole canvas. `x` and `y` are the middle of the part that is not hidden.
    *
    * @returns {Frame}
    */
@@ -44,7 +44,7 @@ class Camera {
     this.changed();
   }
 
-  /** @param {number} factor @param {number} [px] pixel that stays where it is @param {number} [py] */
+  /** @param {number} factor @param {number} [px] pixel that stays fixed @param {number} [py] */
   zoom(factor, px = (this.width - this.hidden) / 2, py = this.height / 2) {
     this.land();
     const k = Camera.clamp(this.k * factor);
@@ -57,7 +57,7 @@ class Camera {
   }
 
   /**
-   * The scale at which a box around a point is seen whole.
+   * Returns the scale at which a box around a point is completely visible.
    *
    * @param {number} halfWidth cm
    * @param {number} halfHeight
@@ -75,7 +75,7 @@ class Camera {
     return this.fly(x, y, this.scaleFor((box[2] - box[0]) / 2, (box[3] - box[1]) / 2));
   }
 
-  /** @param {number} x @param {number} y @param {number} k @returns {Promise<void>} when it is there */
+  /** @param {number} x @param {number} y @param {number} k @returns {Promise<void>} resolves on arrival */
   fly(x, y, k) {
     this.land();
     const to = { x, y, k: Camera.clamp(k) };
@@ -91,14 +91,14 @@ class Camera {
     });
   }
 
-  /** Ends a flight where it is. */
+  /** Ends a flight at the current position. */
   land() {
     const { flight } = this;
     this.flight = null;
     flight?.done();
   }
 
-  /** Moves on; true while in flight. @param {number} now */
+  /** Moves the camera; returns true during a flight. @param {number} now */
   step(now) {
     const { flight } = this;
     if (!flight) return false;
@@ -111,7 +111,7 @@ class Camera {
     const eased = part < 0.5 ? 4 * part ** 3 : 1 - (2 - 2 * part) ** 3 / 2;
     const { from, to } = flight;
     this.k = from.k * (to.k / from.k) ** eased;
-    // So that the target moves evenly over the screen while the scale changes.
+    // The target moves evenly over the screen while the scale changes.
     const ratio = to.k / from.k;
     const share = Math.abs(ratio - 1) < 1e-3 ? eased : ((this.k - from.k) / (to.k - from.k)) * (to.k / this.k);
     this.x = from.x + (to.x - from.x) * share;

@@ -1,16 +1,16 @@
-// The binary `plan` of docs/html-report.md, read into flat arrays: a big map has two million points, and an object for
-// each would be slow to make and slow to draw. All lengths and coordinates are in centimetres, counted from the origin.
+// Reader of the binary `plan` of docs/html-report.md. It fills flat arrays: a big map has two million points, and an
+// object for each is slow to create and to draw. All lengths and coordinates are in centimetres from the origin.
 
 /** @typedef {[number, number, number, number]} Box least x, least y, greatest x, greatest y */
 
 /**
  * @typedef {object} PlanLane
- * @property {number} id 0 where the file has no whole number
- * @property {boolean} left on which side of the center it lies
+ * @property {number} id 0 if the id in the file is not an integer
+ * @property {boolean} left whether it is left of the center line
  * @property {string} type
- * @property {number} inner line further in
+ * @property {number} inner line towards the center
  * @property {number} outer its own line
- * @property {Float64Array} widths pairs of s, from the start of the section, and width
+ * @property {Float64Array} widths pairs of s from the start of the section and width
  */
 
 /**
@@ -20,7 +20,7 @@
  * @property {number} s0
  * @property {number} s1
  * @property {number} center line
- * @property {PlanLane[]} lanes left ones outward from the center, then right ones likewise
+ * @property {PlanLane[]} lanes left lanes from the center outwards, then right lanes from the center outwards
  * @property {Box} box
  */
 
@@ -79,7 +79,7 @@
  * @property {Box} box
  */
 
-/** A list of numbers that grows. */
+/** Growing list of numbers. */
 class NumberPool {
   constructor() {
     this.array = new Int32Array(4096);
@@ -97,7 +97,7 @@ class NumberPool {
   }
 }
 
-/** Points of all lines on each of the three levels of detail. */
+/** Points of all lines at each of the three levels of detail. */
 class PlanLines {
   constructor() {
     this.x = [new NumberPool(), new NumberPool(), new NumberPool()];
@@ -124,7 +124,7 @@ class PlanLines {
   }
 
   /**
-   * Plain arrays of one level; line `i` has the points from `start[i]` to before `start[i + 1]`.
+   * Returns plain arrays of one level; line `i` has the points from `start[i]` up to `start[i + 1]`, exclusive.
    *
    * @param {number} level
    */
@@ -142,7 +142,7 @@ class PlanLines {
 
 /** @typedef {{x: Int32Array, y: Int32Array, start: Int32Array}} LevelOfLines */
 
-/** Reads numbers; whatever is not there or not possible is an error and no read past the end. */
+/** Reader of numbers. A missing or impossible value is an error, so it never reads past the end. */
 class PlanReader {
   /** @param {Uint8Array} bytes */
   constructor(bytes) {
@@ -166,7 +166,7 @@ class PlanReader {
       if (byte === undefined) this.fail('it ends early');
       value += (byte & 127) * scale;
       if (byte < 128) {
-        if (value > Number.MAX_SAFE_INTEGER) this.fail('a number is too great');
+        if (value > Number.MAX_SAFE_INTEGER) this.fail('a number is too large');
         return value;
       }
       scale *= 128;
@@ -183,20 +183,20 @@ class PlanReader {
     if (this.at + 8 > this.bytes.length) this.fail('it ends early');
     const value = this.view.getFloat64(this.at, true);
     this.at += 8;
-    if (!Number.isFinite(value)) this.fail('its origin is no place');
+    if (!Number.isFinite(value)) this.fail('its origin is not finite');
     return value;
   }
 
-  /** How many follow, each of so many bytes at least. @param {number} least */
+  /** Reads the number of items, each with at least this number of bytes. @param {number} least */
   count(least) {
     const count = this.unsigned();
-    if (count * least > this.bytes.length - this.at) this.fail('a list is longer than the rest');
+    if (count * least > this.bytes.length - this.at) this.fail('a list is longer than the remaining data');
     return count;
   }
 
-  /** A coordinate that fits into an array of them. @param {number} value */
+  /** Checks that a coordinate fits into the array. @param {number} value */
   coordinate(value) {
-    if (value < -0x7fffffff || value > 0x7fffffff) this.fail('a coordinate is too great');
+    if (value < -0x7fffffff || value > 0x7fffffff) this.fail('a coordinate is too large');
     return value;
   }
 
@@ -230,9 +230,9 @@ class PlanReader {
   }
 
   /**
-   * Pairs of s, which is written as a difference, and a value.
+   * Reads pairs of s, which is stored as a difference, and a value.
    *
-   * @param {boolean} differences whether the value is one, too
+   * @param {boolean} differences whether the value is stored as a difference too
    */
   profile(differences) {
     const count = this.count(2);
@@ -282,13 +282,13 @@ function boxOfPoints(points) {
   return box;
 }
 
-/** Reads roads, which are most of a plan. */
+/** Reader of roads, the largest part of a plan. */
 class RoadReader {
   /** @param {PlanReader} reader @param {PlanLines} lines */
   constructor(reader, lines) {
     this.reader = reader;
     this.lines = lines;
-    /** Of what has been read last. */
+    /** Box of the last part that was read. */
     this.box = emptyBox();
   }
 
@@ -356,7 +356,7 @@ class RoadReader {
     this.lines.add(x, y, level);
   }
 
-  /** A border and its marks. @returns {number} the line */
+  /** Reads a border and its marks. @returns {number} the line */
   border() {
     const { reader, lines } = this;
     const line = lines.begin();
@@ -400,7 +400,7 @@ class RoadReader {
   }
 
   /**
-   * The lanes of a side, outward: each begins where the one before ends.
+   * Reads the lanes of a side from the center outwards. Each begins at the border of the previous one.
    *
    * @param {number} center
    * @param {boolean} left
@@ -457,7 +457,7 @@ function readObject(reader) {
 function decodePlan(bytes) {
   const reader = new PlanReader(bytes);
   if (bytes.length < 5 || String.fromCharCode(...bytes.subarray(0, 4)) !== 'QCPL')
-    reader.fail('it does not begin as one');
+    reader.fail('the signature is wrong');
   reader.at = 4;
   if (reader.unsigned() !== 1) reader.fail('its version is unknown');
   const origin = { x: reader.double(), y: reader.double() };
@@ -469,7 +469,7 @@ function decodePlan(bytes) {
   const signals = reader.items(11, () => readSignal(reader));
   const objects = reader.items(7, () => readObject(reader));
   const cuts = reader.items(1, () => reader.text());
-  lines.begin(); // so that the last line has an end
+  lines.begin(); // Ends the last line.
   const box = emptyBox();
   for (const road of roads) growBox(box, road.box);
   const roadBox = /** @type {Box} */ ([...box]);
@@ -487,7 +487,7 @@ function decodePlan(bytes) {
     cuts,
     strings: reader.strings,
     box: box[0] <= box[2] ? box : null,
-    /** Of the roads alone; of everything where no road can be drawn. */
+    /** Box of the roads only, or of everything if no road can be drawn. */
     roadBox: roadBox[0] <= roadBox[2] ? roadBox : box[0] <= box[2] ? box : null,
     levels: [lines.level(0), lines.level(1), lines.level(2)],
     marks: lines.marks.array.subarray(0, lines.marks.length),

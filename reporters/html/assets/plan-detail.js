@@ -1,10 +1,10 @@
-// What is drawn on top of the lanes when it is near enough: marks, reference lines, junctions, signals, objects, arrows
-// and names.
+// Details that are drawn on top of the lanes at large scales: marks, reference lines, junctions, signals, objects,
+// arrows and names.
 
-/** Steps of drawing between which the page may do something else. */
+/** Items in one drawing step. The page can do other work between two steps. */
 const ITEMS_PER_STEP = 300;
 
-/** Names never lie on each other: each claims cells of a coarse raster. */
+/** Keeps names from overlapping. Each name claims cells of a coarse raster. */
 class LabelRaster {
   /** @param {Frame} frame */
   constructor(frame) {
@@ -84,7 +84,7 @@ class DetailPainter {
     const double =
       type === 'solid solid' || type === 'broken broken' || type === 'solid broken' || type === 'broken solid';
     canvas.lineWidth = Math.max(1.1, double ? wide * 2.6 : wide) + (theme.ground === MAP_THEMES.light.ground ? 0.9 : 0);
-    // White on light grey needs an edge to be seen.
+    // White on light grey is not visible without an edge.
     if (theme.ground === MAP_THEMES.light.ground) {
       canvas.strokeStyle = theme.markEdge;
       canvas.stroke();
@@ -162,7 +162,7 @@ class DetailPainter {
     }
   }
 
-  /** A post with a line to where it faces; lights are filled, signs are not. @param {Box} box */
+  /** Draws signals as a post with a line in their direction. Lights are filled, signs are not. @param {Box} box */
   *signals(box) {
     const { plan, canvas, frame, theme } = this;
     let steps = 0;
@@ -190,13 +190,13 @@ class DetailPainter {
     }
   }
 
-  /** Arrows for the direction of driving, with the lane's id when near. @param {number[]} visible */
+  /** Draws arrows in the driving direction, with the lane's id at large scales. @param {number[]} visible */
   *arrows(visible) {
     let steps = 0;
     for (const index of visible) {
       const section = this.plan.sections[index];
       const leftHand = this.plan.roads[section?.road ?? -1]?.leftHand ?? false;
-      // In a junction lanes lie on each other, and so would their ids.
+      // In a junction lanes overlap, and their ids would overlap too.
       const named = (this.plan.roads[section?.road ?? -1]?.junction ?? -1) < 0 || this.frame.k * 100 > 45;
       for (const lane of section?.lanes ?? []) this.arrowsOfLane(lane, leftHand, named);
       if (++steps % ITEMS_PER_STEP === 0) yield;
@@ -259,7 +259,7 @@ class DetailPainter {
   }
 
   /**
-   * Where a share of a line's length is, on the frame, with its direction there.
+   * Returns the point at a fraction of a line's length on the frame, with the direction at this point.
    *
    * @param {number} line
    * @param {number} share
@@ -280,7 +280,7 @@ class DetailPainter {
     return null;
   }
 
-  /** Ids of junctions, then of roads, as many as have room. @param {number[]} visible @param {Box} box */
+  /** Draws ids of junctions, then of roads, as many as fit. @param {number[]} visible @param {Box} box */
   labels(visible, box) {
     const { plan, frame, theme } = this;
     for (const index of this.indexed.junctions.within(box)) {
@@ -304,7 +304,7 @@ class DetailPainter {
   }
 
   /**
-   * A point of the reference line that is in sight, the middle if possible.
+   * Returns a visible point of the reference line, the middle if possible.
    *
    * @param {PlanRoad} road
    * @param {Box} box

@@ -1,6 +1,6 @@
-// A grid over boxes: what lies in a part of the map is found without looking at everything.
+// Grid over boxes. Finds the boxes in a part of the map without a scan of all boxes.
 
-/** What covers more cells than this is kept apart and always looked at. */
+/** Boxes that cover more cells are kept in a separate list and always scanned. */
 const MOST_CELLS_OF_ONE = 4096;
 const MOST_CELLS = 262144;
 
@@ -18,7 +18,7 @@ class Grid {
     const width = Math.max(1, this.extent[2] - this.extent[0]);
     const height = Math.max(1, this.extent[3] - this.extent[1]);
     const wanted = Math.min(MOST_CELLS, Math.max(1, valid * 2));
-    /** Side of a cell. */
+    /** Side length of a cell. */
     this.side = Math.max(1000, Math.sqrt((width * height) / wanted), Math.max(width, height) / 4096);
     this.columns = Math.max(1, Math.ceil(width / this.side));
     this.rows = Math.max(1, Math.ceil(height / this.side));
@@ -44,7 +44,7 @@ class Grid {
 
   /**
    * @param {(cell: number, item: number) => void} visit
-   * @param {boolean} [first] whether the great ones are put apart now
+   * @param {boolean} [first] whether large boxes are moved to their list now
    */
   eachCell(visit, first = true) {
     this.boxes.forEach((box, item) => {
@@ -69,7 +69,7 @@ class Grid {
     return [column(box[0]), row(box[1]), column(box[2]), row(box[3])];
   }
 
-  /** What touches a box, in the order of the list. @param {Box} box @returns {number[]} */
+  /** Returns the boxes that touch a box, in the order of the list. @param {Box} box @returns {number[]} */
   within(box) {
     const mark = ++this.query;
     /** @type {number[]} */

@@ -1,4 +1,4 @@
-// Findings on the map: a mark for each, one with a number where many are close.
+// Markers of findings on the map. Findings close to each other share one marker with a number.
 
 /**
  * x and y in cm; members are indices of findings
@@ -27,7 +27,7 @@ class Markers {
     this.clusters = [];
   }
 
-  /** @param {readonly Finding[]} findings @param {readonly number[]} shown indices of those that pass the filters */
+  /** @param {readonly Finding[]} findings @param {readonly number[]} shown indices of the findings that pass the filters */
   set(findings, shown) {
     this.findings = findings;
     this.shown = shown.filter((index) => findings[index]?.anchor);
@@ -35,7 +35,7 @@ class Markers {
   }
 
   /**
-   * Clusters for a scale. They change at powers of √2 only, so that they stand while the map moves.
+   * Returns the clusters for a scale. They change only at powers of √2, so they are stable while the map moves.
    *
    * @param {number} k
    */
@@ -77,7 +77,7 @@ class Markers {
   }
 
   /**
-   * The topmost cluster at a pixel.
+   * Returns the topmost cluster at a pixel.
    *
    * @param {Frame} frame
    * @param {number} px
@@ -123,7 +123,7 @@ function clusterRadius(cluster) {
 }
 
 /**
- * Errors are round, warnings are triangles, information is square.
+ * Draws the shape of a marker: a circle for errors, a triangle for warnings, a square for information.
  *
  * @param {CanvasRenderingContext2D} canvas
  * @param {Level} level

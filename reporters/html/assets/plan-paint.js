@@ -1,5 +1,5 @@
-// Draws the map itself: lanes, borders, marks, reference lines, junctions. It is done in steps, each of a few
-// milliseconds, so that a map of any size is drawn without the page standing still.
+// Draws the map: lanes, borders, marks, reference lines, junctions. It works in steps of a few milliseconds, so that a
+// map of any size does not block the page.
 
 /**
  * center in cm, pixels per cm, size in pixels
@@ -19,7 +19,7 @@ function boxOfFrame(frame, margin = 0) {
   return [frame.x - halfWidth, frame.y - halfHeight, frame.x + halfWidth, frame.y + halfHeight];
 }
 
-/** How many lanes go into one path: long paths are slow to fill, short ones are many calls. */
+/** Number of lanes in one path. Long paths are slow to fill, and short paths need many calls. */
 const LANES_PER_PATH = 24;
 const POINTS_PER_STEP = 6000;
 
@@ -31,14 +31,14 @@ class BasePainter {
     this.kinds = this.plan.sections.map((section) => Uint8Array.from(section.lanes, (lane) => kindOfLane(lane.type)));
   }
 
-  /** Which level of detail suits a scale. @param {number} k pixels per cm */
+  /** Returns the level of detail for a scale. @param {number} k pixels per cm */
   static levelFor(k) {
     const perMetre = k * 100;
     return perMetre < 0.9 ? 2 : perMetre < 7 ? 1 : 0;
   }
 
   /**
-   * Draws in steps; between two of them the caller may do something else.
+   * Draws in steps. The caller can do other work between two steps.
    *
    * @param {CanvasRenderingContext2D} canvas
    * @param {Frame} frame
@@ -67,14 +67,14 @@ class BasePainter {
     detail.labels(visible, box);
   }
 
-  /** Very far away what is smaller than half a pixel is not drawn. @param {number} index @param {Frame} frame */
+  /** Checks whether a section is at least about half a pixel large. @param {number} index @param {Frame} frame */
   isSeen(index, frame) {
     const box = this.plan.sections[index]?.box;
     return box !== undefined && Math.max(box[2] - box[0], box[3] - box[1]) * frame.k > 0.4;
   }
 
   /**
-   * From so far away that a lane is no wider than a hair: one line for each section.
+   * Draws one line for each section, at scales where a lane is too narrow to be visible.
    *
    * @param {CanvasRenderingContext2D} canvas @param {Frame} frame @param {MapTheme} theme @param {number[]} visible
    */
@@ -124,7 +124,7 @@ class BasePainter {
   }
 
   /**
-   * Borders of lanes, thin: they tell neighbours of one kind apart, and hide the seams between polygons.
+   * Draws thin borders of lanes. They separate neighbours of one kind and hide the gaps between polygons.
    *
    * @param {CanvasRenderingContext2D} canvas @param {Frame} frame @param {MapTheme} theme @param {number[]} visible
    * @param {number} level
@@ -150,7 +150,7 @@ class BasePainter {
   }
 
   /**
-   * Puts a line into the path.
+   * Adds a line to the path.
    *
    * @param {CanvasRenderingContext2D} canvas
    * @param {Frame} frame
@@ -171,8 +171,8 @@ class BasePainter {
   }
 
   /**
-   * Puts the polygon of a lane into the path. All go around in the same sense: where lanes of both sides overlap, as in
-   * junctions, opposite ones would cancel out.
+   * Adds the polygon of a lane to the path. All polygons have the same orientation. Opposite ones would cancel out if
+   * lanes of both sides overlap, as in junctions.
    *
    * @param {CanvasRenderingContext2D} canvas @param {Frame} frame @param {PlanLane} lane @param {number} level
    */
@@ -194,7 +194,7 @@ class BasePainter {
   }
 
   /**
-   * Puts the outline of a road or of one of its sections into the path: the outermost borders, without those between.
+   * Adds the outline of a road or of one of its sections to the path: only the outermost borders.
    *
    * @param {CanvasRenderingContext2D} canvas @param {Frame} frame @param {PlanTarget} target @param {number} level
    */
@@ -224,7 +224,7 @@ class BasePainter {
 }
 
 /**
- * Puts what a target means into the path.
+ * Adds the shape of a target to the path.
  *
  * @param {BasePainter} painter
  * @param {CanvasRenderingContext2D} canvas

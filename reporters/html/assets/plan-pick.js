@@ -1,4 +1,4 @@
-// What is where: from a point of the map to road, section and lane, and from road and s to a point.
+// Lookup of positions: from a point of the map to road, section and lane, and from road and s to a point.
 
 /** @typedef {{road: number, section: number, lane: number, s: number, t: number}} PlanSpot all lengths in centimetres */
 /**
@@ -43,14 +43,14 @@ function indexPlan(plan) {
   };
 }
 
-/** Of two ends of a line's level 0. @param {Plan} plan @param {number} line */
+/** Returns both ends of a line at level 0. @param {Plan} plan @param {number} line */
 function lineRange(plan, line) {
   const start = plan.levels[0]?.start;
   return [start?.[line] ?? 0, start?.[line + 1] ?? 0];
 }
 
 /**
- * Whether a ray to the right crosses a piece of a line an odd number of times.
+ * Checks whether a ray to the right crosses a part of a line an odd number of times.
  *
  * @param {Plan} plan
  * @param {number} line
@@ -89,11 +89,11 @@ function isInLane(plan, lane, x, y) {
   return crosses(level.x[i1 - 1], level.y[i1 - 1], level.x[o1 - 1], level.y[o1 - 1], x, y) !== odd;
 }
 
-/** How many stacked lanes are looked at before the pointer gets an answer. */
+/** Maximum number of overlapping lanes that are examined for a pointer position. */
 const MOST_LANES_TRIED = 400;
 
 /**
- * The road and the lane at a point; of several the last, which is drawn on top.
+ * Returns the road and the lane at a point. Of several it returns the last one, which is drawn on top.
  *
  * @param {IndexedPlan} indexed
  * @param {number} x
@@ -119,7 +119,7 @@ function spotAt(indexed, x, y) {
 }
 
 /**
- * The nearest station of a road's reference line.
+ * Returns the nearest station of a road's reference line.
  *
  * @param {Plan} plan
  * @param {PlanRoad} road
@@ -148,7 +148,7 @@ function projectOn(plan, road, x, y) {
 }
 
 /**
- * The point of a reference line at s, with the direction there.
+ * Returns the point of a reference line at s, with the direction at this point.
  *
  * @param {Plan} plan
  * @param {PlanRoad} road
@@ -199,7 +199,7 @@ function lanesOf(plan, target) {
 }
 
 /**
- * What a target covers; an empty box where it is not on the map.
+ * Returns the box of a target, empty if it is not on the map.
  *
  * @param {Plan} plan
  * @param {PlanTarget} target
@@ -207,7 +207,7 @@ function lanesOf(plan, target) {
  */
 function boxOfTarget(plan, target) {
   const section = plan.roads[target.road ?? -1]?.sections[target.section ?? -1];
-  // The middle lane has no width: it is the center line.
+  // The center lane has no width, so the center line is used.
   if (section && target.lane === 0) return boxOfLines(plan, [section.center]);
   if (section && target.lane === undefined) return section.box;
   if (target.lane !== undefined)
@@ -223,7 +223,7 @@ function boxOfTarget(plan, target) {
   return whole?.box ?? emptyBox();
 }
 
-/** A point for a target that comes without one. @param {Plan} plan @param {PlanTarget} target */
+/** Returns a point for a target without one. @param {Plan} plan @param {PlanTarget} target */
 function anchorOf(plan, target) {
   const road = plan.roads[target.road ?? -1];
   if (road) {
@@ -235,7 +235,7 @@ function anchorOf(plan, target) {
   return box[0] <= box[2] ? { x: (box[0] + box[2]) / 2, y: (box[1] + box[3]) / 2 } : null;
 }
 
-/** Width of a lane, linear between its points. @param {Float64Array} pairs @param {number} s */
+/** Returns the width of a lane, interpolated linearly between its points. @param {Float64Array} pairs @param {number} s */
 function valueAt(pairs, s) {
   const count = pairs.length / 2;
   if (count === 0) return NaN;

@@ -1,7 +1,7 @@
-// Colours of the map. Kinds of lanes are told apart by lightness as well as by hue, as roads are by people who see red
-// and green as one.
+// Colours of the map. Kinds of lanes differ in lightness as well as in hue, so people with red-green colour blindness
+// can distinguish them.
 
-/** Kinds in the order in which they are drawn: what traffic drives on lies on top. */
+/** Kinds of lanes in drawing order. Lanes for traffic are on top. */
 const LANE_KINDS = [
   { name: 'other', types: [''], light: '#dfe1e4', dark: '#30343a' },
   { name: 'none', types: ['none'], light: '#e9ebe6', dark: '#282c2b' },
@@ -38,7 +38,7 @@ function kindOfLane(type) {
   return KIND_OF_TYPE.get(type) ?? 0;
 }
 
-/** Lanes with an arrow: where something moves along. */
+/** Types of lanes that have an arrow, because traffic moves along them. */
 const MOVING = new Set([
   'driving',
   'bidirectional',
@@ -105,7 +105,7 @@ const MAP_THEMES = {
 
 /** @typedef {typeof MAP_THEMES.light} MapTheme */
 
-/** Okabe and Ito's vermilion, orange and blue; the shapes differ as well. */
+/** Vermilion, orange and blue of Okabe and Ito. The shapes differ too. */
 const LEVEL_COLORS = { error: '#d5360f', warning: '#e69f00', information: '#0072b2' };
 
 /** @type {Record<string, string>} */
@@ -124,7 +124,7 @@ function markColor(color, theme) {
   return MARK_COLORS[color] ?? theme.white;
 }
 
-/** Pattern of a kind of road mark, in metres. @param {string} type @returns {number[]} */
+/** Returns the dash pattern of a kind of road mark in metres. @param {string} type @returns {number[]} */
 function markPattern(type) {
   if (type === 'broken' || type === 'broken broken') return [3, 4.5];
   if (type === 'botts dots') return [0.3, 1.2];

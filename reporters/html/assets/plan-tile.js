@@ -1,9 +1,9 @@
-// The map as a picture that is somewhat greater than what is seen. While the map is moved the picture is moved; a new
-// one is drawn beside it, a few milliseconds in each frame, and takes its place when it is ready.
+// Cached picture of the map, a little larger than the view. When the map moves, the picture moves. A new one is drawn
+// off screen, a few milliseconds in each frame, and replaces the old one when it is complete.
 
-/** Milliseconds of drawing in a frame. */
+/** Drawing time in a frame in milliseconds. */
 const BUDGET = 9;
-/** How much greater than the view the picture is, on each side, as a share. */
+/** Margin of the picture on each side as a fraction of the view. */
 const MARGIN = 0.25;
 
 /** @typedef {{canvas: HTMLCanvasElement, frame: Frame, theme: MapTheme}} Tile */
@@ -40,7 +40,7 @@ class TileStore {
   }
 
   /**
-   * Whether a picture shows all of a view sharply.
+   * Checks whether a picture covers the whole view at a sufficient resolution.
    *
    * @param {Tile|undefined|null} tile
    * @param {Frame} view
@@ -56,7 +56,7 @@ class TileStore {
   }
 
   /**
-   * Whether it is better to go on with a picture than to begin another.
+   * Checks whether to continue a picture instead of starting another one.
    *
    * @param {Tile} tile
    * @param {Frame} view
@@ -73,7 +73,7 @@ class TileStore {
   }
 
   /**
-   * Goes on drawing.
+   * Continues drawing.
    *
    * @param {Frame} view
    * @param {number} ratio
@@ -108,7 +108,7 @@ class TileStore {
     return true;
   }
 
-  /** Forgets pictures of another size or resolution. */
+  /** Drops pictures of another size or resolution. */
   clear() {
     this.front = null;
     this.back = null;
@@ -130,7 +130,7 @@ class TileStore {
     let left = (frame.x - view.x) * view.k + view.width / 2 - width / 2;
     let top = (view.y - frame.y) * view.k + view.height / 2 - height / 2;
     if (exact) {
-      // Whole device pixels, or the picture is blurred while it stands.
+      // The offset is a whole number of device pixels, because otherwise the picture is blurred.
       const device = context.canvas.width / view.width;
       left = Math.round(left * device) / device;
       top = Math.round(top * device) / device;

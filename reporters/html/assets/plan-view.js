@@ -1,9 +1,9 @@
-// The map as an element: it draws when something has changed, says where the pointer is and what was clicked.
+// Map element. It draws after changes, shows the pointer's position and reports clicks.
 
 /**
  * @typedef {object} MapEvents
- * @property {(finding: number) => void} finding a mark was clicked
- * @property {(members: number[], x: number, y: number) => void} several marks at one place were
+ * @property {(finding: number) => void} finding called after a click on a marker
+ * @property {(members: number[], x: number, y: number) => void} several called after a click on several markers at one place
  * @property {(road: number, x: number) => void} road
  * @property {() => void} nothing
  */
@@ -11,7 +11,7 @@
 const DOUBLE_CLICK_MILLISECONDS = 220;
 
 /**
- * What lies farther outside of the roads than they are big, in a sentence; empty where nothing does.
+ * Returns a sentence about items whose distance from the roads exceeds the size of the road network, or an empty text.
  *
  * @param {Plan} plan
  */
@@ -30,7 +30,7 @@ function farSentence(plan) {
     .filter(({ count }) => count > 0);
   if (parts.length === 0) return '';
   const lies = parts.length === 1 && parts[0]?.count === 1 ? 'lies' : 'lie';
-  return `${parts.map(({ count, one }) => counted(count, one)).join(' and ')} ${lies} far outside of the view`;
+  return `${parts.map(({ count, one }) => counted(count, one)).join(' and ')} ${lies} far outside the view`;
 }
 
 class PlanView {
@@ -50,7 +50,7 @@ class PlanView {
     this.further = [];
     /** @type {number} */
     this.road = -1;
-    /** s on the selected road that the pointer is at in its profile. @type {number|null} */
+    /** Station on the selected road at the pointer's position in its profile. @type {number|null} */
     this.station = null;
     this.roadTimer = 0;
     this.pending = false;
@@ -59,7 +59,7 @@ class PlanView {
     this.canvas = withAttributes(make('canvas', 'map-canvas'), {
       tabindex: 0,
       role: 'img',
-      'aria-label': 'Map of the roads with the findings; the table has the same as text',
+      'aria-label': 'Map of the roads with the findings; the table shows the same as text',
     });
     this.readout = make('div', 'readout');
     this.scaleBar = make('div', 'scale-bar', make('span', ''));
@@ -93,7 +93,7 @@ class PlanView {
     return make('span', 'far', `${sentence} `, everything);
   }
 
-  /** Says something about what is selected, below the scale. @param {string} sentence empty: nothing */
+  /** Shows a sentence about the selection below the scale. @param {string} sentence empty: nothing */
   say(sentence) {
     this.said.textContent = sentence;
     this.element.classList.toggle('with-notes', sentence !== '' || this.notes.querySelector('.far') !== null);
@@ -161,7 +161,7 @@ class PlanView {
     if (flying || more) this.refresh();
   }
 
-  /** Draws everything at once, as printing needs it. */
+  /** Draws everything at once for printing. */
   paintWhole() {
     this.paint(performance.now(), Infinity);
     this.paint(performance.now(), Infinity);
@@ -175,7 +175,7 @@ class PlanView {
     frames.longest = Math.max(frames.longest, took);
     const now = performance.now();
     if (frames.firstPaint === 0) frames.firstPaint = now;
-    // Only frames that follow each other: while nothing changes none is drawn.
+    // Only consecutive frames count, because no frame is drawn while nothing changes.
     const gap = now - frames.last;
     if (gap < 250) frames.gap = frames.gap === 0 ? gap : frames.gap * 0.9 + gap * 0.1;
     frames.last = now;
@@ -295,7 +295,7 @@ class PlanView {
     const [x, y] = this.toPlan(px, py);
     const spot = spotAt(this.indexed, x, y);
     this.events.nothing();
-    // A second click makes it a double one, which zooms.
+    // A second click would make it a double click, which zooms.
     if (spot) this.roadTimer = setTimeout(() => this.events.road(spot.road, px), DOUBLE_CLICK_MILLISECONDS);
   }
 
@@ -304,11 +304,11 @@ class PlanView {
     return this.plan.roadBox ? this.camera.fit(this.plan.roadBox) : Promise.resolve();
   }
 
-  /** Goes to a finding. @param {Finding} finding @returns {Promise<void>} */
+  /** Flies to a finding. @param {Finding} finding @returns {Promise<void>} */
   show(finding) {
     const { anchor } = finding;
     if (!anchor) return Promise.resolve();
-    // At least 25 m to each side; more where all of an element is meant and not a spot on it.
+    // At least 25 m to each side are shown, and more if the finding is about a whole element.
     const half = [2500, 2500];
     if (finding.wholeElement) {
       for (const target of this.targets) {
@@ -322,7 +322,7 @@ class PlanView {
   }
 }
 
-/** Kinds of lanes that are on the map, and the shapes of marks. @param {PlanView} view @param {Theme} theme */
+/** Returns the legend of the kinds of lanes on the map. @param {PlanView} view @param {Theme} theme */
 function legend(view, theme) {
   const used = new Set(view.painter.kinds.flatMap((kinds) => [...kinds]));
   const list = make('ul');

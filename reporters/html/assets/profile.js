@@ -1,4 +1,4 @@
-// Plots of a value along a road: elevation, widths of lanes.
+// Plots of values along a road: elevation, widths of lanes.
 
 /**
  * pairs of s and value in cm; s counts from `from`
@@ -12,14 +12,14 @@
  * @property {boolean} labelled
  */
 
-/** Colours of lines that are told apart by people who see red and green as one (Paul Tol's bright and muted ones). */
+/** Colours of lines, distinguishable with red-green colour blindness (bright and muted schemes of Paul Tol). */
 const PROFILE_COLORS = ['#4477aa', '#ee6677', '#228833', '#ccbb44', '#66ccee', '#aa3377', '#997700', '#88ccaa'];
 
 const PLOT = { width: 316, height: 108, left: 38, right: 22, top: 8, bottom: 18 };
 
 class ProfilePlot {
   /**
-   * @param {string} title @param {number} length of the road in cm @param {ProfileLine[]} lines
+   * @param {string} title @param {number} length length of the road in cm @param {ProfileLine[]} lines
    * @param {{s: number, level: Level}[]} findings @param {(s: number|null) => void} hovered
    */
   constructor(title, length, lines, findings, hovered) {
@@ -30,7 +30,7 @@ class ProfilePlot {
     /** @type {number|null} */
     this.station = null;
     this.range = ProfilePlot.rangeOf(lines);
-    /** Heights that have a label. @type {number[]} */
+    /** Vertical positions that have a label. @type {number[]} */
     this.labels = [];
     const [low, high] = this.range;
     this.canvas = withAttributes(make('canvas', 'plot'), {
@@ -168,7 +168,7 @@ class ProfilePlot {
 }
 
 /**
- * Round numbers within a range.
+ * Returns round numbers within a range.
  *
  * @param {number} low
  * @param {number} high

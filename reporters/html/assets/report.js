@@ -1,4 +1,4 @@
-// The page of a result: puts the parts together and keeps them in step.
+// Page of a result: combines the parts and keeps them consistent.
 
 (() => {
   /** @type {HTMLElement} */
@@ -14,13 +14,13 @@
       this.checkers = listOf(data.checkers);
       this.findings = findingsOf(data, this.rules, plan);
       this.selected = -1;
-      /** What the last selection flies to; kept for those who wait for it. */
+      /** Flight of the last selection. Callers can wait for it. */
       this.flight = Promise.resolve();
       this.filters = new Filters(
         this.findings,
         [this.ruleFacet()],
         () => this.filtered(),
-        plan ? { label: 'only without place on the map', passes: (finding) => finding.anchor === null } : null,
+        plan ? { label: 'only without a place on the map', passes: (finding) => finding.anchor === null } : null,
       );
       this.list = new VirtualList({
         rowHeight: 66,
@@ -72,7 +72,7 @@
         several: (members, x, y) => this.openChooser(members, x, y),
         road: (road, x) => {
           this.showRoad(road, false);
-          // What was clicked stays in sight.
+          // The clicked point stays visible.
           const { camera } = /** @type {PlanView} */ (this.view);
           const over = x - (camera.width - camera.hidden - 60);
           if (camera.hidden > 0 && over > 0) camera.pan(-over, 0);
@@ -229,7 +229,7 @@
       return this.flight;
     }
 
-    /** Why there may be nothing to see where the map is moved to. @param {FindingPlace|undefined} place */
+    /** Says why the map may show nothing at a place. @param {FindingPlace|undefined} place */
     sayAbout(place) {
       this.view?.say(place && isOnUndrawableRoad(place, this.plan) ? UNDRAWABLE : '');
     }
@@ -260,7 +260,7 @@
       view.road = road;
       view.station = null;
       panel.show(road);
-      // The middle of what is seen moves with the panel, the map stays.
+      // The panel moves the middle of the visible part, but the map does not move.
       const hidden = this.stage.clientWidth > 640 ? panel.element.offsetWidth + 12 : 0;
       view.camera.x -= (hidden - view.camera.hidden) / 2 / view.camera.k;
       view.camera.hidden = hidden;
@@ -311,7 +311,7 @@
       if (this.act(event)) event.preventDefault();
     }
 
-    /** @param {KeyboardEvent} event @returns {boolean} whether the key means something here */
+    /** @param {KeyboardEvent} event @returns {boolean} whether the key is handled */
     act(event) {
       const camera = this.view?.camera;
       const arrows = /** @type {Record<string, [number, number]>} */ ({
@@ -337,7 +337,7 @@
       return true;
     }
 
-    /** Enter on a button is a click, except on the row that is selected anyway. @param {KeyboardEvent} event */
+    /** Handles Enter. On a button it is a click, except on the selected row. @param {KeyboardEvent} event */
     enter(event) {
       const finding = this.findings[this.selected];
       const target = event.target instanceof Element ? event.target.closest('button, a, summary, input') : null;
@@ -386,7 +386,7 @@
   function noPlanSentence(data) {
     return data.map
       ? 'The map of this report is missing from the file.'
-      : 'There is no road network to show: the findings are in the list and in the table.';
+      : 'There is no road network to show; see the findings in the list and in the table.';
   }
 
   /** @returns {Promise<{plan: Plan|null, fault: string}>} */
@@ -424,9 +424,9 @@
       ready,
       /** @param {number} id */
       select: (id) => page?.select(id),
-      /** Ends with the last flight that was begun. */
+      /** Resolves at the end of the last flight. */
       settled: () => page?.flight,
-      /** The middle of what is seen, in metres of the map; scale in CSS pixels per metre. */
+      /** Middle of the visible part in metres of the map; scale in CSS pixels per metre. */
       view: () => {
         const view = page?.view;
         return view
@@ -437,7 +437,7 @@
             }
           : null;
       },
-      /** Where a point of the map is on the page, in CSS pixels. @param {number} x metres @param {number} y */
+      /** Position of a point of the map on the page in CSS pixels. @param {number} x metres @param {number} y */
       screen: (x, y) => {
         const view = page?.view;
         if (!view) return null;

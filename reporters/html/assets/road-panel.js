@@ -1,4 +1,4 @@
-// The panel of the road that was clicked: what it is, where it leads, its lanes and its profiles.
+// Panel of the clicked road: its facts, links, lanes and profiles.
 
 /**
  * @typedef {object} RoadActions
@@ -8,7 +8,7 @@
  * @property {(s: number|null) => void} station
  */
 
-/** More lines than that are not told apart in a small plot. */
+/** Maximum number of lines in a plot. More cannot be distinguished in a small plot. */
 const MOST_PROFILE_LINES = 400;
 
 class RoadPanel {
@@ -68,7 +68,7 @@ class RoadPanel {
     for (const plot of this.plots) plot.draw(this.colors(), station);
   }
 
-  /** Where findings of a road lie along it. @param {number} index @param {PlanRoad} road */
+  /** Returns the stations of the findings on a road. @param {number} index @param {PlanRoad} road */
   marksOf(index, road) {
     /** @type {{s: number, level: Level}[]} */
     const marks = [];

@@ -1,7 +1,7 @@
-// The table of the files of a run.
+// Table of the files of a run.
 
 /**
- * shown: the path without what all paths begin with
+ * shown: the path without the common directory of all paths
  *
  * @typedef {object} RunFile
  * @property {string} path
@@ -25,7 +25,7 @@ const FILE_COLUMNS = [
   { name: 'error', title: 'errors', value: (file) => -file.error },
   { name: 'warning', title: 'warnings', value: (file) => -file.warning },
   { name: 'information', title: 'info', value: (file) => -file.information },
-  { name: 'why', title: 'why', value: (file) => file.why },
+  { name: 'why', title: 'reason', value: (file) => file.why },
 ];
 
 /** @param {Record<string, any>} data @returns {RunFile[]} */
@@ -51,7 +51,8 @@ function runFilesOf(data) {
 }
 
 /**
- * The address of a page beside this one. Only relative ones: nothing may lead out of the report, or be a script.
+ * Returns the address of a page beside this one. Only relative addresses are accepted, because a link must not leave
+ * the report or be a script.
  *
  * @param {string} page @param {number} [finding]
  */

@@ -1,4 +1,4 @@
-// The page of a run: what came out of all files, what to mend first, every finding.
+// Page of a run: verdicts of all files, the rules to fix first, all findings.
 
 (() => {
   const app = document.getElementById('app') ?? document.body.appendChild(make('main'));
@@ -60,7 +60,7 @@
       this.verdictButtons = VERDICTS.map((verdict) => this.verdictButton(verdict));
     }
 
-    /** Files with findings; those without would be choices of nothing. @type {number[]} */
+    /** Files with findings. Files without findings are no choices of the filter. @type {number[]} */
     fileChoices = [];
 
     /** @returns {Facet<RunFinding>[]} */
@@ -146,7 +146,7 @@
       );
     }
 
-    /** Rules by the level, the number of files and of findings: where one mending helps most. */
+    /** Returns the rules by level, number of files and number of findings, so the most useful fix comes first. */
     firstToMend() {
       const tallies = this.rules.map((_, rule) => ({
         rule,

@@ -1,14 +1,14 @@
 'use strict';
-// What the pages of results and of runs have in common. The reporter puts the files of a page one after the other
-// into its one script (they are plain declarations; the last file starts everything):
+// Common parts of the pages of results and of runs. The reporter concatenates the files of a page into one script
+// (they are plain declarations; the last file starts the page):
 //
 //   result  shared.js markdown.js list.js plan-data.js plan-grid.js plan-pick.js plan-theme.js plan-paint.js
 //           plan-detail.js plan-tile.js plan-camera.js plan-markers.js plan-view.js model.js filters.js detail.js
 //           table.js profile.js road-panel.js help.js report.js
 //   run     shared.js markdown.js list.js filters.js run-files.js run.js
 //
-// Everything in a report comes from files of others. Text goes into the page through `textContent` alone, by `make`,
-// and whatever is not shown by a browser, or turns the text around it, is made visible by `plain` before.
+// All data in a report come from untrusted files. `make` adds text to the page only through `textContent`. `plain`
+// first makes characters visible that a browser does not show or that change the direction of text.
 
 /** @typedef {'error'|'warning'|'information'} Level */
 
@@ -25,7 +25,7 @@ const LEVEL_NAMES = {
 const VERDICTS = ['rejected', 'undetermined', 'accepted'];
 
 /**
- * A new element with its children; strings become text.
+ * Returns a new element with its children. Strings become text.
  *
  * @template {keyof HTMLElementTagNameMap} T
  * @param {T} tag
@@ -43,7 +43,7 @@ function make(tag, className, ...children) {
 }
 
 /**
- * The element with attributes set; `false` and `null` leave one out.
+ * Sets attributes and returns the element. `false` and `null` leave one out.
  *
  * @template {Element} E
  * @param {E} element
@@ -72,16 +72,16 @@ function makeButton(className, label, action, hint) {
   return button;
 }
 
-/** Controls, marks that turn the direction of text, and what has no width: nothing of these may act unseen. */
+/** Control characters, marks of text direction and characters without width. They must not act invisibly. */
 // eslint-disable-next-line no-control-regex
 const UNSEEN =
   /[\u0000-\u0008\u000b-\u001f\u007f-\u009f\u00ad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\uffff]|[\ud800-\udbff](?![\udc00-\udfff])|(?<![\ud800-\udbff])[\udc00-\udfff]/g;
 
 /**
- * Text of others, so that all of it is seen: `‹U+202E›` instead of a mark that turns the rest of the line around.
+ * Returns untrusted text with invisible characters made visible, for example `‹U+202E›` for a direction mark.
  *
  * @param {unknown} value
- * @param {number} [most] how many characters at most
+ * @param {number} [most] maximum number of characters
  */
 function plain(value, most = 20000) {
   const text = typeof value === 'string' ? value : value === null || value === undefined ? '' : String(value);
@@ -124,22 +124,22 @@ function fixed(value, digits = 2) {
   return Number.isFinite(value) ? value.toFixed(digits) : '–';
 }
 
-/** The part of a rule's uid that tells it from its neighbours. @param {string} uid */
+/** Returns the last part of a rule's uid. @param {string} uid */
 function shortRule(uid) {
   const name = uid.slice(uid.lastIndexOf(':') + 1);
   return plain(name || uid, 120);
 }
 
 /**
- * Code begins with a backtick that does not follow a word and ends with one that no word follows, without space at
- * either end. A backtick within a word is of an id: it stays where it is, and so does any other without its partner, or
- * all code after it would be turned inside out. Of limited length, as text may consist of beginnings only.
+ * Code in text. It begins with a backtick that does not follow a word, and ends with one before no word, without space
+ * at either end. A backtick within a word belongs to an id and stays. An unpaired one stays too, because otherwise code
+ * and text would swap after it. The length is limited, because a text may consist of opening backticks only.
  */
 const CODE =
   /((?<![\p{L}\p{N}_`])`(?!\s)(?:[^`\n]|(?<=[\p{L}\p{N}_])`(?=[\p{L}\p{N}_])){1,600}(?<!\s)`(?![\p{L}\p{N}_`]))/u;
 
 /**
- * Text of a finding; what stands between backticks is code.
+ * Returns text of a finding. Text between backticks is code.
  *
  * @param {unknown} value
  * @param {number} [most]
@@ -154,7 +154,7 @@ function withCode(value, most) {
 const NAME_PARTS = /[^._]+[._]*|[._]+/g;
 
 /**
- * A name that is broken after dots and underscores; elsewhere only where a part alone is wider than its column.
+ * Returns a name that breaks after dots and underscores, and elsewhere only if one part is wider than its column.
  *
  * @param {unknown} value
  * @param {number} [most]
@@ -166,8 +166,8 @@ function breakable(value, most) {
 }
 
 /**
- * A place in a file. Where there is no room for all of it the directories give way from the left, then the beginning of
- * the name; the row stays.
+ * Returns a place in a file. If space is short, the directories are cut from the left, then the beginning of the name.
+ * The row is never cut.
  *
  * @param {string} where
  * @param {string} [className]
@@ -184,7 +184,7 @@ function whereElement(where, className = 'where') {
   return withAttributes(element, { title: shown });
 }
 
-/** How much all paths begin with: directories that say nothing. @param {readonly string[]} paths */
+/** Returns the common directory of all paths. @param {readonly string[]} paths */
 function commonDirectory(paths) {
   let common = paths[0] ?? '';
   for (const path of paths) while (!path.startsWith(common)) common = common.slice(0, -1);
@@ -203,7 +203,7 @@ function verdictBadge(verdict) {
   return make('span', `verdict ${word}`, word);
 }
 
-/** A link out of the report; anything but a web address stays text. @param {unknown} address @param {string} label */
+/** Returns a link out of the report, or text if it is no web address. @param {unknown} address @param {string} label */
 function outwardLink(address, label) {
   const target = textOf(address);
   if (!/^https?:\/\/[^\s]+$/i.test(target)) return target ? make('span', 'muted', plain(target, 500)) : null;
@@ -216,7 +216,7 @@ function outwardLink(address, label) {
   });
 }
 
-/** What is wrong with a block of data, in a sentence for people. */
+/** Error in a block of data, with a sentence for the user. */
 class BlockError extends Error {}
 
 /** @param {string} base64 @returns {Uint8Array<ArrayBuffer>} */
@@ -232,7 +232,7 @@ function fromBase64(base64) {
 }
 
 /**
- * The bytes of a block of data, null where the page has none of this name.
+ * Returns the bytes of a block of data, or null if the page has no block of this name.
  *
  * @param {string} id
  * @returns {Promise<Uint8Array<ArrayBuffer>|null>}
@@ -241,7 +241,7 @@ async function readBlock(id) {
   const block = document.getElementById(id);
   if (!block) return null;
   if (typeof DecompressionStream === 'undefined') {
-    throw new BlockError('This browser is too old for this report: it cannot unpack gzip. Any of 2023 or later can.');
+    throw new BlockError('This browser is too old for this report: it cannot unpack gzip. Use a browser of 2023 or later.');
   }
   try {
     const packed = fromBase64((block.textContent ?? '').trim());
@@ -255,34 +255,34 @@ async function readBlock(id) {
 /** @returns {Promise<Record<string, any>>} */
 async function readData() {
   const bytes = await readBlock('data');
-  if (!bytes) throw new BlockError('This file has no block “data”; it was cut short or is no report.');
+  if (!bytes) throw new BlockError('This file has no block “data”; it is truncated or not a report.');
   let data;
   try {
     data = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes));
   } catch {
-    throw new BlockError('The block “data” of this file is damaged: what it holds is no JSON.');
+    throw new BlockError('The block “data” of this file is damaged: it is not JSON.');
   }
   if (data === null || typeof data !== 'object' || data.schema !== 1) {
-    throw new BlockError('The block “data” of this file has a form that this page does not know.');
+    throw new BlockError('The block “data” of this file has an unknown format.');
   }
   return data;
 }
 
 /** @param {HTMLElement} app @param {unknown} error */
 function showFailure(app, error) {
-  const said = error instanceof BlockError ? error.message : 'Something in this report could not be shown.';
+  const sentence = error instanceof BlockError ? error.message : 'A part of this report cannot be shown.';
   const detail =
     error instanceof BlockError || !(error instanceof Error) ? null : make('pre', '', plain(error.message, 2000));
   app.replaceChildren(
-    withAttributes(make('div', 'failure', make('h1', '', 'This report cannot be shown'), make('p', '', said), detail), {
+    withAttributes(make('div', 'failure', make('h1', '', 'This report cannot be shown'), make('p', '', sentence), detail), {
       role: 'alert',
     }),
   );
 }
 
 /**
- * What was left out. A sentence is there once, with how often it was said; where two lists say the same they are about
- * the same thing.
+ * Returns a note about data that were left out. Each sentence appears once, with its number of occurrences. A sentence
+ * in two lists is about the same data.
  *
  * @param {string} title
  * @param {...unknown} lists sentences
@@ -307,7 +307,7 @@ function cutsNote(title, ...lists) {
   return make('details', 'note cuts', summary, make('ul', '', ...items));
 }
 
-/** Dark or light: what was chosen here before, else what the system says. */
+/** Dark or light theme: the last choice of the user, otherwise the system setting. */
 class Theme {
   constructor() {
     /** @type {(() => void)[]} */
@@ -327,7 +327,7 @@ class Theme {
     try {
       localStorage.setItem('qcbus-theme', this.chosen);
     } catch {
-      // A browser may refuse storage to files; the choice then lasts as long as the page.
+      // A browser may refuse storage to local files. The choice is then lost with the page.
     }
     this.apply();
   }
@@ -355,7 +355,7 @@ class Theme {
   }
 }
 
-/** Whether a key belongs to what has the focus: text fields, selects. @param {KeyboardEvent} event */
+/** Checks whether a key belongs to the focused element, for example a text field or a select. @param {KeyboardEvent} event */
 function isTyping(event) {
   const target = event.target;
   if (target instanceof HTMLInputElement) return target.type === 'search' || target.type === 'text';
@@ -363,8 +363,7 @@ function isTyping(event) {
 }
 
 /**
- * Escape empties a field for searching, too; the browser's own emptying would come after it has lost the focus, without
- * an event that says so.
+ * Makes Escape clear a search field. The browser would clear it only after it has lost the focus, without an event.
  *
  * @param {HTMLInputElement} search
  */
@@ -386,7 +385,7 @@ async function startPage(app, build) {
 }
 
 /**
- * Runs once the markup is there, wherever the script stands.
+ * Runs after the markup is parsed, regardless of the script's position.
  *
  * @param {() => Promise<void>} start
  * @returns {Promise<void>}
@@ -398,11 +397,11 @@ function whenParsed(start) {
   });
 }
 
-/** More rows than this take a browser a minute to put on pages, and nobody reads them. */
+/** Maximum number of printed rows. A browser needs a minute to lay out more. */
 const MOST_PRINTED = 2000;
 
 /**
- * Heading of what is printed, with what is left out.
+ * Returns the heading of a printed table, with the number of rows that are left out.
  *
  * @param {number} all
  * @param {string} one
@@ -416,13 +415,13 @@ function printedHead(all, one) {
     make(
       'p',
       'left-out',
-      `${counted(left, one)} ${left === 1 ? 'is' : 'are'} not printed; the filters make them fewer.`,
+      `${counted(left, one)} ${left === 1 ? 'is' : 'are'} not printed; use the filters to see fewer.`,
     ),
   ];
 }
 
 /**
- * Calls before and after the page is printed, whoever prints.
+ * Calls functions before and after every printing of the page.
  *
  * @param {() => void} before
  * @param {() => void} after

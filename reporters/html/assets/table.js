@@ -1,4 +1,4 @@
-// The findings as a table: for those who cannot use the map, to be copied, and to be printed.
+// Table of the findings: for users who cannot use the map, for copying and for printing.
 
 const ROWS_AT_ONCE = 500;
 const COLUMNS = ['level', 'finding', 'place', 'rule', 'x', 'y', 'XPath'];
@@ -17,7 +17,7 @@ function tableCells(finding, rules) {
   ];
 }
 
-/** Text for spreadsheets. What would be a formula there is made text. @param {readonly string[][]} rows */
+/** Returns text for spreadsheets. Cells that look like a formula become text. @param {readonly string[][]} rows */
 function tabSeparated(rows) {
   return rows
     .map((cells) =>
@@ -128,7 +128,7 @@ class FindingsTable {
   }
 }
 
-/** For browsers that give no clipboard to files. @param {string} text */
+/** Copies by a selection, because some browsers deny the clipboard to local files. @param {string} text */
 function copyBySelection(text) {
   const area = make('textarea', 'sr-only');
   area.value = text;
@@ -139,7 +139,7 @@ function copyBySelection(text) {
 }
 
 /**
- * The filtered findings for the printer; it is there while the page is printed only.
+ * Returns the filtered findings for printing. The section exists only while the page is printed.
  *
  * @param {readonly Finding[]} findings
  * @param {readonly number[]} shown

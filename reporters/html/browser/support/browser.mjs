@@ -1,4 +1,4 @@
-// A browser without a window, and pages in it of which every error and every request is kept.
+// A headless browser, and pages that record every error and every request.
 
 import { existsSync, mkdirSync, writeFileSync } from 'node:fs';
 import { delimiter, join } from 'node:path';
@@ -9,7 +9,7 @@ export const OUT = fileURLToPath(new URL('../out/', import.meta.url));
 
 const NAMES = ['chromium-headless-shell', 'chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable'];
 
-/** The browser to use, null where there is none. */
+/** Returns the path of the browser to use, or null if none is found. */
 export function findChromium() {
   const given = process.env.QCBUS_CHROMIUM;
   if (given) return existsSync(given) ? given : null;
@@ -33,7 +33,7 @@ export function store(name, html) {
   return path;
 }
 
-/** Opens a file; `troubles` collects what must not be. */
+/** Opens a file. `troubles` collects errors, warnings, requests and dialogs. */
 export async function open(browser, path, options = {}) {
   const context = await browser.newContext({
     viewport: { width: 1440, height: 900 },
@@ -44,7 +44,7 @@ export async function open(browser, path, options = {}) {
   const troubles = [];
   const own = pathToFileURL(path).href;
   page.on('console', (message) => {
-    // The tests themselves read the canvas; the advice about that is not about the page.
+    // The tests themselves read the canvas, so this warning is not about the page.
     if (message.text().includes('willReadFrequently')) return;
     if (message.type() === 'error' || message.type() === 'warning') troubles.push(`console: ${message.text()}`);
   });
@@ -61,7 +61,7 @@ export async function open(browser, path, options = {}) {
   return { page, troubles, context };
 }
 
-/** Waits until the map has nothing more to draw. */
+/** Waits until the map is completely drawn. */
 export async function atRest(page) {
   await page.evaluate(() => window.qcbus.settled());
   await page.waitForFunction(() => !window.qcbus.stats().busy);

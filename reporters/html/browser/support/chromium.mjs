@@ -1,4 +1,4 @@
-// Says which browser the tests will use; fails where there is none.
+// Prints the browser of the tests. Fails if none is found.
 
 import { findChromium } from './browser.mjs';
 

@@ -1,7 +1,7 @@
-// Writes the binary `plan` of docs/html-report.md, for pages of tests. It is written from the document and not from
-// the reporter, so that the two are held against the page independently.
+// Writes the binary `plan` of docs/html-report.md for test pages. It follows the document and not the reporter, so the
+// page is tested independently of the reporter.
 
-/** Bytes that grow. */
+/** Growing buffer of bytes. */
 class Writer {
   constructor() {
     this.bytes = new Uint8Array(1 << 16);
@@ -55,7 +55,7 @@ class Writer {
 
 const cm = (metres) => Math.round(metres * 100);
 
-/** Points `[x, y, level]` in metres. */
+/** Writes points `[x, y, level]` in metres. */
 function writeLine(writer, points, stations) {
   let [x, y, s] = [0, 0, 0];
   writer.u(points.length);
@@ -160,7 +160,7 @@ function writeFurniture(writer, plan) {
   });
 }
 
-/** The bytes of a plan whose coordinates are in metres from its origin. */
+/** Returns the bytes of a plan with coordinates in metres from its origin. */
 export function encodePlan(plan) {
   const body = new Writer();
   body.list(plan.roads, (road) => writeRoad(body, road));

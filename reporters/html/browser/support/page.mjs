@@ -1,4 +1,4 @@
-// Puts a page together as the reporter does: markup, style, script with their digests, blocks of data.
+// Builds a page like the reporter: markup, style, script with their digests, blocks of data.
 
 import { createHash } from 'node:crypto';
 import { readFileSync } from 'node:fs';
@@ -6,7 +6,7 @@ import { gzipSync } from 'node:zlib';
 
 const ASSETS = new URL('../../assets/', import.meta.url);
 
-/** The order of the files is said in one place, the comment at the top of shared.js. */
+/** Reads the order of the files from the comment at the top of shared.js, its only definition. */
 function scriptsOf(kind) {
   const text = readFileSync(new URL('shared.js', ASSETS), 'utf8');
   const comment = text.slice(0, text.indexOf('\n\n'));

@@ -1,6 +1,6 @@
-// Road networks for pages of tests: arcs and straights with lanes, a junction, and a town as big as one likes.
+// Road networks for test pages: arcs and straight roads with lanes, a junction, and a town of any size.
 
-/** A road along `shape(s) = [x, y, heading]`, with lanes `[id, type, width]`, of one section for each `cuts` interval. */
+/** Returns a road along `shape(s) = [x, y, heading]` with lanes `[id, type, width]` in `sections` equal sections. */
 export function makeRoad({
   id,
   name = '',
@@ -104,7 +104,7 @@ const TRAM = [
   [-4, 'sidewalk', 2.5],
 ];
 
-/** A crossing with four arms and its turns, a curved road away from it, a highway beside it. */
+/** Returns a crossing with four arms and its turns, a curved road from it, and a highway beside it. */
 export function smallTown() {
   const roads = [];
   const arms = [0, 1, 2, 3].map((quarter) => (quarter * Math.PI) / 2);
@@ -242,7 +242,7 @@ export function smallTown() {
   return { origin: [690000, 5330000], roads, junctions, signals, objects, cuts: [] };
 }
 
-/** A grid of curved streets with at least so many lanes. */
+/** Returns a grid of curved streets with at least `lanes` lanes. */
 export function bigTown(lanes, pointsPerLane) {
   const perRoad = STREET.length;
   const side = Math.ceil(Math.sqrt(lanes / perRoad));
@@ -257,7 +257,7 @@ export function bigTown(lanes, pointsPerLane) {
   return { origin: [0, 0], roads, junctions: [], signals: [], objects: [], cuts: [] };
 }
 
-/** So many lanes in one place. */
+/** Returns `count` lanes at one place. */
 export function stacked(count) {
   const roads = Array.from({ length: count / 2 }, (_, i) =>
     makeRoad({

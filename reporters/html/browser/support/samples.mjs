@@ -1,8 +1,8 @@
-// Data of results and runs for pages of tests.
+// Data of results and runs for test pages.
 
 const RULE_PAGE = `# Widths of lanes
 
-The width of a lane **shall** be defined for the full length of its lane section: there has to be a \`<width>\` element
+The width of a lane **shall** be defined for the full length of its lane section, so a \`<width>\` element must exist
 at \`sOffset="0"\`.
 
 - A lane without a width cannot be drawn.
@@ -24,7 +24,7 @@ export const RULES = [
   {
     uid: 'asam.net:xodr:1.7.0:road.geometry.no_gap',
     checker: 'check_gap',
-    about: 'Geometries follow on each other.',
+    about: 'Geometries have no gaps.',
     page: '',
     link: '',
   },
@@ -50,7 +50,7 @@ const CHECKERS = [
     bundle: 'xodrBundle',
     status: 'completed',
     blocked: false,
-    summary: 'looked at 17 roads',
+    summary: 'checked 17 roads',
     about: 'widths',
     findings: 2,
   },
@@ -60,7 +60,7 @@ const CHECKERS = [
     bundle: 'xodrBundle',
     status: 'skipped',
     blocked: true,
-    summary: 'rests on check_gap',
+    summary: 'requires check_gap',
     about: '',
     findings: 0,
   },
@@ -117,7 +117,7 @@ export function resultOf(findings, more = {}) {
   };
 }
 
-/** Findings on the small town of roads.mjs. */
+/** Returns findings on the small town of roads.mjs. */
 export function townFindings(origin) {
   const at = (x, y) => [origin[0] + x, origin[1] + y];
   const line = { text: '      <lane id="-2" type="parking" level="false">', skipped: 0, more: false, mark: [6, 14] };
@@ -126,7 +126,7 @@ export function townFindings(origin) {
       1,
       'error',
       0,
-      'The width of lane -2 is defined from sOffset 3.5 on only; there is none for the first 3.5 m of the section.',
+      'The width of lane -2 starts at sOffset 3.5; the first 3.5 m of the section have no width.',
       [
         place({
           row: 148,
@@ -148,7 +148,7 @@ export function townFindings(origin) {
       2,
       'error',
       1,
-      'Between two geometries of the reference line there is a gap of 0.31 m.',
+      'The gap between two geometries of the reference line is 0.31 m.',
       [
         place({
           row: 402,
@@ -169,7 +169,7 @@ export function townFindings(origin) {
       ],
       [['gap', '0.31 m']],
     ),
-    finding(3, 'warning', 2, 'Lane 1 of road 1 is not linked in the junction: no connection leads from it.', [
+    finding(3, 'warning', 2, 'Lane 1 of road 1 has no connection in the junction.', [
       place({
         row: 611,
         column: 9,
@@ -179,13 +179,13 @@ export function townFindings(origin) {
         on: [{ junction: 0 }],
       }),
     ]),
-    finding(4, 'warning', 3, 'The signal faces away from the traffic that it is for.', [
+    finding(4, 'warning', 3, 'The signal faces away from its traffic.', [
       place({ row: 233, column: 11, at: at(18, -8.5), how: 'element', on: [{ signal: 0 }] }),
     ]),
-    finding(5, 'information', 3, 'This object has no height; it is taken to be flat.', [
+    finding(5, 'information', 3, 'This object has no height and counts as flat.', [
       place({ row: 301, column: 11, at: at(69, 24), how: 'element', on: [{ object: 0 }] }),
     ]),
-    finding(6, 'information', -1, 'The header says no geoReference, so nobody can tell where on earth this is.', [
+    finding(6, 'information', -1, 'The header has no geoReference, so the position on earth is unknown.', [
       place({ row: 2, column: 3, text: '', xpath: '/OpenDRIVE/header' }),
     ]),
     finding(7, 'warning', 0, 'The width of lane -1 changes by 0.60 m within 1 m.', [
@@ -236,7 +236,7 @@ export function runOf(files, findingsPerFile) {
       verdict,
       page: verdict === 'accepted' ? '' : `pages/${file} a.html`,
       ...counts,
-      why: verdict === 'undetermined' ? 'check_link could not look' : '',
+      why: verdict === 'undetermined' ? 'check_link did not run' : '',
     });
   }
   return {

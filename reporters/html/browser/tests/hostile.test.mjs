@@ -1,4 +1,4 @@
-// Pages of which the data are hostile, damaged or missing in part.
+// Pages with hostile, damaged or incomplete data.
 
 import assert from 'node:assert/strict';
 import { after, before, describe, test } from 'node:test';
@@ -136,7 +136,7 @@ describe('hostile pages', { skip: findChromium() ? false : 'no Chromium' }, () =
   );
 
   onPage(
-    '10,000 lanes and findings in one place',
+    '10,000 lanes and findings at one place',
     () =>
       makePage(
         'result',
@@ -164,8 +164,8 @@ describe('hostile pages', { skip: findChromium() ? false : 'no Chromium' }, () =
   );
 
   const damaged = [
-    ['data that is no gzip', (html) => html.replace(/(id="data">)[^<]{40}/, '$1AAAA')],
-    ['data that is no base64', (html) => html.replace(/(id="data">)/, '$1§§')],
+    ['data that are not gzip', (html) => html.replace(/(id="data">)[^<]{40}/, '$1AAAA')],
+    ['data that are not base64', (html) => html.replace(/(id="data">)/, '$1§§')],
     ['no data', (html) => html.replace('id="data"', 'id="other"')],
   ];
   for (const [name, damage] of damaged) {
@@ -181,7 +181,7 @@ describe('hostile pages', { skip: findChromium() ? false : 'no Chromium' }, () =
     'another schema',
     () => makePage('run', { schema: 2 }),
     async (page) => {
-      assert.match(await page.locator('[role=alert]').textContent(), /form that this page does not know/);
+      assert.match(await page.locator('[role=alert]').textContent(), /unknown format/);
     },
   );
 
@@ -207,10 +207,10 @@ describe('hostile pages', { skip: findChromium() ? false : 'no Chromium' }, () =
   }
 
   onPage(
-    'every byte of a plan',
+    'damage to any byte of a plan',
     () => makePage('result', resultOf([]), whole),
     async (page) => {
-      // The decoder is a plain function of the page's script: any bytes give a plan or a sentence, never another error.
+      // The decoder is a plain function of the page's script. Any bytes give a plan or a BlockError.
       const other = await page.evaluate(
         (bytes) => {
           const problems = [];

@@ -1,4 +1,4 @@
-// Pages that the reporter itself has made, from the directory QCBUS_PAGES.
+// Pages written by the reporter in the directory QCBUS_PAGES.
 
 import assert from 'node:assert/strict';
 import { existsSync, readdirSync } from 'node:fs';
@@ -26,7 +26,7 @@ describe(
     });
     after(() => browser?.close());
 
-    /** The data block as the page reads it, decoded once more by the test. */
+    /** Returns the data block of a page, decoded independently by the test. */
     const dataOf = (page) =>
       page.evaluate(async () => {
         const packed = Uint8Array.from(atob(document.getElementById('data').textContent.trim()), (character) =>
@@ -42,7 +42,7 @@ describe(
         const data = await dataOf(page);
         if (data.findings.length > 0) assert.ok((await page.locator('.finding-row').count()) > 0);
         const hasMap = data.file !== undefined && (await page.evaluate(() => window.qcbus.view())) !== null;
-        assert.equal(hasMap, Boolean(data.map), 'there is a map where the data say so');
+        assert.equal(hasMap, Boolean(data.map), 'a map is shown if the data have one');
         for (const finding of hasMap ? data.findings : []) {
           const at = finding.places.map((place) => place.at ?? null).find((point) => point !== null);
           if (!at) continue;

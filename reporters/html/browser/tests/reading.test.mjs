@@ -1,4 +1,4 @@
-// What the pages do for those who read, type and print: names, focus, what cannot be seen, what is too much.
+// Reading, typing and printing on pages: names, focus, invisible items, large amounts of data.
 
 import assert from 'node:assert/strict';
 import { after, before, describe, test } from 'node:test';
@@ -29,7 +29,7 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
   const focused = (page) => page.evaluate(() => document.activeElement?.getAttribute('data-finding') ?? null);
 
   onPage(
-    'Escape empties the search',
+    'Escape clears the search',
     () => townPage(),
     async (page) => {
       await page.keyboard.press('/');
@@ -42,7 +42,7 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
   );
 
   onPage(
-    'Escape empties both searches of a run',
+    'Escape clears both searches of a run',
     () => makePage('run', runOf(40, 6)),
     async (page) => {
       const all = await page.evaluate(() => window.qcbus.shown());
@@ -62,7 +62,7 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
     return plan;
   };
   onPage(
-    'the view is that of the roads and says what lies far outside',
+    'the view shows the roads and names items far outside',
     () =>
       townPage(
         [
@@ -77,12 +77,12 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
       const view = () => page.evaluate(() => window.qcbus.view());
       const first = await view();
       assert.ok(first.scale > 0.5, `${first.scale} pixels per metre`);
-      assert.match(await page.locator('.map-notes .far').textContent(), /^1 signal lies far outside of the view/);
+      assert.match(await page.locator('.map-notes .far').textContent(), /^1 signal lies far outside the view/);
       const [scale, note] = [
         await page.locator('.scale-bar').boundingBox(),
         await page.locator('.map-notes').boundingBox(),
       ];
-      assert.ok(note.y >= scale.y + scale.height, 'the sentence is under the scale');
+      assert.ok(note.y >= scale.y + scale.height, 'the sentence is below the scale');
       await page.locator('.finding-row').click();
       await atRest(page);
       assert.ok(Math.abs((await view()).x - town.origin[0] - 60000) < 0.05);
@@ -96,7 +96,7 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
   );
 
   onPage(
-    'what is near the roads is not said to be far',
+    'items near the roads are not reported as far',
     () => townPage(),
     async (page) => {
       assert.equal(await page.locator('.map-notes').isVisible(), false);
@@ -105,7 +105,7 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
 
   const deep = `${'a-long-directory/'.repeat(20)}catalog-of-vehicles.xosc`;
   onPage(
-    'places in the checked file have no path, others lose their beginning',
+    'places in the checked file have no path, and long paths lose their beginning',
     () =>
       townPage([
         finding(1, 'error', 0, 'here', [place({ row: 12, column: 3 })]),
@@ -123,7 +123,7 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
         return { left: box.left, right: box.right, directory: directory.left, nameLeft: name.left, name: name.right };
       });
       assert.ok(inside.directory < inside.left, 'the beginning is cut');
-      assert.ok(inside.nameLeft >= inside.left && inside.name <= inside.right + 1, 'name and row are seen');
+      assert.ok(inside.nameLeft >= inside.left && inside.name <= inside.right + 1, 'name and row are visible');
       await page.locator('.finding-row').first().click();
       assert.equal(await page.locator('.place-head .where').getAttribute('title'), 'maps/town.xodr:12:3');
     },
@@ -148,7 +148,7 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
   }
 
   onPage(
-    'the focus stays on the row of a run, and when filters end',
+    'the focus stays on the row of a run and after filters are cleared',
     () => makePage('run', runOf(12, 6)),
     async (page) => {
       await page.getByLabel('warnings', { exact: true }).uncheck();
@@ -166,7 +166,7 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
   );
 
   onPage(
-    'what was left out is said once',
+    'data that were left out are named once',
     () => {
       const plan = smallTown();
       plan.cuts = ['a signal has no place', 'road 5 has no line'];
@@ -188,7 +188,7 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
     return plan;
   };
   onPage(
-    'a place on a road that cannot be drawn says so',
+    'a place on a road that cannot be drawn has a note',
     () =>
       townPage(
         [
@@ -223,7 +223,7 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
       const checkers = ['completed', 'skipped'].map((status, index) => ({
         id: `check_asam_xodr_road_lane_${index}_${'level_true_one_side_'.repeat(3)}`,
         status,
-        summary: 'It has looked at each of the lanes of all of the roads in this file. '.repeat(4),
+        summary: 'It has checked each of the lanes of all of the roads in this file. '.repeat(4),
         findings: 12345,
       }));
       return townPage([finding(1, 'error', 0, 'facts', [place({})], facts)], town, { checkers });
@@ -231,7 +231,7 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
     async (page) => {
       await page.locator('.finding-row').click();
       await page.locator('.checkers summary').click();
-      /** The pieces of text that stand on one line each, for all elements that are found. */
+      /** Returns the lines of text of each element that matches. */
       const linesOf = (selector) =>
         page.locator(selector).evaluateAll((elements) =>
           elements.map((element) => {
@@ -267,7 +267,7 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
   );
 
   onPage(
-    'print has at most 2,000 findings and says what is left out',
+    'print has at most 2,000 findings and counts the others',
     () => townPage(Array.from({ length: 15000 }, (_, i) => finding(i, 'error', 0, `finding ${i}`, [place({})]))),
     async (page) => {
       await page.emulateMedia({ media: 'print' });
@@ -288,7 +288,7 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
   ];
   const codes = [['5', '-1'], ['a`b', '-1'], ['a`b', 'c`d', '-1'], ['-1'], ['6'], []];
   onPage(
-    'backticks are code everywhere, and those of ids turn nothing inside out',
+    'backticks are code everywhere, and backticks in ids do not swap code and text',
     () => townPage(texts.map((text, index) => finding(index, 'error', 0, text, [place({ text })]))),
     async (page) => {
       const codesIn = (selector) =>
@@ -305,7 +305,7 @@ describe('reading a page', { skip: findChromium() ? false : 'no Chromium' }, () 
       assert.deepEqual(await codesIn('.printed tbody td:nth-child(2)'), codes);
       const row = await page.locator('.printed tbody td:nth-child(2)').nth(5).textContent();
       assert.equal(row, 'no end `of code');
-      // Text of nothing but beginnings must not hold the page up.
+      // Text of opening backticks only must not block the page.
       // eslint-disable-next-line no-undef
       const took = await page.evaluate(() => {
         const began = performance.now();

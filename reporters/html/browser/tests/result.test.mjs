@@ -18,7 +18,7 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
   });
   after(() => browser?.close());
 
-  /** Runs a test on a fresh page, which must stay without an error and without a request. */
+  /** Runs a test on a fresh page, which must have no error and no request. */
   const onPage = (name, run, options) =>
     test(name, async () => {
       const { page, troubles, context } = await open(browser, path, options);
@@ -32,7 +32,7 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
     assert.ok(Math.abs(actual - expected) <= tolerance, `${actual} is not ${expected}`);
   const row = (page, id) => page.locator(`.finding-row[data-finding="${id}"]`);
   const selected = (page) => page.locator('.finding-row[aria-expanded="true"]').getAttribute('data-finding');
-  /** Whether the canvas has the colour of highlights somewhere around a point. */
+  /** Checks whether the canvas contains the colour of highlights. */
   const isHighlighted = (page) =>
     page.evaluate(() => {
       const canvas = document.querySelector('.map-canvas');
@@ -42,10 +42,10 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
       return false;
     });
 
-  onPage('says what it is about', async (page) => {
+  onPage('the head shows verdict, reason and checkers', async (page) => {
     assert.equal(await page.locator('.head .verdict').textContent(), 'rejected');
     assert.match(await page.locator('.reason').textContent(), /4 errors/);
-    assert.match(await page.locator('.checkers summary').textContent(), /4 checkers, 2 with trouble/);
+    assert.match(await page.locator('.checkers summary').textContent(), /4 checkers, 2 without an answer/);
     const stats = await page.evaluate(() => window.qcbus.stats());
     assert.equal(stats.findings, findings.length);
     assert.equal(
@@ -64,7 +64,7 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
     near(now.y, y);
     const canvas = await page.locator('.map-canvas').boundingBox();
     const high = canvas.height / now.scale;
-    assert.ok(high > 40 && high < 80, `${high} m are seen`);
+    assert.ok(high > 40 && high < 80, `${high} m are visible`);
     assert.equal(await isHighlighted(page), true);
     assert.equal(await page.locator('.detail mark').textContent(), '<lane id="-2" '.trim().padEnd(14));
     assert.match(await page.locator('.detail .facts').textContent(), /sOffset3\.5/);
@@ -88,7 +88,7 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
     { reducedMotion: 'no-preference' },
   );
 
-  onPage('a further place is flown to', async (page) => {
+  onPage('a click on a further place moves the map', async (page) => {
     await row(page, 2).click();
     await page.locator('.detail .place-head .link').nth(1).click();
     await atRest(page);
@@ -128,7 +128,7 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
     await page.locator('.road-panel').waitFor();
     assert.match(await page.locator('.road-panel h2').textContent(), /Road 1 East Street/);
     assert.equal(await page.locator('.plot').count(), 2);
-    // What was clicked stays in sight, beside the panel.
+    // The clicked point stays visible beside the panel.
     const after = await page.evaluate(
       ([x, y]) => window.qcbus.screen(x, y),
       [town.origin[0] + 100, town.origin[1] + 1.5],
@@ -143,7 +143,7 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
     await page.locator('.road-panel .link', { hasText: 'road 20' }).click();
     await atRest(page);
     assert.match(await page.locator('.road-panel h2').textContent(), /River Road/);
-    // What is flown to is in the middle of the part that the panel does not hide.
+    // The target is in the middle of the part that is not hidden by the panel.
     await page.evaluate(() => window.qcbus.select(8));
     await atRest(page);
     const target = await page.evaluate(([x, y]) => window.qcbus.screen(x, y), findings[7].places[0].at);
@@ -248,7 +248,7 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
     assert.equal(await page.locator('.map').isVisible(), true);
   });
 
-  onPage('what is copied is text in a spreadsheet', async (page) => {
+  onPage('copied cells are text in a spreadsheet', async (page) => {
     // eslint-disable-next-line no-undef
     const copied = await page.evaluate(() =>
       tabSeparated([

@@ -1,4 +1,4 @@
-// How fast a big map is. The figures are printed; nothing but a standstill fails.
+// Speed of a big map. The figures are printed. Only a standstill fails.
 
 import assert from 'node:assert/strict';
 import { after, before, describe, test } from 'node:test';
