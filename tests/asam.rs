@@ -4,7 +4,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -104,13 +104,13 @@ fn level_limits_may_be_in_either_order() {
     assert_eq!(old_order, 3);
     assert!(
         remark.contains("minLevel"),
-        "the old order is remarked upon: {remark}"
+        "the old order is reported: {remark}"
     );
     let (errors, remark) = kept("maxLevel=\"1\" minLevel=\"1\"");
     assert_eq!(errors, 2);
     assert!(
         remark.contains('1'),
-        "what was filtered is counted: {remark}"
+        "the filtered issues are counted: {remark}"
     );
 }
 
@@ -137,7 +137,7 @@ fn report_modules_run_afterwards_with_their_params() {
     let json = std::fs::read_to_string(json).unwrap();
     assert!(
         json.lines().any(|line| line.starts_with("    \"")),
-        "it is indented by 4: {json}"
+        "the report is indented by 4: {json}"
     );
     let _: serde_json::Value = serde_json::from_str(&json).unwrap();
 }

@@ -9,7 +9,7 @@
     clippy::expect_used,
     clippy::panic,
     missing_docs,
-    reason = "all of this is test code, also what is no `#[test]` itself"
+    reason = "this is all test code, including functions without `#[test]`"
 )]
 
 mod storm;
@@ -73,7 +73,10 @@ fn broker_killed_under_load_loses_and_doubles_no_file() {
     judge(&farm, &files, &[]).demand(&tail(&farm.log()));
     let doubled = verdicts_in_journal(&farm.journal());
     let doubled: Vec<_> = doubled.iter().filter(|(_, count)| **count != 1).collect();
-    assert!(doubled.is_empty(), "judged twice: {doubled:#?}");
+    assert!(
+        doubled.is_empty(),
+        "no file may be judged twice: {doubled:#?}"
+    );
     end(&farm, broker);
 }
 
@@ -179,7 +182,10 @@ fn end(farm: &Farm, mut broker: support::broker::Broker) {
         })
         .map(Iterator::collect)
         .unwrap_or_default();
-    assert!(left.is_empty(), "left in the runtime directory: {left:?}");
+    assert!(
+        left.is_empty(),
+        "nothing may remain in the runtime directory: {left:?}"
+    );
 }
 
 fn number_from(variable: &str, otherwise: u64) -> u64 {
@@ -189,7 +195,10 @@ fn number_from(variable: &str, otherwise: u64) -> u64 {
         .unwrap_or(otherwise)
 }
 
-#[expect(clippy::print_stderr, reason = "figures are for whoever runs the test")]
+#[expect(
+    clippy::print_stderr,
+    reason = "the figures are for the person who runs the test"
+)]
 fn report(text: &str) {
     eprintln!("{text}");
 }

@@ -5,7 +5,7 @@
     clippy::expect_used,
     clippy::panic,
     missing_docs,
-    reason = "all of this is test code, also what is no `#[test]` itself"
+    reason = "this is all test code, including functions without `#[test]`"
 )]
 
 mod support;
@@ -97,7 +97,7 @@ fn confined_bundle_cannot_write_to_files_of_others() {
     );
     assert!(
         said.iter().any(|it| !it.contains("it saw 0,")),
-        "it looks at something: {said:#?}"
+        "the bundle must see something: {said:#?}"
     );
 }
 
@@ -249,7 +249,10 @@ fn confined_bundle_cannot_affect_other_processes() {
     assert_eq!(meddlings(&log), Vec::<&str>::new());
     assert!(!victims.file.exists());
     assert!(victims.lives());
-    assert!(victims.listener.accept().is_err(), "nobody has connected");
+    assert!(
+        victims.listener.accept().is_err(),
+        "no process has connected"
+    );
     assert_eq!(victims.sleepers(), 0);
 }
 
@@ -271,7 +274,7 @@ fn only_access_declared_in_a_manifest_is_allowed() {
 fn descendants_of_a_bundle_end_with_the_broker() {
     let (farm, _broker, victims, log) = with_a_meddler(&["--no-sandbox"], None);
     let all = meddlings(&log);
-    assert_eq!(all.len(), 7, "each of them is possible: {all:?}");
+    assert_eq!(all.len(), 7, "every action is possible: {all:?}");
     until("what it has started sleeps", || {
         (victims.sleepers() > 0).then_some(())
     });

@@ -4,7 +4,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -89,7 +89,7 @@ fn two_thousand_idle_connections_do_not_stop_the_broker() {
     assert_eq!(farm.verdict("good.xodr").verdict, Verdict::Accepted);
     assert!(
         descriptors(&broker) < 700,
-        "half of them are the broker's own"
+        "half of the descriptors are reserved for the broker"
     );
     drop(idle);
     until_descriptors_are_back(&broker, before);
@@ -116,7 +116,7 @@ fn vanished_clients_make_room_for_others() {
             client.write_all(&line).unwrap();
             clients.push(client);
         }
-        assert!(farm.status().is_some(), "status is answered beside them");
+        assert!(farm.status().is_some(), "status is answered meanwhile");
         for client in &mut clients {
             client.set_nonblocking(true).unwrap();
             let mut said = [0; 512];
@@ -129,10 +129,7 @@ fn vanished_clients_make_room_for_others() {
         drop(clients);
         until_descriptors_are_back(&broker, before);
     }
-    assert!(
-        told > 100,
-        "those for whom there is no room are told so: {told}"
-    );
+    assert!(told > 100, "clients without room are notified: {told}");
     // A client with a valid request gets the verdict.
     farm.write("never.xodr", &Content::Good(1).bytes());
     assert_eq!(farm.verdict("never.xodr").verdict, Verdict::Accepted);

@@ -8,7 +8,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -171,7 +171,7 @@ impl Victim {
                 quiet && status.files.total == total && status.files.judged == total
             })
         });
-        assert_eq!(ended, None, "{what}: the next broker does not stay");
+        assert_eq!(ended, None, "{what}: the next broker must keep running");
         self.demand(what);
     }
 
@@ -190,7 +190,10 @@ impl Victim {
         );
         let counts = verdicts_in_journal(&self.farm.journal());
         let doubled: Vec<_> = counts.iter().filter(|(_, count)| **count != 1).collect();
-        assert!(doubled.is_empty(), "{what}: judged twice: {doubled:#?}");
+        assert!(
+            doubled.is_empty(),
+            "{what}: no file may be judged twice: {doubled:#?}"
+        );
     }
 }
 
@@ -319,7 +322,10 @@ fn file_rewritten_after_a_crash_gets_a_current_verdict() {
     killed_anywhere(Work::Job, Meanwhile::Rewritten);
 }
 
-#[expect(clippy::print_stderr, reason = "figures are for whoever runs the test")]
+#[expect(
+    clippy::print_stderr,
+    reason = "the figures are for the person who runs the test"
+)]
 fn report(text: &str) {
     eprintln!("{text}");
 }

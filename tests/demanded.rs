@@ -4,7 +4,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -44,7 +44,11 @@ fn preconditions_of_a_requested_checker_always_count() {
         .iter()
         .map(|checker| &*checker.id)
         .collect();
-    assert_eq!(ids.first(), Some(&IDS), "what is configured comes first");
+    assert_eq!(
+        ids.first(),
+        Some(&IDS),
+        "the configured checker comes first"
+    );
     assert!(
         ids.contains(&"check_asam_xodr_xml_valid_xml_document"),
         "{ids:?}"

@@ -5,7 +5,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -79,7 +79,7 @@ impl Victim {
             assert_eq!(
                 self.broker.ended(),
                 None,
-                "{what}: the broker has ended\n{}",
+                "{what}: the broker must keep running\n{}",
                 self.explain()
             );
             let status = self.farm.status()?;
@@ -131,7 +131,7 @@ impl Victim {
             let limit = *support::watchdog::LONG;
             assert!(
                 begun.elapsed() < limit,
-                "{what}: it never goes wrong\n{}",
+                "{what}: a write must fail in time\n{}",
                 self.explain()
             );
         }

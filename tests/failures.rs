@@ -5,7 +5,7 @@
     clippy::expect_used,
     clippy::panic,
     missing_docs,
-    reason = "all of this is test code, also what is no `#[test]` itself"
+    reason = "this is all test code, including functions without `#[test]`"
 )]
 
 mod support;
@@ -78,7 +78,7 @@ fn corrupt_journal_is_reported() {
     insta::assert_snapshot!(told(&farm, &stderr(&output)));
     assert!(
         !farm.instance().join("control.sock").exists(),
-        "nothing stays behind"
+        "no file remains"
     );
 }
 
@@ -152,7 +152,7 @@ fn missing_watched_directory_is_reported_until_it_is_back() {
     insta::assert_snapshot!(notice(&farm, "is gone"));
     assert!(
         farm.out().join("a.xodr.xqar").exists(),
-        "its results are kept"
+        "the results are kept"
     );
     // The accepted file is missing, so the broker must not report it as accepted.
     let wait = |timeout_ms| Request::Wait {
@@ -220,7 +220,7 @@ fn inside(test: &str, prepare: &str, body: fn()) {
         return body();
     }
     if let Some(status) = run_inside(test, prepare) {
-        assert!(status.success(), "see above");
+        assert!(status.success(), "the inner test must succeed, see above");
     }
 }
 
@@ -270,7 +270,7 @@ fn full_output_disk_is_reported() {
             .collect();
         assert!(
             !left.iter().any(|name| name.ends_with(".xqar")),
-            "nothing half-written: {left:?}"
+            "no partial result may remain: {left:?}"
         );
         let lost = Content::Scenario(1, "nowhere.xodr".to_owned());
         farm.write("lost.xosc", &lost.bytes());
@@ -329,7 +329,7 @@ fn full_shared_memory_is_reported() {
         assert_eq!(
             output.status.code(),
             Some(5),
-            "nothing starts in it, and no bus error"
+            "the broker must not start, and must not get a bus error"
         );
         insta::assert_snapshot!(told(&late, &stderr(&output)));
         drop(filler);

@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -46,7 +46,7 @@ fn table(heading: &str) -> Vec<Vec<String>> {
 fn quoted(cell: &str) -> String {
     cell.split('`')
         .nth(1)
-        .unwrap_or_else(|| panic!("nothing quoted in {cell}"))
+        .unwrap_or_else(|| panic!("expected quoted text in {cell}"))
         .to_owned()
 }
 
@@ -89,7 +89,7 @@ fn every_expected_issue_is_found_at_its_place() {
     let said = cli.check_in(&sample_farm(), &["."], "out");
     assert_eq!(said.code, Some(1), "{}", said.whole(&cli));
     let promises = promises();
-    assert_eq!(promises.len(), 24, "the table is read");
+    assert_eq!(promises.len(), 24, "the whole table is read");
     for Promise {
         file,
         rule,
@@ -132,8 +132,8 @@ fn good_files_are_accepted_without_findings() {
         let file = quoted(&row[0]);
         assert!(!has_error(&said.stdout, &file), "{}", said.stdout);
         let results = cli.result(&format!("out/{file}.xqar"));
-        let is_warned_of = row[1].contains("warned of");
-        let worst = if is_warned_of {
+        let is_warning = row[1].contains("a warning");
+        let worst = if is_warning {
             Level::Error
         } else {
             Level::Warning
@@ -165,7 +165,7 @@ fn every_issue_is_printed_with_row_and_column() {
             count += 1;
         }
     }
-    assert!(count >= 13, "only {count} issues");
+    assert!(count >= 13, "too few issues: {count}");
 }
 
 #[test]
@@ -201,7 +201,7 @@ fn results_are_written_to_predictable_places() {
     assert_eq!(
         files_below(&cli.path().join("tree")),
         expected,
-        "one each, and nothing else"
+        "exactly one result for each file"
     );
 
     // The result of a file elsewhere is placed by the file's path from the root.
@@ -242,7 +242,7 @@ fn two_runs_write_the_same_bytes() {
         assert!(text == read("two"), "{} differs", file.display());
         assert!(
             !text.contains(&*cli.path().to_string_lossy()),
-            "it names where it was run"
+            "the output must not name the working directory"
         );
     }
 }

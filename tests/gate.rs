@@ -4,7 +4,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -471,7 +471,7 @@ fn earlier_results_do_not_look_current() {
     assert_eq!(
         results(&out).first().unwrap(),
         "in/Result.xqar",
-        "it is ignored"
+        "the ignored file has no result"
     );
     assert!(foreign.exists());
 }

@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -54,7 +54,7 @@ fn manifest(name: &str, command: &str, more: &serde_json::Value) -> String {
 
 fn bundle<'r>(results: &'r Results, name: &str) -> &'r CheckerBundle {
     let found = results.bundles.iter().find(|it| it.name == name);
-    found.unwrap_or_else(|| panic!("no bundle {name}"))
+    found.unwrap_or_else(|| panic!("the result must contain bundle {name}"))
 }
 
 /// Returns the status of each checker with the number of its issues.

@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -64,7 +64,7 @@ fn modules(programs: &Path) -> Vec<Module> {
     };
     let words: Vec<&str> = another.split(' ').collect();
     let [program, name, kind] = words[..] else {
-        panic!("{ANOTHER} is no program, name and kind: {another}");
+        panic!("{ANOTHER} must be a program, a name and a kind: {another}");
     };
     modules.push(Module::new(program.into(), name, kind));
     modules
@@ -145,7 +145,7 @@ fn hosted(cli: &Cli, module: &Module, input: &Path) -> Said {
     let results = read_result(&result.join(format!("{}.xqar", input.display())));
     let name = module.joined_as();
     let bundle = results.bundles.iter().find(|it| it.name == name);
-    let bundle = bundle.unwrap_or_else(|| panic!("{name} has not judged {input:?}"));
+    let bundle = bundle.unwrap_or_else(|| panic!("{name} must judge {input:?}"));
     let mut said = said(bundle);
     // A missing bundle reports nothing itself, so the broker's text is the only information.
     let absent = bundle

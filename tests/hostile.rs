@@ -4,7 +4,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -39,7 +39,7 @@ fn is_rejected(cli: &Cli, name: &str, text: &str, place: (u64, u64)) {
         "{}",
         said.whole(cli)
     );
-    assert_eq!(said.stderr, "", "nothing is to be said besides");
+    assert_eq!(said.stderr, "", "nothing else is reported");
     let results = cli.result(&format!("out/in/{name}.xqar"));
     let found: Vec<_> = issues(&results)
         .map(|(_, issue)| (issue.description.as_str(), places(issue)))
@@ -47,7 +47,10 @@ fn is_rejected(cli: &Cli, name: &str, text: &str, place: (u64, u64)) {
     let hit = found
         .iter()
         .any(|(said, at)| said.contains(text) && at.contains(&place));
-    assert!(hit, "no issue says `{text}` at {place:?}: {found:#?}");
+    assert!(
+        hit,
+        "expected an issue with `{text}` at {place:?}, found {found:#?}"
+    );
     assert!(checkers(&results).all(|it| it.status != Some(Status::Error)));
     let written = std::fs::read_to_string(cli.path().join(format!("out/in/{name}.xqar"))).unwrap();
     assert_eq!(asam::complaints(&written), [""; 0]);
@@ -124,7 +127,10 @@ fn external_entity_is_rejected() {
     cli.write("in/x.xodr", text);
     is_rejected(&cli, "x.xodr", "DOCTYPE", (2, 1));
     let written = std::fs::read_to_string(cli.path().join("out/in/x.xodr.xqar")).unwrap();
-    assert!(!written.contains("root:"), "what it points to is not read");
+    assert!(
+        !written.contains("root:"),
+        "the external entity is not read"
+    );
 }
 
 #[test]
@@ -324,7 +330,7 @@ fn broker_survives_all_hostile_files_at_once() {
     }
     assert_eq!(farm.verdict("good.xodr").verdict, Verdict::Accepted);
     assert!(broker.is_alive());
-    assert_eq!(bundles(&farm), before, "no bundle died of it");
+    assert_eq!(bundles(&farm), before, "no bundle may die");
 }
 
 #[test]

@@ -5,7 +5,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -158,7 +158,7 @@ fn kernel_files_as_maps_delay_no_other() {
         assert_ne!(
             verdict.verdict,
             Verdict::Accepted,
-            "nobody has seen the map"
+            "the map was not checked"
         );
     }
     symlink("/dev/zero", farm.root().join("zero.xodr")).unwrap();
@@ -179,7 +179,7 @@ fn lease(file: &File) -> bool {
 #[test]
 fn leased_files_delay_no_other() {
     // The kernel requests the lease back by this signal, which would end the process.
-    #[expect(unsafe_code, reason = "no other call keeps the default action away")]
+    #[expect(unsafe_code, reason = "no other call disables the default action")]
     // SAFETY: no function is called when the signal arrives.
     unsafe {
         libc::signal(libc::SIGIO, libc::SIG_IGN);

@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on should panic"
+    reason = "a test that cannot continue panics"
 )]
 
 #[path = "house/documents.rs"]
@@ -130,7 +130,9 @@ fn allowed(name: &str) -> Option<BTreeSet<&'static str>> {
     let (_, others) = MAY_KNOW
         .iter()
         .find(|(other, _)| *other == name)
-        .unwrap_or_else(|| panic!("{name} is new: say in MAY_KNOW whom it may know, and why"));
+        .unwrap_or_else(|| {
+            panic!("{name} is new: add its allowed dependencies to MAY_KNOW, with the reason")
+        });
     let others = (*others)?;
     Some(others.iter().chain(IDL).copied().collect())
 }

@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -77,7 +77,7 @@ async fn bundle_of_another_instance_is_not_killed() {
     // The hello has a launch, because a broker kills only processes that were started by one.
     let refused = lie(&here, hello("liar", victim.pid, Some(1 << 40))).await;
     let Err(JoinError::Refused(why)) = refused else {
-        panic!("it was let in: {:?}", refused.err());
+        panic!("the hello must be refused: {:?}", refused.err());
     };
     assert!(why.contains("does not prove it"), "{why}");
     is_said(&here, "`liar` states that a broker has started it");
@@ -169,7 +169,7 @@ fn process_without_proof_does_not_judge() {
     until_so("it ends", || stranger.0.try_wait().unwrap().is_some());
     assert!(
         peer_of(&farm, "proves_nothing").is_none(),
-        "it is on no roster"
+        "the bundle is not in the registry"
     );
     farm.write("good.xodr", &Content::Good(1).bytes());
     assert_eq!(farm.verdict("good.xodr").verdict, Verdict::Accepted);

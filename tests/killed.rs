@@ -4,7 +4,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -154,12 +154,12 @@ fn bundle_not_restarted_leaves_errors_until_it_is_back() {
     );
     assert!(
         is_complete(&farm, "a.xodr", "xodrBundle"),
-        "the others' work counts"
+        "the work of the other bundles counts"
     );
     assert_eq!(
         farm.verdict("bad.xodr").verdict,
         Verdict::Rejected,
-        "an error is an error"
+        "an error rejects the file"
     );
     let said = farm.qcbus(&["wait", &farm.root().join("a.xodr").to_string_lossy()]);
     assert_eq!(said.status.code(), Some(3));
@@ -257,7 +257,10 @@ fn forgotten_shared_memory_is_released() {
     let checked = check.arg(farm.base().join("checked")).output().unwrap();
     assert_eq!(checked.status.code(), Some(0), "{checked:?}");
     assert_eq!(shm_segments(&prefixes[0]), [""; 0]);
-    assert!(!shm_segments(&prefixes[1]).is_empty(), "of one that lives");
+    assert!(
+        !shm_segments(&prefixes[1]).is_empty(),
+        "the shared memory of the living broker is kept"
+    );
     other.write("good.xodr", &Content::Good(1).bytes());
     assert_eq!(other.verdict("good.xodr").verdict, Verdict::Accepted);
 }

@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -103,7 +103,7 @@ fn manually_started_bundle_joins_and_leaves_at_a_signal() {
         wait_for_state(&farm, "polite", true);
         assert_eq!(checkers_of(&farm, "polite", round * 10), POLITE);
         bundle.signal(Signal::TERM);
-        assert_eq!(bundle.ends(), Some(0), "it says good-bye");
+        assert_eq!(bundle.ends(), Some(0), "the bundle leaves in order");
         wait_for_state(&farm, "polite", false);
         assert_eq!(checkers_of(&farm, "polite", round * 10 + 1), [""; 0]);
     }
@@ -111,7 +111,7 @@ fn manually_started_bundle_joins_and_leaves_at_a_signal() {
     assert_eq!(
         (status.pid, status.generation),
         (broker.pid(), generation),
-        "no restart"
+        "the broker was not restarted"
     );
 }
 

@@ -4,7 +4,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "all of this is test code, also what is no `#[test]` itself"
+    reason = "this is all test code, including functions without `#[test]`"
 )]
 
 mod support;

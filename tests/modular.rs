@@ -4,7 +4,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -336,7 +336,7 @@ fn reload_applies_the_configured_search_path() {
     let log = farm.log();
     assert!(
         !log.contains("scenarioPath"),
-        "the parameter is known: {log}"
+        "the parameter must be known: {log}"
     );
 }
 

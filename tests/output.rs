@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -74,7 +74,7 @@ fn concise_lines_match_a_problem_matcher() {
         );
         assert!(
             cli.path().join(parts[2]).is_file(),
-            "a click opens it: {line}"
+            "the place must name an existing file: {line}"
         );
         let (level, text) = rest.split_once(": ").unwrap();
         assert!(
@@ -243,11 +243,11 @@ fn exit_code_follows_the_options() {
     assert_eq!(bad.code, Some(0));
     assert!(
         last_line(&bad).contains("1 rejected"),
-        "the verdict stays: {}",
+        "the verdict is unchanged: {}",
         bad.stdout
     );
     let nobody = cli.qcbus(&["check", "in/good.xodr", "--exit-zero", "--select", "xosc"]);
-    assert_eq!(nobody.code, Some(3), "that nobody looked is no finding");
+    assert_eq!(nobody.code, Some(3), "an unchecked file is not a finding");
 }
 
 #[test]
@@ -286,7 +286,7 @@ fn colours_follow_the_option() {
     };
     assert!(coloured("always"));
     assert!(!coloured("never"));
-    assert!(!coloured("auto"), "this is no terminal");
+    assert!(!coloured("auto"), "the output is not a terminal");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -121,7 +121,11 @@ fn bundle_that_does_not_become_ready_is_removed_again() {
         assert!(text.contains(why) || code == Some(3), "{script}: {text}");
         assert!(text.contains("it was removed again"), "{script}: {text}");
         assert!(!farm.bundles_d().join("mine.json").exists());
-        assert_eq!(judges(&farm, "mine", number), None, "nobody misses it");
+        assert_eq!(
+            judges(&farm, "mine", number),
+            None,
+            "the bundle is not required"
+        );
     }
 }
 
@@ -150,7 +154,7 @@ fn upgrade_reports_the_old_and_the_new_version() {
     let (farm, program) = farm_with_mine("1.0.0");
     let _broker = farm.serve_ready();
     let (code, text) = upgrade(&farm, &[]);
-    assert_eq!(code, Some(2), "there is none yet: {text}");
+    assert_eq!(code, Some(2), "there is no bundle to upgrade yet: {text}");
     assert_eq!(add(&farm, "mine", &program, &[]).0, Some(0));
     let (code, text) = upgrade(&farm, &[]);
     assert_eq!(code, Some(0), "{text}");
@@ -216,7 +220,7 @@ fn upgrade_to_a_broken_program_keeps_the_working_one() {
     );
     assert_eq!(manifest(), written);
     assert_eq!(judges(&farm, "mine", 1), polite("1.0.0"));
-    assert_eq!(pid(), before, "it was not even started anew");
+    assert_eq!(pid(), before, "the process was not restarted");
 
     // The broken program is at the same path.
     install(&program, "exit 4");
@@ -351,7 +355,7 @@ fn new_rust_bundle_is_built_tested_and_judges() {
     let (code, text) = new("mine");
     assert_eq!(code, Some(0), "{text}");
     let (code, text) = new("mine");
-    assert_eq!(code, Some(2), "nothing is written over: {text}");
+    assert_eq!(code, Some(2), "no file is overwritten: {text}");
     // The target is below the target directory of the workspace, so that it is built once.
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("own-bundle");
     let cargo = |words: &[&str]| {

@@ -6,7 +6,7 @@
     clippy::unwrap_used,
     clippy::panic,
     clippy::print_stderr,
-    reason = "a test that cannot go on fails where it stands, and one that is skipped says so"
+    reason = "a test that cannot continue panics, and a skipped test is reported"
 )]
 
 mod support;
@@ -128,14 +128,17 @@ impl Inbox {
         until_or(
             "the broker refuses to start",
             || {
-                assert!(!self.trace().exists(), "the neighbour's program was run");
+                assert!(
+                    !self.trace().exists(),
+                    "the program of another user must not run"
+                );
                 (!broker.is_alive()).then_some(())
             },
             said,
         );
         assert_eq!(broker.wait().code(), Some(2), "{}", said());
         for part in because {
-            assert!(said().contains(part), "no `{part}` in: {}", said());
+            assert!(said().contains(part), "expected `{part}` in: {}", said());
         }
     }
 }
@@ -168,7 +171,7 @@ fn state_directory_replaceable_by_others_is_refused() {
     open.is_refused(&[], &["inbox (mode 0777)", "chmod +t", "--state"]);
     assert!(
         !open.path().join("qcbus-out").exists(),
-        "nothing is left there"
+        "nothing may be created there"
     );
     let planted = Inbox::new(0o1777);
     planted.plant("qcbus-out/note", "");
@@ -272,12 +275,12 @@ fn manifest_planted_later_is_reported_and_not_run() {
     let notices = farm.status().unwrap().notices;
     assert!(
         !notices.iter().any(older),
-        "that manifest has gone: {notices:?}"
+        "the notice of the removed manifest must be gone: {notices:?}"
     );
     std::fs::write(&path, evil(&trace)).unwrap();
     let reload = farm.qcbus(&["reload"]);
     assert!(!reload.status.success(), "{reload:?}");
-    assert!(!trace.exists(), "the neighbour's program was run");
+    assert!(!trace.exists(), "the program of another user must not run");
 }
 
 #[test]
@@ -305,7 +308,7 @@ fn program_writable_by_others_is_not_restarted() {
         || note("everyone may write to"),
         explain,
     );
-    assert!(!trace.exists(), "it was started");
+    assert!(!trace.exists(), "the program must not be started");
 }
 
 fn status_as(user: u32, runtime: &[(&str, &Path)]) -> Output {
@@ -346,7 +349,7 @@ fn planted_runtime_directory_is_left_unchanged() {
         assert_eq!(
             mode_of(&target),
             0o755,
-            "what the link leads to was changed"
+            "the target of the link must be unchanged"
         );
         assert_eq!(std::fs::read_dir(&target).unwrap().count(), 0);
         // After `su`, XDG_RUNTIME_DIR may still be the directory of the previous user.

@@ -5,7 +5,7 @@
     clippy::unwrap_used,
     clippy::panic,
     clippy::expect_used,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -55,7 +55,7 @@ fn page(cli: &Cli) -> std::path::PathBuf {
 }
 
 fn data_of(page: &str) -> Value {
-    serde_json::from_slice(&block(page, "data").expect("there is data")).unwrap()
+    serde_json::from_slice(&block(page, "data").expect("the page contains data")).unwrap()
 }
 
 fn map_of(path: &Path) -> OwnedMap {
@@ -69,7 +69,7 @@ fn place<'d>(data: &'d Value, rule: &str) -> &'d Value {
     let rules = data["rules"].as_array().unwrap();
     let is_it = |it: &Value| it["uid"].as_str().unwrap().ends_with(rule);
     let index = rules.iter().position(is_it);
-    let index = index.unwrap_or_else(|| panic!("no {rule} in {rules:?}"));
+    let index = index.unwrap_or_else(|| panic!("rule {rule} must be in {rules:?}"));
     let findings = data["findings"].as_array().unwrap();
     let found = findings.iter().find(|it| it["rule"] == index).unwrap();
     &found["places"][0]
@@ -78,7 +78,7 @@ fn place<'d>(data: &'d Value, rule: &str) -> &'d Value {
 /// Returns the index of a road and the point on it at s and t.
 fn on_road(map: &RoadMap<'_>, id: &str, s: f64, t: f64) -> (usize, [f64; 2]) {
     let index = map.roads().iter().position(|road| road.id() == id);
-    let index = index.unwrap_or_else(|| panic!("no road {id}"));
+    let index = index.unwrap_or_else(|| panic!("road {id} must be in the map"));
     let point = map.roads()[index].point(s, t, 0.0).unwrap();
     (index, [point.x, point.y])
 }
@@ -104,11 +104,11 @@ fn every_fault_is_marked_at_its_map_position() {
             let off = (at[0] - expected[0]).hypot(at[1] - expected[1]);
             assert!(
                 off < 0.01,
-                "{rule}: {at:?} instead of {expected:?}: {place}"
+                "{rule}: expected {expected:?}, found {at:?}: {place}"
             );
             let on = place["on"].as_array().unwrap();
             let names = on.iter().any(|it| it["road"] == index || it["signal"] == 0);
-            assert!(names, "{rule}: highlights {on:?}");
+            assert!(names, "{rule}: unexpected highlights {on:?}");
         }
         // An overlap covers an area, so its mark lies on both roads.
         let place = place(&data, "road.no_overlap_outside_junction");

@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -296,7 +296,11 @@ fn assert_said(case: &Case, results: &Results, whole: &str) {
     let hit = remarks
         .iter()
         .any(|(text, place)| text.contains(said) && *place == at);
-    assert!(hit, "{}: {said} at {at:?}: {remarks:?}\n{whole}", case.name);
+    assert!(
+        hit,
+        "{}: expected {said} at {at:?}, found {remarks:?}\n{whole}",
+        case.name
+    );
 }
 
 #[test]
@@ -432,7 +436,7 @@ fn one_about_the_map(results: &Results) -> (String, Vec<(u64, u64)>) {
     let all = issues(results).filter(|(checker, _)| &*checker.id == "qcbus_rests_on");
     let all: Vec<_> = all.collect();
     let [(_, issue)] = &*all else {
-        panic!("one issue: {all:?}");
+        panic!("expected one issue, found {all:?}");
     };
     (issue.description.clone(), places(issue))
 }

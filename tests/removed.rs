@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -177,7 +177,11 @@ fn directory_taken_by_another_broker_is_left_to_it() {
     farm.write("late.xodr", &Content::Good(3).bytes());
     until_failing(&farm, "another running broker");
     let there: Vec<_> = std::fs::read_dir(other.gate()).unwrap().collect();
-    assert_eq!(there.len(), 2, "its mark and its file: {there:?}");
+    assert_eq!(
+        there.len(),
+        2,
+        "only its gate file and its published file: {there:?}"
+    );
 }
 
 #[test]

@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -106,7 +106,12 @@ fn children_stay_what_the_broker_is(replace: impl FnOnce(&Path, &Path)) {
     assert!(!speak_to.is_empty() && speak_to.iter().all(|it| *it == farm.log_path()));
     farm.write("a.xodr", &Content::Good(1).bytes());
     let judged = farm.verdict("a.xodr").verdict;
-    assert_eq!(judged, Verdict::Rejected, "by the module: {}", farm.log());
+    assert_eq!(
+        judged,
+        Verdict::Rejected,
+        "judged by the module: {}",
+        farm.log()
+    );
     assert!(!farm.log().contains("the newer program"), "{}", farm.log());
     it_is_said(&farm, &program);
 }

@@ -4,7 +4,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -72,7 +72,7 @@ fn copied_in_and_compared(load: &Load) {
         .collect();
     assert_eq!(
         written, expected,
-        "one result for each, none twice, nothing else"
+        "exactly one result for each file, and nothing else"
     );
     every_checker_is_there(&farm, &names);
     the_status_agrees(&farm, &names);
@@ -311,7 +311,7 @@ fn future_file_is_awaited_through_a_link() {
     assert_eq!(
         said.status.code(),
         Some(3),
-        "watched, but not there: {said:?}"
+        "watched, but missing: {said:?}"
     );
     farm.write("later.xodr", &Content::Good(1).bytes());
     let said = wait("later.xodr", "60s");
@@ -431,7 +431,7 @@ fn follows_its_map(farm: &Farm, reference: &str, map: &Path) {
             .into_iter()
             .filter(of_map)
             .collect();
-        assert!(of_map.is_empty(), "it is not watched: {of_map:?}");
+        assert!(of_map.is_empty(), "the map is not watched: {of_map:?}");
     }
     std::fs::remove_file(map).unwrap();
     rests_on(None);
@@ -453,7 +453,7 @@ fn map_outside_the_watched_directory_is_followed() {
     follows_its_map(&farm, "../library/town.xodr", &map);
     assert!(
         !farm.out().join("town.xodr.xqar").exists(),
-        "it gets no result of its own"
+        "the map gets no result of its own"
     );
     assert_eq!(farm.status().unwrap().files.total, 1);
 }
@@ -553,7 +553,11 @@ fn served(farm: &Farm, directories: &[&Path], there: &[&str], gone: &[&str]) {
     });
     assert_eq!(farm.qcbus(&["down"]).status.code(), Some(0));
     assert!(broker.wait().success());
-    assert_eq!(wrong(), Vec::<PathBuf>::new(), "also after the end");
+    assert_eq!(
+        wrong(),
+        Vec::<PathBuf>::new(),
+        "also after the broker has ended"
+    );
 }
 
 #[test]

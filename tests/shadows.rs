@@ -4,7 +4,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -84,7 +84,7 @@ fn shadow_reports_its_effect_and_changes_no_verdict() {
     }
     let epoch = farm.status().unwrap().epoch;
     let (code, told) = trials(&farm, STRICT, 4);
-    assert_eq!(code, Some(1), "something would be rejected: {told}");
+    assert_eq!(code, Some(1), "a file would be rejected: {told}");
     let counts = &told["counts"];
     assert_eq!(
         (&counts["tried"], &counts["would_reject"]),
@@ -109,7 +109,11 @@ fn shadow_reports_its_effect_and_changes_no_verdict() {
     );
     let (_, text) = told_status(&farm);
     assert!(text.contains("a shadow, ready"), "{text}");
-    assert_eq!(farm.status().unwrap().epoch, epoch, "nobody else judges");
+    assert_eq!(
+        farm.status().unwrap().epoch,
+        epoch,
+        "no other bundle is required"
+    );
 
     let (code, text) = bundle(&farm, &["upgrade", STRICT, "--no-shadow"]);
     assert_eq!(code, Some(0), "{text}");
@@ -198,7 +202,10 @@ fn shadow_named_by_a_configuration_is_not_missing() {
     assert_eq!(farm.verdict("a.xodr").verdict, Verdict::Accepted);
     assert_eq!(trials(&farm, STRICT, 1).1["counts"]["would_reject"], 1);
     let (_, text) = told_status(&farm);
-    assert!(text.contains("which is a shadow"), "that is said: {text}");
+    assert!(
+        text.contains("which is a shadow"),
+        "the status names the shadow: {text}"
+    );
     // After the removal it is a required bundle that is missing.
     farm.send_away(STRICT);
     until_or(

@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 mod support;
@@ -161,9 +161,9 @@ fn four_bundles_read_one_image() {
             mapped / MIB,
             touched / MIB
         );
-        assert!(private < PRIVATE, "{name} has a copy: {memory:?}");
+        assert!(private < PRIVATE, "{name} must not have a copy: {memory:?}");
         let whole = touched * 10 > size * 9;
-        assert!(whole, "{name} has not read the shared image: {memory:?}");
+        assert!(whole, "{name} must read the shared image: {memory:?}");
     }
     assert_eq!(
         farm.verdict("large.xodr").verdict,
@@ -176,7 +176,7 @@ fn four_bundles_read_one_image() {
     for name in pids.keys() {
         assert!(
             names.contains(&name.as_str()),
-            "{name} took part: {names:?}"
+            "{name} must take part: {names:?}"
         );
     }
     drop((more, broker));
@@ -218,6 +218,6 @@ fn process_writing_to_the_image_dies_alone() {
     assert_eq!(
         bundles(&farm, &["xodrBundle", "xoscBundle", "polite"]),
         others,
-        "nobody else died"
+        "no other process died"
     );
 }

@@ -5,7 +5,7 @@
     clippy::expect_used,
     clippy::panic,
     missing_docs,
-    reason = "all of this is test code, also what is no `#[test]` itself"
+    reason = "this is all test code, including functions without `#[test]`"
 )]
 
 mod support;
@@ -143,7 +143,7 @@ fn hangs_after_hello() {
     assert_eq!(
         farm.verdict("0.xodr").verdict,
         Verdict::Undetermined,
-        "its manifest demands it"
+        "its manifest makes it required"
     );
 }
 
@@ -270,7 +270,7 @@ fn another_protocol_is_refused_with_both_versions() {
     assert_eq!(
         farm.verdict("0.xodr").verdict,
         Verdict::Undetermined,
-        "its manifest demands it"
+        "its manifest makes it required"
     );
 }
 

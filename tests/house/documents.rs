@@ -157,7 +157,7 @@ fn code_in_documents_matches_the_source() {
             let whole = std::fs::read_to_string(root.join(path)).unwrap_or_default();
             assert!(
                 whole.contains(code),
-                "{} shows what {path} does not have:\n{code}",
+                "{} shows code that {path} does not contain:\n{code}",
                 file.display()
             );
             shown += 1;

@@ -25,10 +25,14 @@ fn broker_functions_and_files_are_short() {
             }
         }
     }
-    assert!(sources.len() > 50, "only {} files", sources.len());
+    assert!(sources.len() > 50, "too few files: {}", sources.len());
     assert!(wrong.is_empty(), "too long:\n{}", wrong.join("\n"));
     let nine_in_ten = long.len() * 10 <= sources.len();
-    assert!(nine_in_ten, "more than one in ten:\n{}", long.join("\n"));
+    assert!(
+        nine_in_ten,
+        "more than one file in ten is long:\n{}",
+        long.join("\n")
+    );
 }
 
 /// Returns the lines on which functions begin, and their names.

@@ -185,7 +185,7 @@ impl Driver {
         } else {
             let log = crate::tail(&self.farm.log());
             panic!(
-                "the broker ended by itself: {how}\n{}\n{log}",
+                "the broker must not end on its own: {how}\n{}\n{log}",
                 self.tally.last_lines()
             );
         }

@@ -260,7 +260,7 @@ impl Driver {
             let result = self.farm.out().join(format!("{name}.xqar"));
             assert!(
                 !result.exists(),
-                "{name} was judged before it was whole\n{}",
+                "{name} was judged before it was complete\n{}",
                 self.tally.last_lines()
             );
             let bytes = writer.content.bytes();

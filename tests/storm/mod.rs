@@ -136,7 +136,7 @@ fn at_every_moment(driver: &mut Driver, history: &[Seen], removals: &Removals) {
     let (deeds, log) = (driver.tally.last_lines(), tail(&driver.farm.log()));
     assert!(
         all.is_empty(),
-        "{} of what was seen may not be: {first:#?}\n{deeds}\n{log}",
+        "{} observations are wrong: {first:#?}\n{deeds}\n{log}",
         all.len()
     );
 }
@@ -148,7 +148,7 @@ fn condemned_are_few(driver: &Driver, condemned: &BTreeMap<String, u64>) {
         let harmed = driver.harmed.get(bundle).copied().unwrap_or_default();
         assert!(
             count * 2 <= harmed,
-            "{bundle} is condemned for {count} files, and came to harm {harmed} times\n{}",
+            "{bundle} is condemned for {count} files but was harmed only {harmed} times\n{}",
             driver.tally.last_lines()
         );
     }
@@ -213,11 +213,11 @@ fn demand(mut driver: Driver, seen: usize, start_kib: u64, end_kib: u64, seconds
             },
         );
     }
-    assert!(peak < PEAK_KIB, "a broker took {peak} KiB");
+    assert!(peak < PEAK_KIB, "a broker used {peak} KiB");
     assert_eq!(
         (lost, doubled),
         (0, 0),
-        "lost and doubled\n{}",
+        "no verdict may be lost or doubled\n{}",
         tally.last_lines()
     );
     report(&format!(

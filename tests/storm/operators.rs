@@ -85,7 +85,11 @@ impl Driver {
         };
         let lost = before.iter().filter(|it| !after.contains(it));
         let lost: Vec<&Path> = lost.map(|it| it.as_path()).filter(is_output).collect();
-        assert!(lost.is_empty(), "the copy took {lost:?}\n{}", copy.log());
+        assert!(
+            lost.is_empty(),
+            "the copy must not remove {lost:?}\n{}",
+            copy.log()
+        );
         self.tally.note("serve a copy", "");
     }
 

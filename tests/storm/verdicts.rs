@@ -294,7 +294,7 @@ mod tests {
         for (number, change) in changes.into_iter().enumerate() {
             let mut case = accepted(&Content::Part(2, Mark::Clean));
             change(&mut case.told);
-            assert!(is_wrong(&case), "change {number} is let pass");
+            assert!(is_wrong(&case), "change {number} must be detected");
         }
     }
 

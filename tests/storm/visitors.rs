@@ -118,7 +118,7 @@ impl Driver {
         std::fs::create_dir_all(self.farm.base().join("program")).unwrap();
         if let Some(python) = std::env::var_os(PYTHON) {
             let python = PathBuf::from(python);
-            assert!(python.is_absolute(), "{PYTHON} is no absolute path");
+            assert!(python.is_absolute(), "{PYTHON} must be an absolute path");
             let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/storm/judge.py");
             let program = format!("#!/bin/sh\nexec {} {script} \"$@\"\n", python.display());
             std::fs::write(self.python(), program).unwrap();

@@ -339,7 +339,11 @@ pub fn shm_segments(prefix: &str) -> Vec<String> {
 /// another test could inherit it. The program could then not be run ("text file busy").
 pub fn copy_program(from: &Path, to: &Path) {
     let copied = Command::new("cp").arg(from).arg(to).status();
-    assert!(copied.unwrap().success(), "{} is copied", from.display());
+    assert!(
+        copied.unwrap().success(),
+        "{} must be copied",
+        from.display()
+    );
 }
 
 /// Returns the end of a log.

@@ -52,7 +52,7 @@ fn namespace(prepare: &str, arguments: &[&str]) -> Command {
 }
 
 /// Prints that a test is skipped here, with the reason.
-#[expect(clippy::print_stderr, reason = "a test that is skipped must say so")]
+#[expect(clippy::print_stderr, reason = "a skipped test must be reported")]
 pub fn skip(test: &str, why: &str) {
     eprintln!("skipped: {test}: {why}");
 }

@@ -1,7 +1,7 @@
 //! Shared code of the process tests: a separate farm for every test, a broker to start and kill,
 //! files with a known verdict, processes to inspect, and a watchdog instead of sleeping.
 
-#![allow(dead_code, reason = "every test target uses another part of this")]
+#![allow(dead_code, reason = "each test target uses a different part of it")]
 
 pub mod asam;
 pub mod asam_venv;

@@ -200,7 +200,7 @@ fn spawn_stopped(command: &mut Command) -> std::io::Result<Pid> {
     let be_traced = || ptrace::traceme().map_err(Into::into);
     #[expect(
         unsafe_code,
-        reason = "nothing but one system call happens between fork and exec"
+        reason = "only one system call is made between fork and exec"
     )]
     // SAFETY: `ptrace` is a bare system call: it allocates no memory and takes no lock.
     let child = unsafe { command.pre_exec(be_traced) }.spawn()?;
@@ -307,7 +307,7 @@ impl Tracer<'_> {
         } else if info.op == libc::PTRACE_SYSCALL_INFO_ENTRY {
             #[expect(
                 unsafe_code,
-                reason = "the kernel says which field of the union it filled"
+                reason = "the kernel reports which field of the union is set"
             )]
             // SAFETY: at an entry stop the kernel fills this field, and all bit patterns are valid
             // numbers.

@@ -32,7 +32,7 @@ pub fn until_or<T>(
         }
         assert!(
             start.elapsed() < *LONG,
-            "the watchdog: {what}: this never happened\n{}",
+            "watchdog timeout: {what}: this did not happen\n{}",
             explain()
         );
         pause(LOOK);

@@ -92,7 +92,11 @@ fn bundle_known_only_to_the_broker_is_not_used() {
     let marked = bench.watched("marked.xodr", Content::Marked(1).bytes());
     assert_eq!(bench.compared(&[&marked]), Made::Warm);
     let verdict = bench.farm.verdict("marked.xodr").verdict;
-    assert_eq!(verdict, Content::Marked(1).verdict(), "here it judges");
+    assert_eq!(
+        verdict,
+        Content::Marked(1).verdict(),
+        "the bundle judges the watched file"
+    );
 }
 
 #[test]
@@ -113,12 +117,12 @@ fn changed_schemas_are_used_as_they_are_now() {
     bench.compared(&words);
     assert!(
         bench.cold(&words).says("signal"),
-        "the schema of now is used"
+        "the current schema is used"
     );
     assert_eq!(
         bench.compared(&words[..1]),
         Made::Cold,
-        "and none when none is named"
+        "no schema is used when none is given"
     );
 }
 
@@ -234,7 +238,7 @@ fn client_with_other_rights_is_not_answered() {
     let differs = |file: &str| bench.told(all(&[file, "-v"])) != bench.told(less(&[file, "-v"]));
     assert!(
         files.iter().all(|file| differs(file)),
-        "rights make a difference"
+        "permissions make a difference"
     );
 }
 

@@ -243,6 +243,6 @@ mod tests {
         let message = other.receive(1 << 20).unwrap().unwrap();
         assert_eq!((message.number, &message.body[..]), (2, &b"body"[..]));
         assert!(one.send(3, &"", &[&[0; 100]]).is_ok());
-        assert!(other.receive(50).is_err(), "longer than is taken");
+        assert!(other.receive(50).is_err(), "longer than the limit");
     }
 }

@@ -241,7 +241,7 @@ mod tests {
         };
         assert!(
             takes(vec![done(None), skipped(), skipped()]),
-            "nothing is wrong with it"
+            "the outcomes are valid"
         );
         assert!(
             takes(vec![done(Some(Level::Error)), done(None), skipped()]),

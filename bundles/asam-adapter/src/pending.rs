@@ -154,7 +154,7 @@ mod tests {
         assert_eq!(staged.changed(), None);
         let input = staged.input().to_path_buf();
         std::fs::set_permissions(&input, std::fs::Permissions::from_mode(0o600)).unwrap();
-        assert_eq!(staged.changed(), None, "it says the same");
+        assert_eq!(staged.changed(), None, "the content is unchanged");
         std::fs::write(&input, "yy").unwrap();
         assert_eq!(staged.changed(), Some("/a/b/c/x.xosc".into()));
     }

@@ -83,8 +83,8 @@ mod tests {
         std::fs::write(&path, "two").unwrap();
         assert!(programs.changed().unwrap().contains("module.py"));
         std::fs::remove_file(&path).unwrap();
-        assert!(programs.changed().is_some(), "it has gone");
+        assert!(programs.changed().is_some(), "the file was removed");
         std::fs::write(&path, "one").unwrap();
-        assert_eq!(programs.changed(), None, "it is back");
+        assert_eq!(programs.changed(), None, "the file is present again");
     }
 }

@@ -75,6 +75,9 @@ mod tests {
         let (names, bytes) = in_directory(dir.path(), 100).unwrap();
         let expected = [("a.txt".to_owned(), 1), ("b/c.txt".to_owned(), 2)];
         assert_eq!((&names[..], &bytes[..]), (&expected[..], &b"acc"[..]));
-        assert!(in_directory(dir.path(), 2).is_err(), "more than is taken");
+        assert!(
+            in_directory(dir.path(), 2).is_err(),
+            "longer than the limit"
+        );
     }
 }

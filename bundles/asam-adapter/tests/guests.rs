@@ -4,7 +4,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
 
 use std::os::unix::fs::PermissionsExt as _;
@@ -74,7 +74,7 @@ impl Guest {
     fn is_gone(&self, said: &str) {
         let begin = Instant::now();
         while !processes_with(&self.mark).is_empty() {
-            assert!(begin.elapsed() < WATCHDOG, "it has left processes; {said}");
+            assert!(begin.elapsed() < WATCHDOG, "no process may remain; {said}");
             std::thread::yield_now();
         }
         assert_eq!(self.rooms(), Vec::<PathBuf>::new(), "{said}");
@@ -93,7 +93,7 @@ impl Guest {
             let line = said
                 .lines()
                 .find(|it| it.contains(&format!(": {checker} failed: ")));
-            let line = line.unwrap_or_else(|| panic!("{checker} is not open: {said}"));
+            let line = line.unwrap_or_else(|| panic!("{checker} must have failed: {said}"));
             for why in why {
                 assert!(line.contains(why), "{why}: {said}");
             }
@@ -260,7 +260,7 @@ fn descendants_of_module_end_with_it() {
     assert_eq!(
         guest.judge(&[]),
         (Some(0), String::new()),
-        "its result counts"
+        "the result counts"
     );
     let crashed = children.replace("exit 0", "exit 9");
     Guest::doing(&crashed).is_open(&[], &["exit code 9"]);
@@ -315,11 +315,15 @@ fn findings_of_unknown_checker_are_kept() {
         said.contains("did not have when it was started: `three`"),
         "{said}"
     );
-    assert_eq!(code, Some(1), "an error is an error: {said}");
+    assert_eq!(code, Some(1), "an error rejects the file: {said}");
     let quiet = Guest::doing(
         r#"{ begin; checker one completed; checker two completed; checker three completed; end; } > "$result""#,
     );
-    assert_eq!(quiet.judge(&[]).0, Some(3), "it was not asked before");
+    assert_eq!(
+        quiet.judge(&[]).0,
+        Some(3),
+        "the checker was unknown at the start of the module"
+    );
 }
 
 #[test]
@@ -332,7 +336,7 @@ fn error_status_fails_checker_and_skipped_status_does_not() {
         said.contains("one failed: the module reports that it failed"),
         "{said}"
     );
-    assert!(!said.contains("two"), "skipped is an answer: {said}");
+    assert!(!said.contains("two"), "skipped is a valid answer: {said}");
 }
 
 #[test]
@@ -352,7 +356,7 @@ fn module_that_describes_no_checkers_is_refused() {
         );
         assert!(
             said.contains("`guest`, `xodrBundle`") && said.contains("\"application\""),
-            "its section may have another name: {said}"
+            "the section may have another name: {said}"
         );
     }
 }
@@ -427,7 +431,7 @@ fn killed_process_leaves_no_module_process_or_directory() {
         assert_eq!(
             guest.judge(&[]).0,
             Some(0),
-            "the next begins with an empty place"
+            "the next run begins with an empty directory"
         );
     }
 }

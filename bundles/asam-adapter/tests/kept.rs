@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::print_stderr,
-    reason = "a test that cannot go on fails where it stands, and one that is skipped says so"
+    reason = "a test that cannot continue panics, and a skipped test is reported"
 )]
 
 use std::os::unix::fs::PermissionsExt as _;

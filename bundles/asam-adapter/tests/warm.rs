@@ -7,7 +7,7 @@
     clippy::unwrap_used,
     clippy::panic,
     clippy::print_stdout,
-    reason = "a test that cannot go on should panic, and one that is skipped says so"
+    reason = "a test that cannot continue panics, and a skipped test is reported"
 )]
 
 #[path = "warm/programs.rs"]
@@ -161,11 +161,11 @@ fn jobs_do_not_see_state_of_earlier_jobs() {
     }
     assert_ne!(
         outcomes[0].stdout, outcomes[1].stdout,
-        "chance is another one in each job"
+        "the random values differ in each job"
     );
     assert_ne!(
         outcomes[1].stdout, outcomes[2].stdout,
-        "chance is another one in each job"
+        "the random values differ in each job"
     );
 }
 
@@ -293,9 +293,9 @@ fn unsupported_command_is_refused_with_reason() {
         ("./late", "use its absolute path"),
         (
             "late",
-            "/bin/late` does not begin with imports, so that nothing of it can be loaded ahead",
+            "/bin/late` does not begin with imports, so it cannot be loaded in advance",
         ),
-        ("broken", "it cannot be loaded ahead: SyntaxError: "),
+        ("broken", "it cannot be loaded in advance: SyntaxError: "),
         (
             "spaced",
             "its interpreter has the option `-s -E`, which only a plain run supports",
@@ -346,7 +346,7 @@ fn unsupported_command_is_refused_with_reason() {
         ),
         (
             "PYTHON -m loops",
-            "the module `loops` is imported by one that it imports",
+            "the module `loops` is in a cycle of imports",
         ),
     ] {
         let got = shop.why_cold(&command.replace("PYTHON", &python.to_string()));

@@ -4,7 +4,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::needless_pass_by_value,
-    reason = "helpers of tests, which are given what is made on the spot"
+    reason = "test helpers take their arguments by value"
 )]
 
 use std::path::{Path, PathBuf};

@@ -4,9 +4,9 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
+    reason = "a test that cannot continue panics"
 )]
-#![expect(clippy::print_stdout, reason = "a skipped test says so")]
+#![expect(clippy::print_stdout, reason = "a skipped test is reported")]
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -169,7 +169,11 @@ fn expansion_equals_reference_tool_where_it_is_right() {
             assert!(same, "{}: {text:?}", case.name);
             seen += 1;
         } else {
-            assert!(!same || text.is_none(), "{} is the same by now", case.name);
+            assert!(
+                !same || text.is_none(),
+                "{} must still differ from the recorded expansion",
+                case.name
+            );
         }
     }
     assert_eq!(seen, SAME.len());

@@ -1,6 +1,6 @@
 //! Tests of combined scenarios and library files, beyond the examples of the pages.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
+#![expect(clippy::unwrap_used, reason = "a test that cannot continue panics")]
 
 use std::path::PathBuf;
 

@@ -1,10 +1,6 @@
 //! Compares points with those of ASAM's own bundle, if its cases are available.
 
-#![expect(
-    clippy::expect_used,
-    clippy::panic,
-    reason = "helpers of tests may fail a test"
-)]
+#![expect(clippy::expect_used, clippy::panic, reason = "test helpers may panic")]
 
 use std::path::{Path, PathBuf};
 
@@ -40,7 +36,7 @@ fn compare(case: &serde_json::Value) {
         .join(name);
     let bytes = std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let image = prepare_bytes(&path, bytes, &Limits::default()).build();
-    let map = RoadMap::new(Document::open(&image).expect("the image is sound"));
+    let map = RoadMap::new(Document::open(&image).expect("the image is valid"));
     let road = map.roads().first().expect("a road");
     let point = road.point(number("s"), number("t"), number("h"));
     let point = point.unwrap_or_else(|| panic!("{case} cannot be evaluated"));

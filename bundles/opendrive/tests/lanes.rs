@@ -1,6 +1,6 @@
 //! Tests of sections, borders and surfaces of hand-written roads with known numbers.
 
-#![expect(clippy::expect_used, reason = "helpers of tests may fail a test")]
+#![expect(clippy::expect_used, reason = "test helpers may panic")]
 
 mod common;
 
@@ -51,8 +51,8 @@ fn lane_t(
 
 #[track_caller]
 fn near(got: Option<f64>, want: f64) {
-    let got = got.expect("can be evaluated");
-    assert!((got - want).abs() < 1e-12, "{got} instead of {want}");
+    let got = got.expect("the value can be evaluated");
+    assert!((got - want).abs() < 1e-12, "expected {want}, found {got}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Tests of connected road ends and lane ends, in a junction with a road that enters it twice.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests may fail a test")]
+#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
 
 mod common;
 

@@ -3,7 +3,7 @@
 #![expect(
     clippy::expect_used,
     clippy::print_stdout,
-    reason = "helpers of tests may fail a test and say why"
+    reason = "test helpers may panic and print the reason"
 )]
 
 use std::path::{Path, PathBuf};
@@ -49,9 +49,9 @@ fn reference_lines_are_continuous_and_linked_lanes_meet() {
     let real = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/cases/real");
     let mut seen = Seen::default();
     for path in maps(&real) {
-        let bytes = std::fs::read(&path).expect("a readable map");
+        let bytes = std::fs::read(&path).expect("the map is readable");
         let image = prepare_bytes(&path, bytes, &Limits::default()).build();
-        let map = RoadMap::new(Document::open(&image).expect("the image is sound"));
+        let map = RoadMap::new(Document::open(&image).expect("the image is valid"));
         seen.maps += 1;
         look_at_lines(&map, &mut seen);
         look_at_joints(&map, &mut seen, &path);
@@ -112,7 +112,7 @@ fn look_at_joints(map: &RoadMap<'_>, seen: &mut Seen, path: &Path) {
 
 fn report(map: &RoadMap<'_>, joint: &LaneJoint<'_>, inner: f64, outer: f64, path: &Path) {
     let name = |end: LaneEnd| {
-        let lane = map.lane(end.lane).expect("a lane of the map");
+        let lane = map.lane(end.lane).expect("the lane is in the map");
         format!(
             "road {} section {} lane {:?} {}",
             lane.at.road.id(),

@@ -1,8 +1,8 @@
-"""A large map, made anew each time."""
+"""A large generated map."""
 
 
 def big_map(megabytes: int) -> str:
-    """A map of about so many megabytes, two fifths of a million elements for each ten of them."""
+    """Returns a map of about this size, with 400,000 elements for each 10 MB."""
     geometry = "".join(
         f'      <geometry s="{5 * n}.0000000000000000e+00" x="{5 * n}.25" y="-1.5e-3" hdg="0.125" length="5.0">'
         "<line/></geometry>\n"

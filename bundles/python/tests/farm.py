@@ -1,4 +1,4 @@
-"""A broker with a directory that it watches."""
+"""A broker with its watched directory."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-#: The program that came with the package.
+#: The program of the package.
 QCBUS = Path(sys.executable).with_name("qcbus")
-#: No bound on how long things take: when it is over, something hangs.
+#: Seconds after which a test counts as hanging. It is no bound on speed.
 WATCHDOG = 120
 
 TEN_LINES = '''
@@ -49,7 +49,7 @@ class Farm:
         self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(place / "run"), "NO_COLOR": "1"}
 
     def qcbus(self, *arguments: object, code: int | None = 0, told: bool = False) -> str:
-        """What a command prints; with ``told`` what it tells people beside."""
+        """Returns the stdout of a command, or its stderr with ``told``."""
         it = subprocess.run(
             [QCBUS, *map(str, arguments)],
             cwd=self.place, env=self.environment, capture_output=True, text=True, timeout=WATCHDOG,
@@ -69,19 +69,19 @@ class Farm:
         return path
 
     def add(self, name: str, script: Path) -> None:
-        """Adds a bundle and waits until it is there."""
+        """Adds a bundle and waits until it is ready."""
         self.qcbus("bundle", "add", name, sys.executable, script)
         self.until(lambda: (self.peer(name) or {}).get("state") == "ready")
 
     def until(self, true: Any) -> Any:
         end = time.monotonic() + WATCHDOG
         while not (value := true()):
-            assert time.monotonic() < end, f"it never came to that\n{self.log()}"
+            assert time.monotonic() < end, f"timeout\n{self.log()}"
             time.sleep(0.02)
         return value
 
     def put(self, name: str, text: str = MAP) -> Path:
-        """A file that is there as a whole or not at all."""
+        """Puts a file into the watched directory atomically."""
         (self.place / "coming").write_text(text)
         return (self.place / "coming").rename(self.files / name)
 

@@ -1,4 +1,4 @@
-"""A bundle in Python beside a running broker."""
+"""A bundle in Python on a running broker."""
 
 import os
 import signal
@@ -41,7 +41,7 @@ def test_ten_lines_beside_a_farm(tmp_path):
         begun = time.monotonic()
         farm.add("acme", farm.script(TEN_LINES))
         verdict = farm.wait(farm.files / "a.xodr")
-        print(f"found {time.monotonic() - begun:.2f} s after `bundle add` was typed")
+        print(f"found {time.monotonic() - begun:.2f} s after `bundle add`")
         assert verdict["warnings"] == 1
         [issue] = farm.result("a.xodr").iter("Issue")
         assert issue.get("description") == "road `17` has no name; give it one"
@@ -95,7 +95,7 @@ for what in (
 """
     farm.add("acme", farm.script(rule(body)))
     if farm.peer("acme")["sandbox"]["state"] != "confined":
-        pytest.skip(f"this kernel confines nobody: {farm.peer('acme')}")
+        pytest.skip(f"this kernel cannot confine a process: {farm.peer('acme')}")
     assert farm.wait(farm.put("a.xodr"))["verdict"] == "accepted", [it.attrib for it in farm.result("a.xodr").iter("Checker")]
     said = [it.get("description") for it in farm.result("a.xodr").iter("Issue")]
     assert said == ["PermissionError"] * 6
@@ -154,7 +154,7 @@ for number in range(150_000):
 """)))  # fmt: skip
     flood = farm.wait(farm.put("f.xodr"))
     assert flood["verdict"] == "accepted"
-    assert flood["warnings"] == 1001, "a thousand, and one that says how many more there are"
+    assert flood["warnings"] == 1001, "a thousand, and one with the number of the others"
     last = list(farm.result("f.xodr").iter("Issue"))[-1].get("description")
     assert "149000" in last.replace(",", ""), last
     assert farm.wait(farm.put("m.xodr", MAP.replace("17", "1")))["verdict"] == "undetermined"
@@ -208,7 +208,7 @@ def test_a_new_bundle_runs_as_its_page_says(tmp_path):
         assert issue.get("description") == "lane -1 of road `17` is 1 m wide; a driving lane needs 2 m"
         said = farm.qcbus("rule", "driving_lane_width")
         assert "wide enough for a vehicle" in said and "narrowest" in said, said
-        # Saved anew it is another bundle, without a word to the broker.
+        # A saved script becomes a new version without a command to the broker.
         text = (made / "bundle.py").read_text().replace("level=\"warning\"", "level=\"error\"")
         (made / "coming").write_text(text)
         (made / "coming").rename(made / "bundle.py")
@@ -223,4 +223,4 @@ def test_a_bundle_that_cannot_run_is_said_and_taken_out(farm):
     assert "`acme` is not ready: it ended with exit code 1" in said
     assert "No module named 'nothing_of_this_name'" in farm.log()
     assert farm.peer("acme") is None
-    assert farm.wait(farm.put("a.xodr"))["verdict"] == "undetermined", "nobody has looked"
+    assert farm.wait(farm.put("a.xodr"))["verdict"] == "undetermined", "no bundle has checked the file"

@@ -1,4 +1,4 @@
-"""Numbers in bulk."""
+"""Columns and tables of numbers."""
 
 import math
 
@@ -51,7 +51,7 @@ def test_a_column_is_a_buffer():
     assert memoryview(look("<OpenDRIVE/>", lambda doc: doc.table("road", "s"))["s"]).tolist() == []
     within = look(MAP, lambda doc: doc.table("geometry").within(doc.table("road")))
     assert (memoryview(within).format, list(memoryview(within))) == ("q", [0, 0, 1])
-    # A view keeps what it reads, whoever else lets it go.
+    # A view keeps its column alive.
     view = memoryview(look(MAP, lambda doc: doc.table("geometry", "s")["s"]))
     assert view.tolist() == [0.0, 60.0, 0.0]
 

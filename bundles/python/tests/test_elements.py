@@ -1,4 +1,4 @@
-"""Elements feel like lxml's, and end with their job."""
+"""Elements behave like those of lxml, and end with their job."""
 
 import pytest
 import qcbus
@@ -39,7 +39,7 @@ def test_what_an_element_says_of_itself():
 def test_numbers_are_numbers_or_none():
     assert at("road", lambda it: it.float("length")) == 100.0
     assert at("road", lambda it: (it.float("name"), it.float("no"))) == (None, None)
-    assert at("road[2]", lambda it: it.float("length")) is None, "not-a-number is no length"
+    assert at("road[2]", lambda it: it.float("length")) is None, "NaN is not a length"
     assert at("road[2]", lambda it: (it.int("junction"), it.int("id"), it.int("no"))) == (-1, 2, None)
     assert at("road", lambda it: it.int("length")) is None
 
@@ -119,7 +119,7 @@ def test_objects_end_with_their_job():
     ):  # fmt: skip
         with pytest.raises((qcbus.Closed, IndexError)):
             use()
-    assert list(table["length"])[0] == 100.0, "numbers are whoever asked for them"
+    assert list(table["length"])[0] == 100.0, "numbers outlive the job"
     assert issubclass(qcbus.Closed, RuntimeError)
 
 

@@ -1,4 +1,4 @@
-"""Beside lxml itself: the same tree, by the same names."""
+"""Comparison with lxml: the same tree with the same names."""
 
 import pytest
 from looking import look
@@ -48,8 +48,8 @@ def test_the_tree_is_that_of_lxml(name):
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_text_is_all_of_its_own(name):
-    """lxml's `text` ends where the first child begins; ours is all that is written directly in the element, and
-    nothing where that is white space alone."""
+    """lxml's `text` ends at the first child. Ours is the whole text directly in the element, or `None` if it is only
+    white space."""
     theirs = etree.fromstring(TEXTS[name].encode())
     whole = ["".join(it.xpath("text()")) for it in theirs.iter(etree.Element)]
     ours = look(TEXTS[name], lambda doc: [it.text for it in doc.iter()])
@@ -57,7 +57,7 @@ def test_text_is_all_of_its_own(name):
 
 
 def test_a_row_is_that_of_the_beginning():
-    """libxml2 counts where the tag ends."""
+    """libxml2 uses the row of the tag's end."""
     text = "<a>\n<b x='1'\n  y='2'/>\n</a>"
     assert etree.fromstring(text)[0].sourceline == 3
     assert look(text, lambda doc: (doc.root[0].sourceline, doc.root[0].sourcecolumn)) == (2, 1)

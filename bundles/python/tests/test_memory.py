@@ -1,4 +1,4 @@
-"""A large document is read where it lies."""
+"""A large document is read in place."""
 
 import json
 
@@ -16,7 +16,8 @@ bundle = qcbus.Bundle("reader", version="1.0", kinds=["xodr"])
 
 
 def private():
-    """Bytes of this process alone: of a shared mapping the kernel calls private what no other has touched."""
+    """Returns the private bytes of this process. Shared mappings do not count: the kernel reports their pages as private
+    until another process uses them."""
     kilobytes, is_shared = 0, False
     with open("/proc/self/smaps") as maps:
         for line in maps:
@@ -30,7 +31,7 @@ def private():
 
 @bundle.rule("example.org:xodr:1.0.0:all.read")
 def all_read(doc, found):
-    """Every element is looked at."""
+    """Every element is read."""
     before = private()
     elements = widths = 0
     for element in doc.iter():

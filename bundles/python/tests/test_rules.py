@@ -1,4 +1,4 @@
-"""Rules and bundles: what is found, what goes wrong, what is refused."""
+"""Rules and bundles: findings, failures and rejected input."""
 
 import re
 import subprocess
@@ -87,7 +87,7 @@ def test_whatever_a_rule_raises_ends_nothing_but_its_checker(what):
 @pytest.mark.parametrize("text", ["", "<OpenDRIVE>", MAP[:-5], "no XML", MAP + "<more/>"])
 def test_no_rule_looks_at_half_a_file(text):
     def check(doc, found):
-        raise AssertionError("it was asked")
+        raise AssertionError("the rule ran")
 
     said, [(checker, why)] = run(bundle_of(check), text)
     assert (said, checker) == ([], "check_looking_looks")
@@ -96,7 +96,7 @@ def test_no_rule_looks_at_half_a_file(text):
 
 def test_what_is_said_after_the_rule_has_come_back_is_refused():
     kept = []
-    found(lambda doc, found: kept.extend([found, found.issue(doc.root, "said"), doc.root]))
+    found(lambda doc, found: kept.extend([found, found.issue(doc.root, "reported"), doc.root]))
     with pytest.raises(qcbus.Closed):
         kept[0].issue(kept[2], "too late")
     with pytest.raises(qcbus.Closed):
@@ -118,7 +118,7 @@ def test_an_element_of_another_job_is_no_place():
         run(bundle_of(lambda inner, _: another.append(found.issue(inner.root, "of another job"))), MAP)
 
     said, _ = run(bundle_of(outer), MAP)
-    assert (said, another) == ([], []), "a document that is open, but not the rule's own"
+    assert (said, another) == ([], []), "the document is open but belongs to another rule"
 
 
 def test_what_a_finding_cannot_be():
@@ -136,7 +136,7 @@ def test_what_a_finding_cannot_be():
 def test_parameters_have_their_defaults():
     seen = []
     params = [
-        qcbus.Param("most", 2.5, "the most that is allowed", unit="m"),
+        qcbus.Param("most", 2.5, "the maximum that is allowed", unit="m"),
         qcbus.Param("strict", True, "whether it is strict"),
         qcbus.Param("word", "x", "a word"),
     ]
@@ -154,8 +154,8 @@ def test_rules_rest_on_others_and_on_versions():
 
     @bundle.rule("example.org:xodr:1.0.0:second", after=[first])
     def second(doc, found):
-        """It never looks."""
-        raise AssertionError("the rule before found an error")
+        """It never runs."""
+        raise AssertionError("the previous rule found an error")
 
     @bundle.rule("example.org:xodr:1.9.0:third", versions="1.9.0..")
     def third(doc, found):
@@ -173,27 +173,27 @@ def test_what_no_bundle_can_be():
     def check(doc, found):
         """It looks."""
 
-    with pytest.raises(ValueError, match="is no name of a bundle"):
+    with pytest.raises(ValueError, match="is not a valid bundle name"):
         qcbus.Bundle("a b", version="1.0")
     with pytest.raises(ValueError, match="`pdf` is not a file kind; the kinds are"):
         qcbus.Bundle("a", version="1.0", kinds=["pdf"])
-    with pytest.raises(ValueError, match="takes at least one kind"):
+    with pytest.raises(ValueError, match="must have at least one kind"):
         qcbus.Bundle("a", version="1.0", kinds=[])
-    with pytest.raises(ValueError, match="needs a UID"):
+    with pytest.raises(ValueError, match="must have a UID"):
         bundle.rule()(check)
     for uid in ("named", "a.b:xodr:1.0.0", "a-b.c:xodr:1.0.0:d", "a.b:xodr:1.0.0:d e", "a.b:x:y:z", ""):
         with pytest.raises(ValueError, match="is not a UID: it must have a domain"):
             bundle.rule(uid)(check)
     with pytest.raises(ValueError, match="`bad` is not a level"):
         bundle.rule("a.b:xodr:1.0.0:c", level="bad")(check)
-    with pytest.raises(ValueError, match="does not say what it demands"):
+    with pytest.raises(ValueError, match="has no docstring"):
         bundle.rule("a.b:xodr:1.0.0:c")(lambda doc, found: None)
     with pytest.raises(ValueError, match="after.*`no`"):
         bundle.rule("a.b:xodr:1.0.0:c", after=["no"])(check)
     with pytest.raises(ValueError, match="versions"):
         bundle.rule("a.b:xodr:1.0.0:c", versions="newest")(check)
     bundle.rule("a.b:xodr:1.0.0:c")(check)
-    with pytest.raises(ValueError, match="has a rule `check_b_check` already"):
+    with pytest.raises(ValueError, match="already has a rule `check_b_check`"):
         bundle.rule("a.b:xodr:1.0.0:d")(check)
     run(bundle, MAP)
     with pytest.raises(RuntimeError, match="declare all rules before"):
@@ -239,7 +239,7 @@ def test_a_script_on_one_file(tmp_path):
         "a.xodr:2:1: warning: road `1` has no name; give it one [acme.example:xodr:1.0.0:road.named]",
         "a.xodr:3:1: warning: road `2` has no name; give it one [acme.example:xodr:1.0.0:road.named]",
     ]
-    assert it.stderr == "looking\n", "what rules print is not among what was found"
+    assert it.stderr == "looking\n", "the output of rules is not among the findings"
     assert ran(tmp_path, "acme.py", "--wrong").returncode == 2
     assert ran(tmp_path, "acme.py", "none.xodr").returncode == 2
     imported = ran(tmp_path, "-c", "import acme; print(len(acme.bundle.rules))")
@@ -273,7 +273,7 @@ def test_examples_are_tried(tmp_path):
     assert ran(tmp_path, "-m", "qcbus.test", "none.py").returncode == 2
     assert ran(tmp_path, "-m", "qcbus.test").returncode == 2
     missing = ran(tmp_path, "-m", "qcbus.test", "nowhere.py")
-    assert (missing.returncode, missing.stderr) == (2, "nowhere.py: there is no such script\n")
+    assert (missing.returncode, missing.stderr) == (2, "nowhere.py: script not found\n")
 
 
 def test_examples_are_tests_of_pytest(tmp_path):
@@ -284,7 +284,7 @@ def test_examples_are_tests_of_pytest(tmp_path):
         assert "3 passed" in it.stdout, it.stdout + it.stderr
     (tmp_path / "acme.py").write_text(SCRIPT.replace('bad=[(', 'bad=["<road name=\'x\'/>", ('))
     it = ran(tmp_path, "-m", "pytest", "-q", "acme.py")
-    assert "1 failed, 3 passed" in it.stdout and "nothing was found in" in it.stdout, it.stdout
+    assert "1 failed, 3 passed" in it.stdout and "found nothing in" in it.stdout, it.stdout
 
 
 def test_the_version_is_one(tmp_path):

@@ -171,7 +171,7 @@ fn modular_scenario_elements_are_allowed_in_their_places() {
     assert_eq!(
         ask(&alone),
         1,
-        "a parameter reference without a scenario reference is no modular scenario"
+        "a parameter reference without a scenario reference is not a modular scenario"
     );
 }
 
@@ -233,7 +233,7 @@ fn message_gives_place_of_late_child_and_intended_attribute() {
          <xs:element name='last' minOccurs='0'/></xs:sequence>\
          <xs:attribute name='fromLane' use='required'/></xs:complexType></xs:element></xs:schema>",
     )
-    .expect("a sound schema");
+    .expect("the schema is valid");
     let found = |text: &str| -> Vec<String> {
         let all = support::violations(&schema, "a.xodr", text);
         all.into_iter().map(|(_, text)| text).collect()
@@ -249,10 +249,7 @@ fn message_gives_place_of_late_child_and_intended_attribute() {
     assert_eq!(found("<a/>").len(), 1);
 }
 
-#[expect(
-    clippy::panic,
-    reason = "a test fails where its data is not as expected"
-)]
+#[expect(clippy::panic, reason = "a test panics if its data is not as expected")]
 /// Returns the violations of a map: their severities, rows and texts.
 fn weighed(version: &str, text: &str) -> Vec<(Severity, u32, String)> {
     let header = format!("<OpenDRIVE><header revMajor=\"1\" revMinor=\"{version}\"/>");
@@ -345,7 +342,7 @@ fn features_of_later_version_are_not_reported_as_typos() {
     let bytes = image("t.xodr", &text);
     let Outcome::Checked(checked) = check(&open(&bytes), FileKind::Xodr, &Options::default())
     else {
-        panic!("a version with a schema");
+        panic!("the version has a schema");
     };
     assert!(checked.later.is_some_and(|later| later.version.minor == 5));
     let texts = checked.violations.iter().map(|one| &one.text);
@@ -356,7 +353,7 @@ fn features_of_later_version_are_not_reported_as_typos() {
     let bytes = image("t.xodr", &slip);
     let Outcome::Checked(checked) = check(&open(&bytes), FileKind::Xodr, &Options::default())
     else {
-        panic!("a version with a schema");
+        panic!("the version has a schema");
     };
     let mut meant = checked
         .violations

@@ -287,7 +287,7 @@ fn known_schema_defect_is_marked_in_violation() {
     for condition in qcbus_schema::known_conditions() {
         assert!(
             notation.contains(condition),
-            "{condition} is in no table any more"
+            "{condition} must be in a table"
         );
     }
     let text = "<OpenDRIVE><header revMajor=\"1\" revMinor=\"8\"/><vmsGroup id=\"1\"><vmsBoardReference/></vmsGroup></OpenDRIVE>";
@@ -342,7 +342,7 @@ fn arbitrary_schemas_compile_or_are_refused() {
                 good += 1;
                 violations(&schema, "t.xml", "<a x='1'><a/><b>1</b></a>");
                 let again = qcbus_schema::Schema::from_notation(&schema.to_notation())
-                    .expect("its own notation");
+                    .expect("the notation of a compiled schema is readable");
                 assert_eq!(again.to_notation(), schema.to_notation());
             }
             Err(_) => bad += 1,

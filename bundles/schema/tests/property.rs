@@ -14,7 +14,7 @@ proptest! {
     #[test]
     fn generated_document_is_valid_and_single_edit_is_found(which in 0..SHIPPED.len(), seed in 0..u64::from(u32::MAX)) {
         let shipped = &SHIPPED[which];
-        let schema = shipped.schema().expect("a sound table");
+        let schema = shipped.schema().expect("the table is valid");
         let name = format!("made.{}", &name_of(shipped)[..4]);
         let text = document(schema, 0, seed, 120).expect("a document");
         let bytes = image(&name, &text);
@@ -25,7 +25,7 @@ proptest! {
         let (broken, what) = violate(&sound, &text, &mut Dice::new(seed));
         let bytes = image(&name, &broken);
         let found = schema.validate(&open(&bytes), Limits::default());
-        prop_assert!(!found.is_valid(), "{what} was not found in\n{broken}");
+        prop_assert!(!found.is_valid(), "{what} must be found in\n{broken}");
     }
 }
 
@@ -103,7 +103,7 @@ fn arbitrary_documents_are_validated_without_panic() {
     let mut dice = Dice::new(7);
     for turn in 0..400 {
         let shipped = &SHIPPED[turn % SHIPPED.len()];
-        let schema = shipped.schema().expect("a sound table");
+        let schema = shipped.schema().expect("the table is valid");
         let text = soup(schema, &mut dice);
         let bytes = image("soup.xodr", &text);
         let report = schema.validate(

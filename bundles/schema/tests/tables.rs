@@ -23,7 +23,7 @@ fn all_tables_together_stay_below_ten_megabytes() {
         .iter()
         .map(|one| one.schema().expect("sound").heap_bytes())
         .sum();
-    assert!(bytes > 100_000, "the count forgets something: {bytes}");
+    assert!(bytes > 100_000, "the counted size is too small: {bytes}");
     assert!(bytes < 10_000_000, "{bytes}");
 }
 

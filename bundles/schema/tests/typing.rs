@@ -1,6 +1,6 @@
 //! Tests that elements and attributes have the types of the schema of their version.
 
-#![expect(clippy::unwrap_used, reason = "in a test it is a finding")]
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 use std::path::Path;
 

@@ -72,7 +72,7 @@ fn schemas_that_include_each_other_become_single_schema() {
         ("scenario_12.xsd", &scenario),
     ];
     assert_eq!(
-        names(&made(&files).expect("sound schemas")),
+        names(&made(&files).expect("the schemas are valid")),
         [
             "Xodr 1.7: dir/1.7/map.xsd dir/1.7/parts.xsd",
             "Xosc 1.2: dir/scenario_12.xsd",
@@ -87,7 +87,7 @@ fn table_title_gives_its_version() {
         .iter()
         .find(|one| one.version == Version { major: 1, minor: 4 });
     let notation = shipped.expect("OpenDRIVE 1.4").notation;
-    let found = made(&[("own.tbl", notation)]).expect("sound tables");
+    let found = made(&[("own.tbl", notation)]).expect("the tables are valid");
     assert_eq!(names(&found), ["Xodr 1.4: dir/own.tbl"]);
 }
 
@@ -136,7 +136,7 @@ fn schema_for_version_comes_before_general_schema() {
         ("1.6/map.xsd", &root("OpenDRIVE")),
     ];
     let options = Options {
-        overrides: made(&files).expect("sound schemas"),
+        overrides: made(&files).expect("the schemas are valid"),
         ..Options::default()
     };
     let used = |minor: u32| {
@@ -162,7 +162,7 @@ fn result_names_shipped_schema_without_user_schema() {
     );
     let Outcome::Checked(checked) = check(&open(&image), FileKind::Xodr, &Options::default())
     else {
-        panic!("a known version");
+        panic!("the version is known");
     };
     assert_eq!(checked.provenance()[0].value, "OpenDRIVE 1.8.1");
 }

@@ -4,7 +4,7 @@
 
 #![expect(
     clippy::expect_used,
-    reason = "a test fails where its data is not as expected"
+    reason = "a test panics if its data is not as expected"
 )]
 
 mod support;
@@ -18,16 +18,17 @@ use support::{image, open, table};
 #[test]
 fn verdicts_match_recorded_reference_verdicts() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
-    let recorded =
-        std::fs::read_to_string(folder.join("verdicts.jsonl")).expect("the recorded verdicts");
+    let recorded = std::fs::read_to_string(folder.join("verdicts.jsonl"))
+        .expect("the recorded verdicts are readable");
     let mut documents: HashMap<String, String> = HashMap::new();
     let (mut valid, mut invalid) = (0, 0);
     for line in recorded.lines().skip(1) {
-        let verdict: serde_json::Value = serde_json::from_str(line).expect("a line of JSON");
+        let verdict: serde_json::Value =
+            serde_json::from_str(line).expect("the line is valid JSON");
         let name = verdict["document"].as_str().expect("a document");
         let base = documents.entry(name.to_owned()).or_insert_with(|| {
             std::fs::read_to_string(folder.join("documents").join(name))
-                .expect("a document of ours")
+                .expect("the document is readable")
         });
         let text = spliced(base, &verdict);
         let image = image(name, &text);

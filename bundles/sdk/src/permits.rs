@@ -164,7 +164,10 @@ mod tests {
     fn permit_count_is_at_least_one_and_bounded() {
         assert_eq!(Permits::new(0).count(), 1);
         assert_eq!(Permits::new(usize::MAX).count(), Permits::MOST);
-        assert!(Permits::new(1).spare().is_none(), "the only one is taken");
+        assert!(
+            Permits::new(1).spare().is_none(),
+            "the only permit is taken"
+        );
         assert!(Permits::available() >= 1);
     }
 }

@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "tests fail by panicking, their helpers too"
+    reason = "tests and their helpers fail by panicking"
 )]
 
 mod common;
@@ -91,12 +91,12 @@ fn jobs_run_in_parallel_and_slow_job_blocks_none() {
         assert_eq!(
             MOST.load(Ordering::SeqCst),
             THREADS,
-            "as many at once as told"
+            "as many jobs at once as configured"
         );
         assert_eq!(
             order.last(),
             Some(&JobId(0)),
-            "the slow one was first, and is over last"
+            "the slow job starts first and ends last"
         );
         while !daemon.is_finished() {
             let _ = tokio::time::timeout(Duration::from_millis(20), host.next()).await;
@@ -134,7 +134,7 @@ async fn talk(host: &mut Host) -> (Found, Vec<JobId>) {
             HostEvent::Garbage { what, .. } | HostEvent::TurnedAway { why: what } => {
                 panic!("{what}")
             }
-            HostEvent::Gone { .. } => panic!("the bundle went away"),
+            HostEvent::Gone { .. } => panic!("the bundle must stay connected"),
         }
     }
 }
@@ -166,7 +166,7 @@ fn said(
             order.push(job);
             OVER.fetch_add(1, Ordering::SeqCst);
             let all: BTreeSet<&JobId> = order.iter().collect();
-            assert_eq!(all.len(), order.len(), "a job is over once");
+            assert_eq!(all.len(), order.len(), "each job ends only once");
             if order.len() == JOBS {
                 host.send(peer, &ToPeer::Drain);
             }

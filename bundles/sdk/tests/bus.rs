@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "tests fail by panicking, their helpers too"
+    reason = "tests and their helpers fail by panicking"
 )]
 
 mod common;
@@ -110,7 +110,7 @@ async fn talk(host: &mut Host) -> (usize, Status) {
             HostEvent::Garbage { what, .. } | HostEvent::TurnedAway { why: what } => {
                 panic!("{what}")
             }
-            HostEvent::Gone { .. } => panic!("the bundle went away"),
+            HostEvent::Gone { .. } => panic!("the bundle must stay connected"),
         }
     }
 }

@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "tests fail by panicking, their helpers too"
+    reason = "tests and their helpers fail by panicking"
 )]
 
 mod common;
@@ -212,7 +212,7 @@ fn panic_fails_its_checker_and_keeps_findings() {
     assert_eq!(
         checked(|_| true, |_, _| None).len(),
         RULES.len() + 2,
-        "the others go on"
+        "the other checkers continue"
     );
 }
 
@@ -342,10 +342,10 @@ fn blocking_checkers_of_selected_checker_are_reported() {
         (by(1), by(2)),
         (vec!["finds_errors".into()], vec!["after_errors".into()])
     );
-    assert_eq!(all[0].issues.len(), 2, "the fault itself");
+    assert_eq!(all[0].issues.len(), 2, "the errors themselves are reported");
     assert_eq!(
         ids(&demanded("newer")),
         ["newer"],
-        "that it does not apply is an answer"
+        "an inapplicable checker counts as an answer"
     );
 }

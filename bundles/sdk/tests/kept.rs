@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "tests fail by panicking, their helpers too"
+    reason = "tests and their helpers fail by panicking"
 )]
 
 mod common;
@@ -180,7 +180,7 @@ impl Broker {
                         said.extend(issues.into_iter().map(|issue| issue.description));
                     }
                     FromPeer::JobDone { .. } => return said,
-                    FromPeer::NeedDocument { doc } => panic!("{doc:?} is not available"),
+                    FromPeer::NeedDocument { doc } => panic!("{doc:?} must be available"),
                     _ => {}
                 },
                 other => panic!("{other:?}"),

@@ -124,7 +124,7 @@ fn rules_check_parts_in_turn_and_then_the_whole() {
     assert_eq!(order, [0, 1, 2, 4, 3]);
     let (_, issues, outcome) = &heard.ended[0];
     assert_eq!(texts(issues), ["road 0", "road 1", "road 2"]);
-    assert_eq!(outcome.metadata[0].value, "3", "the whole comes last");
+    assert_eq!(outcome.metadata[0].value, "3", "the whole is checked last");
 }
 
 #[test]
@@ -158,9 +158,9 @@ fn check_can_be_cancelled_between_parts() {
     let (complete, heard) = heard(Some(2));
     assert!(!complete);
     let begun = heard.begun.into_inner().unwrap();
-    assert_eq!(begun, [0, 1], "one part and no more");
+    assert_eq!(begun, [0, 1], "no further part is begun");
     assert!(
         heard.ended.is_empty(),
-        "what is not at its end is not reported"
+        "an unfinished checker is not reported"
     );
 }

@@ -214,12 +214,12 @@ fn findings_do_not_depend_on_number_of_threads() {
     assert_eq!(
         of("many").1.len(),
         21,
-        "twenty, and how many there are more"
+        "twenty findings, and the number of the others"
     );
     assert_eq!(of("states").2.metadata.len(), ROADS / 50);
     assert_eq!(of("refers").1.len(), 3);
     let panicked = &of("panics");
-    assert_eq!(panicked.1.len(), 72, "what was found before is true");
+    assert_eq!(panicked.1.len(), 72, "findings before the panic are kept");
     assert!(
         panicked.2.ending.reason().ends_with("at 71"),
         "{:?}",

@@ -117,10 +117,7 @@ fn clock(hands: &Permits) -> Duration {
         tv_sec: 0,
         tv_nsec: 0,
     };
-    #[expect(
-        unsafe_code,
-        reason = "std has no clock that stands still while others run"
-    )]
+    #[expect(unsafe_code, reason = "std has no clock for the CPU time of a thread")]
     // SAFETY: `time` is a timespec that outlives the call.
     unsafe {
         libc::clock_gettime(clock, &raw mut time);

@@ -2,7 +2,7 @@
 //! rules are checked, as proven by the findings in the pages' bad examples. `QCBUS_BLESS=1`
 //! rewrites it.
 
-#![expect(clippy::unwrap_used, reason = "in a test it is a finding")]
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 use std::collections::BTreeSet;
 use std::fmt::Write;

@@ -276,7 +276,7 @@ fn every_rule_has_edits_or_a_reason() {
     assert_eq!(listed.len(), rules.len(), "a rule is listed twice");
     for entry in &entries {
         let one = entry.edits.is_empty() == entry.without.is_some();
-        assert!(one, "{}: either edits or a reason", entry.rule);
+        assert!(one, "{}: expected either edits or a reason", entry.rule);
     }
 }
 
@@ -301,6 +301,6 @@ fn every_edit_is_found_only_by_its_rule() {
     let written = std::fs::read_to_string(PAGE).unwrap_or_default();
     assert!(
         written == text,
-        "{PAGE} is not what the edits lead to; QCBUS_BLESS=1 writes it"
+        "{PAGE} does not match the edits; QCBUS_BLESS=1 rewrites it"
     );
 }

@@ -4,7 +4,7 @@
 //! The pages show the plain cases. These tests contain the cases that a careless implementation
 //! gets wrong.
 
-#![expect(clippy::unwrap_used, reason = "in a test it is a finding")]
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 #[path = "tricky/beyond.rs"]
 mod beyond;

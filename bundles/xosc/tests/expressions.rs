@@ -1,7 +1,7 @@
 //! Tests of expressions from simulators' own tests, in scenarios. The whole bundle reports each
 //! faulty expression exactly once, wherever it is, and does not report the good one.
 
-#![expect(clippy::unwrap_used, reason = "in a test it is a finding")]
+#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
 
 use std::path::Path;
 

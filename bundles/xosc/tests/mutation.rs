@@ -59,11 +59,11 @@ fn every_rule_has_edits_or_a_reason() {
     );
     for entry in &entries {
         let one = entry.edits.is_empty() == entry.without.is_some();
-        assert!(one, "{}: either edits or a reason", entry.rule);
+        assert!(one, "{}: expected either edits or a reason", entry.rule);
     }
     for (family, entries) in list::families(&entries) {
         let count: usize = entries.iter().map(|entry| entry.edits.len()).sum();
-        assert!(count >= LEAST, "{family} has {count} edits only");
+        assert!(count >= LEAST, "{family} has only {count} edits");
     }
 }
 
@@ -90,14 +90,17 @@ fn every_edit_is_found_only_by_its_rule() {
     let faults: Vec<String> = trials.iter().filter_map(Trial::fault).collect();
     assert!(
         faults.is_empty(),
-        "{} of {} edits are not as they should be:\n{}",
+        "{} of {} edits do not have the expected effect:\n{}",
         faults.len(),
         trials.len(),
         faults.join("\n")
     );
     if wanted.is_empty() {
         let silent = silent(&entries, &trials);
-        assert!(silent.is_empty(), "no edit makes these fire: {silent:?}");
+        assert!(
+            silent.is_empty(),
+            "no edit triggers these rules: {silent:?}"
+        );
         agrees_or_says(Path::new(page::PATH), &page::page(&entries, &trials));
     }
 }

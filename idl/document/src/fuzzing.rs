@@ -160,16 +160,16 @@ pub fn check_promises(document: Document<'_>) {
     });
     let mut paths = XPaths::new(document);
     for &node in elements.iter().take(SOME) {
-        assert!(!node.name().is_empty(), "an element without name");
+        assert!(!node.name().is_empty(), "every element must have a name");
         assert_eq!(paths.xpath(node), node.xpath());
         assert_eq!(paths.positional_xpath(node), node.positional_xpath());
         assert!(
             document.elements(node.name()).any(|posted| posted == node),
-            "{node:?} is not posted"
+            "{node:?} must be in the postings"
         );
         assert!(
             node.children().all(|child| child.parent() == Some(node)),
-            "a child of {node:?} does not know it"
+            "every child of {node:?} must have it as its parent"
         );
         let siblings = node.parent().map_or(1, |parent| {
             parent
@@ -177,7 +177,7 @@ pub fn check_promises(document: Document<'_>) {
                 .filter(|other| other.is(node.name()))
                 .count()
         });
-        assert!(siblings >= 1, "{node:?} is no child of its parent");
+        assert!(siblings >= 1, "{node:?} must be a child of its parent");
     }
     for name in elements
         .iter()
@@ -188,7 +188,7 @@ pub fn check_promises(document: Document<'_>) {
         let walked = elements.iter().copied().filter(|node| node.is(name));
         assert!(
             document.elements(name).eq(walked),
-            "the postings of {name} are not what a walk finds"
+            "the postings of {name} must match a walk of the tree"
         );
     }
     for source in document.sources() {
@@ -221,10 +221,13 @@ pub fn build_image(data: &[u8]) -> Result<Vec<u8>, BuildError> {
         let _ = one_event(&mut builder, &mut next);
     }
     let used = builder.finish([7; 32])?;
-    assert!(used <= capacities.image_len(), "the bound is no bound");
+    assert!(
+        used <= capacities.image_len(),
+        "the image must not exceed its computed bound"
+    );
     out.truncate(used);
     let judged = Document::open(&out).and_then(|document| document.validate());
-    assert_eq!(judged, Ok(()), "what was built is not sound");
+    assert_eq!(judged, Ok(()), "the built image must be valid");
     assert_eq!(read_image(&out), Outcome::Sound);
     Ok(out)
 }

@@ -58,7 +58,7 @@ fn any_event_order_is_refused_or_gives_sound_image() {
     }
     assert!(
         built > 100,
-        "only {built} scripts made an image of some size"
+        "only {built} scripts built an image of sufficient size"
     );
 }
 

@@ -1,9 +1,6 @@
 //! Tests of positions (files, rows and columns), XPaths, and numbers in attributes.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "helpers of tests, which may fail loudly"
-)]
+#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
 
 use qcbus_document::fuzzing::Tree;
 use qcbus_document::{BuildError, Capacities, Document, FaultCode, ImageBuilder};
@@ -311,7 +308,7 @@ fn offset_is_mapped_to_its_source_file() {
     assert_eq!(
         document.root().unwrap().position().to_string(),
         "a.xodr:1:1",
-        "a byte order mark is no column"
+        "a byte order mark does not count as a column"
     );
     let faults: Vec<_> = document
         .faults()
@@ -427,6 +424,6 @@ fn builder_refuses_to_write_beyond_capacity() {
     assert_eq!(Document::open(&out[..used]).unwrap().validate(), Ok(()));
     assert!(
         out[needed..].iter().all(|&byte| byte == 0x5A),
-        "bytes behind the image were touched"
+        "bytes after the image must be unchanged"
     );
 }

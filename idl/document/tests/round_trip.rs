@@ -1,9 +1,6 @@
 //! Tests that an image returns its input: any tree, any values, any position.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "helpers of tests, which may fail loudly"
-)]
+#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
 
 use proptest::prelude::*;
 use qcbus_document::fuzzing::{Child, Tree};

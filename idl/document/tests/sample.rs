@@ -2,10 +2,7 @@
 //! them in miri, which detects reads beyond an image and invalid texts that a normal test cannot
 //! see.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "helpers of tests, which may fail loudly"
-)]
+#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
 
 use qcbus_document::fuzzing::{self, Outcome, Random, Tree};
 

@@ -62,7 +62,7 @@ mod tests {
         assert_eq!(distance("", "abc"), 3);
         assert_eq!(distance("kitten", "sitting"), 3);
         assert_eq!(distance("checkreId", "checkerId"), 1, "a swap is one edit");
-        assert_eq!(distance("MINLEVEL", "minLevel"), 0, "case does not count");
+        assert_eq!(distance("MINLEVEL", "minLevel"), 0, "case is ignored");
         assert_eq!(distance("straße", "strasse"), 2);
     }
 

@@ -183,7 +183,11 @@ mod tests {
         own.bundles.extend(skipped.bundles);
         own.bundles
             .extend(results(Some(Status::Completed), None, false).bundles);
-        assert_eq!(Verdict::of(&own), Verdict::Accepted, "one has looked");
+        assert_eq!(
+            Verdict::of(&own),
+            Verdict::Accepted,
+            "one bundle has checked the file"
+        );
     }
 
     #[test]

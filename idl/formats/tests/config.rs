@@ -2,7 +2,7 @@
 
 #![expect(
     clippy::unwrap_used,
-    reason = "a test fails by panicking, in its helpers too"
+    reason = "tests and their helpers fail by panicking"
 )]
 
 mod common;
@@ -162,7 +162,7 @@ fn example_of_2023_is_refused_at_stray_quotation_mark() {
     let repaired = broken.replace("\"e\"myTrack.xodr\">", "\"myTrack.xodr\"/>");
     let Parsed { config, oddities } = parse(&repaired);
     assert_eq!(config.input_file(), Some("myTrack.xodr"));
-    assert_eq!(oddities.len(), 1, "the old order of levels");
+    assert_eq!(oddities.len(), 1, "the old order of levels is reported");
 }
 
 #[test]

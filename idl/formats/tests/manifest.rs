@@ -52,7 +52,7 @@ fn framework_manifest_leads_to_its_modules() {
     assert_eq!(
         modules.len(),
         2,
-        "one name for a bundle and for a report is no clash"
+        "a bundle and a report may have the same name"
     );
     assert_eq!(modules[0].mode, Mode::Bus);
     assert_eq!(modules[0].module_type, ModuleType::CheckerBundle);

@@ -2,7 +2,7 @@
 
 #![expect(
     clippy::unwrap_used,
-    reason = "a test fails by panicking, in its helpers too"
+    reason = "tests and their helpers fail by panicking"
 )]
 
 mod common;
@@ -189,7 +189,7 @@ fn new_level_is_applied_before_level_interval() {
     assert_eq!(
         pooled.results.bundles.len(),
         1,
-        "nothing removed, nothing to say"
+        "nothing is reported when nothing was removed"
     );
     let params = &pooled.results.bundles[0].checkers[0].params;
     assert_eq!(params[..], [param("qcbus.level", "warning")]);
@@ -350,7 +350,10 @@ fn findings_of_blocking_checker_are_kept_despite_filter() {
     let pooled = pooled(input);
     insta::assert_snapshot!(outline(&pooled.results));
     assert_eq!(pooled.verdict(), Verdict::Rejected);
-    assert_eq!(pooled.removed.errors, 1, "what stands in nobody's way");
+    assert_eq!(
+        pooled.removed.errors, 1,
+        "only the error of the checker that blocks no other is removed"
+    );
 }
 
 #[test]

@@ -73,7 +73,7 @@ fn result_in_old_format_is_read() {
     assert_eq!(
         (issues[0].id, issues[0].level),
         (0, Level::Error),
-        "`x7` is not a number: its rank"
+        "`x7` is not a number, so the rank is the id"
     );
     assert_eq!((issues[1].id, issues[1].level), (1, Level::Information));
     assert_eq!(

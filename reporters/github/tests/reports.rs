@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on should panic"
+    reason = "a test that cannot continue panics"
 )]
 
 mod common;
@@ -195,7 +195,7 @@ fn ten_thousand_findings_are_logged_and_limit_is_stated() {
     let mut titles: Vec<_> = named("error").map(|it| &it.properties["title"]).collect();
     titles.sort();
     titles.dedup();
-    assert_eq!(titles.len(), 10, "another rule each");
+    assert_eq!(titles.len(), 10, "every error has a different rule");
     assert_eq!(
         commands.last().unwrap().data,
         "10 of 9000 errors, 4 of 4 warnings, 9 of 996 information are annotated: GitHub accepts no more from one step. The log of the step contains all of them."

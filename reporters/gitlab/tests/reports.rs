@@ -1,7 +1,7 @@
 //! Compares whole reports with the rules of the format
 //! (<https://docs.gitlab.com/ci/testing/code_quality/>, "Code Quality report format").
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
+#![expect(clippy::unwrap_used, reason = "a test that cannot continue panics")]
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -6,7 +6,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on should panic"
+    reason = "a test that cannot continue panics"
 )]
 
 mod common;

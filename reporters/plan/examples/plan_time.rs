@@ -6,7 +6,7 @@
 #![expect(
     clippy::expect_used,
     clippy::print_stdout,
-    reason = "a tool of ours that prints what it has measured, or why it could not"
+    reason = "a tool that prints its measurements, or the reason of a failure"
 )]
 
 use std::path::Path;
@@ -21,17 +21,17 @@ const FINDINGS: usize = 10_000;
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let path = arguments.next().expect("the path of a map");
+    let path = arguments.next().expect("expected the path of a map");
     let copies = arguments
         .next()
-        .map_or(1, |text| text.parse().expect("a number of copies"));
-    let text = std::fs::read_to_string(&path).expect("a readable map");
-    let from = text.find("<road ").expect("a map has roads");
-    let to = text.rfind("</OpenDRIVE>").expect("a map has an end");
+        .map_or(1, |text| text.parse().expect("expected a number of copies"));
+    let text = std::fs::read_to_string(&path).expect("the map is readable");
+    let from = text.find("<road ").expect("the map has roads");
+    let to = text.rfind("</OpenDRIVE>").expect("the map has an end tag");
     let text = [&text[..from], &text[from..to].repeat(copies), &text[to..]].concat();
     let megabytes = text.len() as f64 / 1e6;
     let image = prepare_bytes(Path::new(&path), text.into_bytes(), &Limits::default()).build();
-    let document = Document::open(&image).expect("the image is sound");
+    let document = Document::open(&image).expect("the image is valid");
 
     // Rules normally access most of a map before it is drawn. No rule runs here.
     let map = RoadMap::new(document);
@@ -72,6 +72,6 @@ fn main() {
         start.elapsed()
     );
     if let Some(output) = arguments.next() {
-        std::fs::write(output, bytes).expect("a place to write to");
+        std::fs::write(output, bytes).expect("the output file is writable");
     }
 }

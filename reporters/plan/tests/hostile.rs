@@ -96,7 +96,10 @@ fn many_endless_roads_share_the_point_limit() {
     let plan = plan(&roads);
     assert_eq!(plan.roads.len(), 2_000);
     let drawn = plan.roads.iter().filter(|road| road.flags == 0).count();
-    assert!(drawn > 0 && drawn < 100, "{drawn} roads were drawn");
+    assert!(
+        drawn > 0 && drawn < 100,
+        "unexpected number of drawn roads: {drawn}"
+    );
     assert!(plan.cuts[0].contains("too many points"), "{:?}", plan.cuts);
 }
 

@@ -174,7 +174,7 @@ mod tests {
         let mut artifacts = ArtifactStore::open(&path, &Lines, false, true).unwrap();
         artifacts.put(&Lines, "b", "b=1\n".into()).unwrap();
         artifacts.put(&Lines, "a", "a=1\n".into()).unwrap();
-        assert!(!path.exists(), "half a report is none");
+        assert!(!path.exists(), "no partial report is written");
         artifacts.finish(&Lines).unwrap();
         assert_eq!(read(), "a=1\nb=1\n");
     }

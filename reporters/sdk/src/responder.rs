@@ -204,7 +204,7 @@ mod tests {
         let mut notebook = Notebook::default();
         let mut responder = Responder::new(&mut notebook);
         let PeerReport::Failed(why) = tell(&mut responder, 1, "fails.xodr") else {
-            panic!("it was not written");
+            panic!("the write must fail");
         };
         assert_eq!(
             why,

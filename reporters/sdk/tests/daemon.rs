@@ -4,7 +4,7 @@
     clippy::unwrap_used,
     clippy::expect_used,
     clippy::panic,
-    reason = "a test that cannot go on should panic"
+    reason = "a test that cannot continue panics"
 )]
 
 use std::collections::BTreeMap;
@@ -84,7 +84,7 @@ fn block_on(test: impl Future<Output = ()>) {
         .unwrap();
     runtime
         .block_on(async { tokio::time::timeout(WATCHDOG, test).await })
-        .expect("the watchdog: this never happened");
+        .expect("watchdog timeout: this did not happen");
 }
 
 /// The simulated broker.
@@ -129,7 +129,7 @@ impl Broker {
                     ..
                 } => {}
                 HostEvent::Message { message, .. } => return message,
-                HostEvent::Garbage { what, .. } => panic!("garbage: {what}"),
+                HostEvent::Garbage { what, .. } => panic!("invalid message: {what}"),
                 HostEvent::Hello { .. } | HostEvent::Gone { .. } | HostEvent::TurnedAway { .. } => {
                 }
             }
@@ -189,7 +189,7 @@ fn results_are_written_acknowledged_and_drained() {
 
             let full = result(3, &dir.path().join("full.xodr"), None, digest);
             let PeerReport::Failed(why) = broker.report(full).await else {
-                panic!("it cannot have been written");
+                panic!("the write must fail");
             };
             assert!(why.ends_with("there is no room"), "{why}");
             broker.send(&ToPeer::Drain);

@@ -3,7 +3,7 @@
 #![expect(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test that cannot go on should panic"
+    reason = "a test that cannot continue panics"
 )]
 
 use std::collections::BTreeMap;
@@ -45,7 +45,7 @@ fn line(name: &str, row: u64) -> String {
     let file = farm(name);
     let result = result(&file, Path::new("none.xqar"), digest(&file));
     let line = FileSources::new(&result).line(&result.input, row, 1);
-    line.unwrap_or_else(|| panic!("{name}:{row} has a line"))
+    line.unwrap_or_else(|| panic!("{name}:{row} must have a line"))
         .text
 }
 

@@ -1,6 +1,6 @@
 //! Tests of the format with one line for each finding.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+#![allow(clippy::unwrap_used, reason = "a test that cannot continue panics")]
 
 use qcbus_formats::location::OtherPlace;
 use qcbus_formats::pool::BLOCKED;

@@ -1,6 +1,6 @@
 //! Tests of a report on an existing result file.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
+#![expect(clippy::unwrap_used, reason = "a test that cannot continue panics")]
 
 use std::path::Path;
 

@@ -179,7 +179,7 @@ mod tests {
         assert_eq!(results, whole, "it fits");
         cut_to(&mut results, 200_000);
         let [modest, flood] = results.bundles[0].checkers.as_slice() else {
-            panic!("a checker is gone");
+            panic!("no checker may be removed");
         };
         assert_eq!(modest, &whole.bundles[0].checkers[0]);
         assert_eq!(flood.issues.len(), 125);

@@ -123,7 +123,11 @@ mod tests {
             "{said}"
         );
         assert!(said.contains("LimitNOFILE=2112"), "{said}");
-        assert_eq!(allowed(64).peers(64).0, FEWEST, "it is tried all the same");
+        assert_eq!(
+            allowed(64).peers(64).0,
+            FEWEST,
+            "the minimum is allowed nevertheless"
+        );
     }
 
     #[test]
@@ -131,6 +135,10 @@ mod tests {
         let taken = Descriptors::take();
         let now = getrlimit(Resource::Nofile);
         assert!(now.current.is_none_or(|it| it >= taken.allowed));
-        assert_eq!(Descriptors::take().before, None, "there is no more");
+        assert_eq!(
+            Descriptors::take().before,
+            None,
+            "the limit is already at its maximum"
+        );
     }
 }

@@ -423,7 +423,10 @@ mod tests {
             std::fs::rename(&place, &aside).unwrap();
             assert!(!first.is_in_place());
             first.hold().unwrap();
-            assert!(first.is_in_place(), "it is made and taken");
+            assert!(
+                first.is_in_place(),
+                "the directory is created and locked again"
+            );
             let second = DirectoryLock::take(&place, purpose, "second");
             assert!(matches!(second, Err(LockError::Taken { .. })));
             std::fs::remove_dir_all(&place).unwrap();
@@ -453,7 +456,7 @@ mod tests {
         drop(DirectoryLock::share(&out).unwrap());
         let nothing = dir.path().join("nothing");
         drop(DirectoryLock::share(&nothing).unwrap());
-        assert!(!nothing.exists(), "nothing was written");
+        assert!(!nothing.exists(), "nothing is created");
     }
 
     #[test]
@@ -471,9 +474,12 @@ mod tests {
             }
             assert!(DirectoryLock::share(&below).is_err());
             let state = DirectoryLock::take(&below, Purpose::State, "first");
-            assert!(state.is_ok(), "a broker's state lies below its results");
+            assert!(
+                state.is_ok(),
+                "the state of a broker may be below its results"
+            );
             let in_both = DirectoryLock::share(dir.path());
-            assert!(in_both.is_err(), "results of a check behind a gate");
+            assert!(in_both.is_err(), "results of a check must not be in a gate");
             drop(lock);
             let second = DirectoryLock::take(&below, held, "second").unwrap();
             for wanted in [Purpose::Results, Purpose::Gate] {

@@ -216,6 +216,6 @@ mod tests {
         run(2).await;
         assert_eq!(words.of("mine"), ["early", "no module"]);
         run(3).await;
-        assert!(words.of("mine").is_empty(), "it had joined");
+        assert!(words.of("mine").is_empty(), "the process had joined");
     }
 }

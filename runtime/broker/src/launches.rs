@@ -125,7 +125,11 @@ mod tests {
         }
         next.forget();
         let other = Launches::of(dir.path()).unwrap();
-        assert_eq!(other.proven(&proof), None, "another instance in its place");
+        assert_eq!(
+            other.proven(&proof),
+            None,
+            "a proof for another instance is invalid"
+        );
         use std::os::unix::fs::PermissionsExt;
         let mode = std::fs::metadata(dir.path().join(FILE))
             .unwrap()

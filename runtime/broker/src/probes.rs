@@ -204,11 +204,14 @@ mod tests {
         assert_eq!(lost.unwrap_err().kind(), io::ErrorKind::TimedOut);
         assert_eq!(io_watchdog.hanging(), std::slice::from_ref(&pipe));
         let found = probes.within(|| Path::new("/").is_dir());
-        assert!(found.unwrap(), "others go on");
+        assert!(found.unwrap(), "other probes continue");
         std::fs::write(&pipe, "at last").unwrap();
         let begun = Instant::now();
         while !io_watchdog.hanging().is_empty() {
-            assert!(begun.elapsed() < Duration::from_secs(60), "the watchdog");
+            assert!(
+                begun.elapsed() < Duration::from_secs(60),
+                "watchdog timeout"
+            );
             std::thread::yield_now();
         }
     }

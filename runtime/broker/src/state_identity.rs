@@ -110,7 +110,7 @@ mod tests {
     #[test]
     fn unchanged_state_gives_no_notice() {
         let dir = tempfile::tempdir().unwrap();
-        assert_eq!(said(dir.path(), "/out"), None, "it is new");
+        assert_eq!(said(dir.path(), "/out"), None, "the state is new");
         assert_eq!(said(dir.path(), "/out"), None);
     }
 
@@ -127,8 +127,8 @@ mod tests {
             told.contains(&format!("a copy of {}", live.display())),
             "{told}"
         );
-        assert_eq!(said(&copy, "/copy/out"), None, "it is said once");
-        assert_eq!(said(&live, "/live/out"), None, "the original is untouched");
+        assert_eq!(said(&copy, "/copy/out"), None, "reported once");
+        assert_eq!(said(&live, "/live/out"), None, "the original is unchanged");
     }
 
     #[test]

@@ -149,7 +149,10 @@ fn withdrawal_from_the_gate_needs_no_journal() {
 fn until(is_so: impl Fn() -> bool) {
     let begun = Instant::now();
     while !is_so() {
-        assert!(begun.elapsed() < Duration::from_secs(60), "the watchdog");
+        assert!(
+            begun.elapsed() < Duration::from_secs(60),
+            "watchdog timeout"
+        );
         std::thread::sleep(Duration::from_millis(10));
     }
 }

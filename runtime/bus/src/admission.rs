@@ -428,9 +428,9 @@ mod tests {
         let known = admission.take(&key(1, 1)).unwrap();
         assert_eq!(known.process.as_ref().unwrap().id(), std::process::id());
         assert!(known.is_there());
-        assert!(admission.take(&key(1, 1)).is_none(), "it is said once");
+        assert!(admission.take(&key(1, 1)).is_none(), "taken only once");
         assert!(known.is_same(&admission.take(&key(1, 2)).unwrap()));
-        assert!(admission.known.is_empty(), "the old generation is over");
+        assert!(admission.known.is_empty(), "the old generation is dropped");
     }
 
     #[test]
@@ -469,7 +469,7 @@ mod tests {
         child.kill().unwrap();
         child.wait().unwrap();
         assert!(!other.is_there());
-        assert!(!far.is_there(), "also where its process cannot be seen");
+        assert!(!far.is_there(), "also if its process is not visible");
     }
 
     #[test]

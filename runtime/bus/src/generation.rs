@@ -325,7 +325,7 @@ mod tests {
     #[test]
     fn unlocked_root_is_stray_once_it_is_old() {
         let root = root();
-        assert!(!is_stray(&root), "its broker may be about to lock it");
+        assert!(!is_stray(&root), "a broker may be about to lock it");
         age(&root, UNLOCKED_FOR);
         assert!(is_stray(&root));
         removal_lock::lock_and_remove(&root).unwrap();
@@ -338,7 +338,7 @@ mod tests {
         let life = lock_life(&root, || seen = Some(is_stray(&root))).unwrap();
         assert_eq!((seen, is_stray(&root)), (Some(false), false));
         drop(life);
-        assert!(is_stray(&root), "it has died");
+        assert!(is_stray(&root), "the broker has died");
         removal_lock::lock_and_remove(&root).unwrap();
     }
 
@@ -350,7 +350,7 @@ mod tests {
         age(&root, UNLOCKED_FOR);
         assert!(!is_stray(&root));
         drop(life);
-        assert!(is_stray(&root), "it has died");
+        assert!(is_stray(&root), "the broker has died");
         removal_lock::lock_and_remove(&root).unwrap();
     }
 

@@ -398,7 +398,11 @@ mod tests {
             }
             let text = fs::read_to_string(&path).unwrap();
             for maker in makers {
-                assert!(!text.contains(maker), "{maker} in {}", path.display());
+                assert!(
+                    !text.contains(maker),
+                    "{maker} must not be used in {}",
+                    path.display()
+                );
             }
         }
     }

@@ -224,7 +224,10 @@ mod tests {
         let (_dir, root) = root();
         let inside = RemovalLock::of(&root).unwrap().enter().unwrap();
         lock_and_remove(&root).unwrap();
-        assert!(!root.exists(), "it does not wait for ever");
+        assert!(
+            !root.exists(),
+            "the removal does not wait for the stopped process"
+        );
         fs::create_dir(&root).unwrap();
         fs::write(root.join("node"), "made too late").unwrap();
         drop(inside);

@@ -327,7 +327,7 @@ mod tests {
                 }
                 now += Duration::from_millis(100);
                 out.tick(now);
-                prop_assert!(round < 20_000, "it never ends");
+                prop_assert!(round < 20_000, "the transfer must end");
             }
             prop_assert_eq!(got, messages);
         }

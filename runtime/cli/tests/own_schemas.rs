@@ -2,7 +2,7 @@
 
 #![expect(
     clippy::unwrap_used,
-    reason = "a test that cannot set up its directory has failed"
+    reason = "a test fails if it cannot set up its directory"
 )]
 
 use std::path::Path;
@@ -75,7 +75,7 @@ impl<'d> Broker<'d> {
         {
             assert!(
                 self.process.try_wait().unwrap().is_none(),
-                "the broker has ended"
+                "the broker must keep running"
             );
         }
         result(self.cli, "qcbus-out/map.xodr.xqar")

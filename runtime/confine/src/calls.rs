@@ -349,7 +349,7 @@ mod tests {
             assert_eq!(
                 unknown.is_empty(),
                 programs,
-                "only programs have a call that is to be unknown"
+                "only programs have calls that must seem unknown"
             );
         }
     }

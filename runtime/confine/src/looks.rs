@@ -68,12 +68,15 @@ mod tests {
         };
         assert!(is_filtered(&status(2, 1), 0));
         assert!(is_filtered(&status(5, 1), 2));
-        assert!(!is_filtered(&status(2, 1), 2), "as it was started");
+        assert!(
+            !is_filtered(&status(2, 1), 2),
+            "no filter was added since the start"
+        );
         assert!(!is_filtered(&status(2, 0), 0));
         assert!(!is_filtered(&status(0, 1), 0));
         assert!(
             is_filtered("NoNewPrivs:\t1\nSeccomp:\t2\n", 0),
-            "an old kernel"
+            "on an old kernel"
         );
         assert!(!is_filtered("", 0));
     }

@@ -117,7 +117,10 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         let may = May::default();
         assert!(inside(&may, "cat \"$0\"", file.path()));
-        assert!(inside(&may, "ulimit -n 20", file.path()), "its own limits");
+        assert!(
+            inside(&may, "ulimit -n 20", file.path()),
+            "a program may lower its own limits"
+        );
         let before = file.as_file().metadata().unwrap().permissions().mode();
         for line in [
             "chmod 777 \"$0\"",

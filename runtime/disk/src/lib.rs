@@ -421,7 +421,7 @@ mod tests {
         write_named(&pipe, b"through", false).unwrap();
         assert_eq!(reader.join().unwrap(), b"through");
         let is_file = std::fs::symlink_metadata(&pipe).unwrap().is_file();
-        assert!(!is_file, "it is a pipe still");
+        assert!(!is_file, "the file is still a pipe");
     }
 
     #[test]
@@ -462,7 +462,7 @@ mod tests {
         sweep_dead(dir.path());
         assert!(
             ahead.path().exists(),
-            "it is this process', and not renamed yet"
+            "the file belongs to this process and is not renamed yet"
         );
     }
 
@@ -478,7 +478,10 @@ mod tests {
         assert!(at("top").exists() && !at("top/a").exists());
         assert!(at("top/c/kept").exists() && !at("top/c/d").exists());
         remove_empty_above(&at("top/gone"), &at("elsewhere"));
-        assert!(at("top").exists(), "it does not lie below that top");
+        assert!(
+            at("top").exists(),
+            "the directory is not below the given top directory"
+        );
     }
 
     #[test]
@@ -510,7 +513,7 @@ mod tests {
         remove(&dir.path().join("x".repeat(256))).unwrap();
         remove(&file.join("below")).unwrap();
         remove(dir.path()).unwrap();
-        assert!(file.exists(), "a directory is nothing that was written");
+        assert!(file.exists(), "a directory is not an output file");
         remove(&file).unwrap();
         assert!(!file.exists());
     }

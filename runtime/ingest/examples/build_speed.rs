@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p qcbus-ingest --example build_speed -- [MEGABYTES]`
 
-#![expect(clippy::print_stdout, reason = "a measurement prints its figures")]
+#![expect(clippy::print_stdout, reason = "a benchmark prints its measurements")]
 
 use std::fmt::Write;
 use std::path::Path;

@@ -14,7 +14,7 @@ use crate::{Limits, Reader, Source, Walking, gather, prepare_bytes, references};
 ///
 /// # Panics
 /// If one of these conditions is violated.
-#[expect(clippy::panic, reason = "a fuzz body reports by panicking")]
+#[expect(clippy::panic, reason = "a fuzz target reports failures by panicking")]
 pub fn ingest(bytes: &[u8]) {
     let limits = Limits {
         max_file: 1 << 20,
@@ -37,7 +37,7 @@ pub fn ingest(bytes: &[u8]) {
         if document.root().is_none() {
             assert!(
                 document.faults().next().is_some(),
-                "{name}: no root and no fault"
+                "{name}: a document without a root must have a fault"
             );
         }
         references(&document, &SearchPath::default());
@@ -155,16 +155,16 @@ pub fn assembled(files: &[(String, Vec<u8>)]) -> Outcome {
     }
 }
 
-#[expect(clippy::panic, reason = "a fuzz body reports by panicking")]
+#[expect(clippy::panic, reason = "a fuzz target reports failures by panicking")]
 fn sound(expansion: &Expansion<'_>, image: &[u8]) -> String {
     let text = expansion.text();
     let whole = expansion.pieces[0].document.root().is_some();
     let document = match Document::open(image) {
         Ok(document) => document,
-        Err(error) => panic!("the expanded image: {error}"),
+        Err(error) => panic!("the expanded image must be valid: {error}"),
     };
     if let Err(error) = document.validate() {
-        panic!("the expanded image: {error}");
+        panic!("the expanded image must be valid: {error}");
     }
     let again = prepare_bytes(
         Path::new("/again.xosc"),
@@ -174,13 +174,16 @@ fn sound(expansion: &Expansion<'_>, image: &[u8]) -> String {
     let again = again.build();
     let again = match Document::open(&again) {
         Ok(again) => again,
-        Err(error) => panic!("the expanded text: {error}"),
+        Err(error) => panic!("the expanded text must be readable: {error}"),
     };
     if let Some(fault) = again
         .faults()
         .find(|fault| fault.code.makes_partial() && whole)
     {
-        panic!("the expanded text: {}\n{text}", fault.text);
+        panic!(
+            "the expanded text must have no such fault: {}\n{text}",
+            fault.text
+        );
     }
     assert_eq!(tree(document), tree(again), "{text}");
     let same = expand(
@@ -190,7 +193,7 @@ fn sound(expansion: &Expansion<'_>, image: &[u8]) -> String {
         }],
         u64::MAX,
     );
-    assert_eq!(same.text(), text, "expanded twice");
+    assert_eq!(same.text(), text, "a second expansion changes nothing");
     text
 }
 

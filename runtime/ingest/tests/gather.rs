@@ -1,6 +1,6 @@
 //! The set of documents of a file, and the reports about missing ones.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
 
 use std::collections::HashMap;
 use std::convert::Infallible;
@@ -104,7 +104,7 @@ fn first_existing_spelling_of_a_reference_is_used() {
     let looked = ["/farm/s/a%20b.xodr", "/farm/s/c.xodr"].map(PathBuf::from);
     assert_eq!(
         store.looked, looked,
-        "who watches knows where one may appear"
+        "the watcher knows where a missing file may appear"
     );
 }
 

@@ -1,6 +1,6 @@
 //! Malicious input: it ends in an error or in faults, soon, and within bounds.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
 
 use std::fs;
 use std::io::Write;
@@ -148,7 +148,7 @@ fn gzip_bombs_and_truncated_gzip_are_faults() {
     );
     assert!(
         document.elements("road").count() > 100,
-        "what was inflated is in the tree"
+        "the decompressed part is in the tree"
     );
 }
 

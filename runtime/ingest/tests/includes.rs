@@ -1,7 +1,7 @@
 //! `<include>` of OpenDRIVE: it is spliced at its place, and each failure is a fault with its
 //! place.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
 
 use std::fs;
 use std::path::Path;
@@ -298,7 +298,7 @@ fn malformed_includes_are_faults() {
         let link = document.elements("link").next().unwrap();
         assert!(
             link.parent().unwrap().is("road"),
-            "what follows the include is where it was"
+            "content after the include keeps its place"
         );
     }
 }

@@ -1,9 +1,6 @@
 //! Modular scenarios: their expansion, and its robustness against arbitrary archives.
 
-#![expect(
-    clippy::panic,
-    reason = "a test that cannot go on fails where it stands"
-)]
+#![expect(clippy::panic, reason = "a test that cannot continue panics")]
 
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
@@ -52,13 +49,13 @@ fn expand(files: &[(&str, String)]) -> Outcome {
 fn expanded(files: &[(&str, String)]) -> String {
     match expand(files) {
         Outcome::Expanded(text) => text,
-        Outcome::Stopped(why) => panic!("not expanded: {why}"),
+        Outcome::Stopped(why) => panic!("the expansion must succeed: {why}"),
     }
 }
 
 fn stopped(files: &[(&str, String)]) -> String {
     match expand(files) {
-        Outcome::Expanded(text) => panic!("expanded to {text}"),
+        Outcome::Expanded(text) => panic!("the expansion must fail, found {text}"),
         Outcome::Stopped(why) => why,
     }
 }
@@ -144,7 +141,7 @@ fn nested_archives_have_separate_names() {
         ("in.mosc".to_owned(), inner),
     ];
     let Outcome::Expanded(text) = fuzzing::assembled(&files) else {
-        panic!("not expanded")
+        panic!("the expansion must succeed")
     };
     assert!(
         text.contains("name='P.P.G'") && text.contains("x = '6' y='5'"),
@@ -437,7 +434,7 @@ fn random_scenarios_expand_the_same_every_time() {
     let mut whole = 0;
     for _ in 0..800 {
         let Ok(tree) = files.new_tree(&mut runner) else {
-            panic!("no scenario")
+            panic!("a scenario must be generated")
         };
         let (main, lib, other, inner, deep) = tree.current();
         let inner = fuzzing_pack(&[("main.xosc", inner), ("lib.xosc", deep)]);
@@ -451,15 +448,12 @@ fn random_scenarios_expand_the_same_every_time() {
         assert_eq!(
             first,
             fuzzing::assembled(&files),
-            "it is the same every time"
+            "the result is always the same"
         );
         let from_library = |text: &String| text.contains("P.G") || text.contains("name='P'");
         whole += usize::from(matches!(&first, Outcome::Expanded(text) if from_library(text)));
     }
-    assert!(
-        whole > 80,
-        "only {whole} of 800 took something from a library"
-    );
+    assert!(whole > 80, "only {whole} of 800 scenarios used a library");
 }
 
 proptest! {

@@ -1,6 +1,6 @@
 //! References of a scenario to other files.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
 
 use std::fs;
 use std::io::{Cursor, Write};

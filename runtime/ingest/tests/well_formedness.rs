@@ -1,6 +1,6 @@
 //! A construct that XML 1.0 forbids is a fault with its place. An allowed construct is none.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
 
 use std::path::Path;
 

@@ -225,12 +225,18 @@ mod other {
     pub(super) struct Validator;
 
     impl Validator {
-        #[expect(clippy::unnecessary_wraps, reason = "as with the feature")]
+        #[expect(
+            clippy::unnecessary_wraps,
+            reason = "same signature as with the feature"
+        )]
         pub(super) fn new(_: &str) -> Result<Validator> {
             Ok(Validator)
         }
 
-        #[expect(clippy::unnecessary_wraps, reason = "as with the feature")]
+        #[expect(
+            clippy::unnecessary_wraps,
+            reason = "same signature as with the feature"
+        )]
         pub(super) fn validate(&mut self, _: &[u8]) -> Result<f64> {
             Ok(f64::INFINITY)
         }

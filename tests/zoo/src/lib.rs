@@ -41,7 +41,10 @@ pub fn main(arguments: impl Iterator<Item = String>) -> ExitCode {
     }
 }
 
-#[expect(clippy::print_stderr, reason = "the one place where the zoo talks")]
+#[expect(
+    clippy::print_stderr,
+    reason = "only this function prints the messages of the zoo"
+)]
 fn complain(text: &str) {
     eprintln!("zoo: {text}");
 }

@@ -11,6 +11,6 @@ fn unknown_animal_is_refused_with_the_known_names() {
     let told = String::from_utf8(output.stderr).unwrap();
     assert!(told.contains("no animal is called `unicorn`"), "{told}");
     for animal in qcbus_zoo::animals::ANIMALS {
-        assert!(told.contains(animal.name), "{} is not told", animal.name);
+        assert!(told.contains(animal.name), "{} must be listed", animal.name);
     }
 }

@@ -1,12 +1,12 @@
 
 
-# The second part, after `watch.py`: the import, a job, its end, requests and answers.
+# Second part, after `watch.py`: the import, a job, its end, requests and answers.
 
 # ---- the import
 
 
 def first_imports(source, path):
-    """The statements with which a program begins, as far as they do nothing but import."""
+    """Returns the import statements at the beginning of a program."""
     tree = compile(source, path, "exec", _ast.PyCF_ONLY_AST, dont_inherit=True)
     imports = []
     for at, statement in enumerate(tree.body):
@@ -17,12 +17,12 @@ def first_imports(source, path):
             break
         imports.append(statement)
     if not imports:
-        raise Cold("`%s` does not begin with imports, so that nothing of it can be loaded ahead" % path)
+        raise Cold("`%s` does not begin with imports, so it cannot be loaded in advance" % path)
     return compile(_ast.Module(body=imports, type_ignores=[]), path, "exec", dont_inherit=True)
 
 
 def script_main(path):
-    """The module `__main__` as an interpreter makes it for a script."""
+    """Returns the module `__main__` as an interpreter creates it for a script."""
     from importlib.machinery import SourceFileLoader
 
     main = bare_main()
@@ -39,7 +39,7 @@ def bare_main():
 
 
 def load_script():
-    """Loads what the script imports first; gives what runs it."""
+    """Returns the functions that run the first imports of a script and the script."""
     with open(TARGET, "rb") as file:
         source = file.read()
     if not is_safe():
@@ -51,7 +51,7 @@ def load_script():
 
 
 def load_module():
-    """Loads what `python -m` would run, up to the end of its first imports; gives what runs it."""
+    """Returns the functions that run the first imports of the module of `python -m` and the module."""
     sys.modules["__main__"] = bare_main()
     import runpy
 
@@ -64,7 +64,7 @@ def load_module():
         parts = {"__name__": name, "__package__": spec.parent, "__spec__": spec, "__file__": spec.origin}
         exec(first_imports(source, spec.origin), parts)
         if name in sys.modules and not before:
-            raise Cold("the module `%s` is imported by one that it imports" % name)
+            raise Cold("the module `%s` is in a cycle of imports" % name)
 
     def run():
         if not is_safe():
@@ -83,7 +83,7 @@ STALE |= {"mkdtemp", "mkstemp", "TemporaryDirectory", "NamedTemporaryFile", "ran
 
 
 def refuse_what_is_stale():
-    """A time, a seed, a random number that a module takes when it is loaded would be the same in each job."""
+    """Refuses modules that read a time, a seed or a random number at import, because it would be the same in each job."""
     for name, module in list(sys.modules.items()):
         file = getattr(module, "__file__", None)
         loader = getattr(getattr(module, "__spec__", None), "loader", None)
@@ -92,15 +92,15 @@ def refuse_what_is_stale():
         code = loader.get_code(name)
         if code is None or not names_at_once(code) & STALE:
             continue
-        # The names alone may be imports, or methods that are only named.
+        # The names alone may be imports or methods that are not called.
         tree = compile(loader.get_source(name) or "", file, "exec", _ast.PyCF_ONLY_AST, dont_inherit=True)
         for called in calls_at_once(tree):
             if called in STALE:
-                raise Cold("loading `%s` calls `%s`, whose result would be that of another job" % (name, called))
+                raise Cold("loading `%s` calls `%s`, and its result would be the same in each job" % (name, called))
 
 
 def names_at_once(code):
-    """The names in what runs when a module is loaded: its own statements, and those of its classes."""
+    """Returns the names in code that runs at import: the statements of the module and of its classes."""
     names = set(code.co_names)
     for inner in code.co_consts:
         if isinstance(inner, type(code)) and not inner.co_flags & 1:  # CO_OPTIMIZED: a function
@@ -109,7 +109,7 @@ def names_at_once(code):
 
 
 def calls_at_once(node):
-    """The names of what is called when a module is loaded."""
+    """Yields the names of the functions that are called at import."""
     if isinstance(node, _ast.Call):
         yield getattr(node.func, "attr", getattr(node.func, "id", None))
     for field in node._fields:
@@ -121,7 +121,7 @@ def calls_at_once(node):
                 yield from calls_at_once(inner)
 
 
-PRINTS = 64 << 10  # what each job prints again
+PRINTS = 64 << 10  # maximum output of an import in bytes; each job prints it again
 
 
 def open_files():
@@ -129,7 +129,7 @@ def open_files():
 
 
 def load():
-    """Imports what can be imported ahead; gives what runs the program, and what the import has printed and set."""
+    """Runs the first imports. Returns the function that runs the program, and the output and variables of the imports."""
     sys.argv = Arguments([TARGET])
     before = open_files()
     variables = dict(os.environb)
@@ -146,7 +146,7 @@ def load():
     if watch.seen is None and sys.getrefcount(sys.argv) > 2:
         watch.seen = "keeps its arguments"
     if watch.seen is not None:
-        raise Cold("loading it %s, which is another thing in each job" % watch.seen)
+        raise Cold("loading it %s, which differs between jobs" % watch.seen)
     if len(open_files()) > len(before):
         raise Cold("loading it leaves a file open")
     refuse_what_is_stale()
@@ -157,12 +157,12 @@ def load():
 
 
 def changes(before, after):
-    """What the import has changed in its environment: so it does in that of each job."""
+    """Returns the changes of the import to its environment. Each job repeats them."""
     return {it: after.get(it) for it in before.keys() | after.keys() if before.get(it) != after.get(it)}
 
 
 def printed(fd):
-    """What was printed so far, into a file in memory."""
+    """Returns the output so far, which is in a file in memory."""
     end = os.lseek(fd, 0, os.SEEK_CUR)
     if end > PRINTS:
         raise Cold("loading it prints more than %d bytes" % PRINTS)
@@ -170,7 +170,8 @@ def printed(fd):
 
 
 def refuse_threads():
-    """What threads hold is lost in a fork. Some libraries (OpenBLAS) end theirs before one, and start them again when needed."""
+    """Refuses threads, because they are lost in a fork. Some libraries (OpenBLAS) end theirs before a fork and start them
+    again when needed."""
     pid = raw_fork()
     if pid == 0:
         os._exit(0)
@@ -181,11 +182,11 @@ def refuse_threads():
             return
         time.sleep(0.002)
         threads = len(os.listdir("/proc/self/task"))
-    raise Cold("loading it starts threads (%d run), and they would be missing in each job" % (threads - 1))
+    raise Cold("loading it starts threads (%d running), which would be missing in each job" % (threads - 1))
 
 
 def raw_fork():
-    """A fork without the warning that newer versions give while there are threads: they are looked for here."""
+    """Forks without the warning of newer versions about threads, because the caller checks for threads."""
     warnings = sys.modules.get("warnings")
     filters = None if warnings is None else warnings.filters[:]
     if warnings is not None:
@@ -202,7 +203,7 @@ def raw_fork():
 
 
 class Standard:
-    """Makes the three standard streams as new, as the same objects: modules may have kept them."""
+    """Renews the three standard streams. They stay the same objects, because modules may refer to them."""
 
     def __init__(self):
         streams = (sys.__stdin__, sys.__stdout__, sys.__stderr__)
@@ -217,7 +218,7 @@ class Standard:
             mode = "wb" if writes else "rb"
             raw.__init__(fd, mode, closefd=False)
             if raw.seekable() != self.can_seek(fd):
-                # It has remembered that of what was there before, and keeps to it: a pipe in place of a file.
+                # The object caches whether the earlier file was seekable, but a pipe may have replaced a file.
                 raw = type(raw)(fd, mode, closefd=False)
                 buffer = buffer if buffered else raw
             raw.name = ("<stdin>", "<stdout>", "<stderr>")[fd]
@@ -242,13 +243,13 @@ class Standard:
 
 
 class Loaded:
-    """The program, up to the end of its first imports."""
+    """The program after its first imports."""
 
     def __init__(self):
         streams = manner()
         self.run, self.prints, self.changed = load()
         if manner() != streams:
-            raise Cold("loading it changes how its standard streams are written")
+            raise Cold("loading it changes the settings of its standard streams")
         self.standard = Standard()
 
 
@@ -258,7 +259,7 @@ def manner():
 
 
 class Job:
-    """What a request asks for."""
+    """A request for a job."""
 
     def __init__(self, request, fds):
         fields = request.split(b"\0")
@@ -270,7 +271,7 @@ class Job:
         self.fds = fds
 
     def enter(self, changed):
-        """All that a plain start does before the program runs."""
+        """Sets up the process as a plain start does before the program runs."""
         for fd, given in enumerate(self.fds):
             os.dup2(given, fd, inheritable=True)
         for given in self.fds:
@@ -282,7 +283,7 @@ class Job:
         self.take_environment(changed)
 
     def take_environment(self, changed):
-        # An interpreter in the locale "C" sets this one for its children.
+        # An interpreter in the locale "C" sets this variable for its children.
         coerced = os.environb.get(b"LC_CTYPE")
         if coerced is not None:
             self.environment.setdefault(b"LC_CTYPE", coerced)
@@ -296,7 +297,7 @@ class Job:
 
 
 def renew_library():
-    """What Python's own modules and NumPy have taken when they were loaded. (`random` is seeded anew by every fork.)"""
+    """Renews the values that Python's own modules and NumPy read at import. (Every fork seeds `random` again.)"""
     processes = sys.modules.get("multiprocessing.process")
     if hasattr(processes, "ORIGINAL_DIR"):
         processes.ORIGINAL_DIR = os.getcwd()
@@ -305,12 +306,12 @@ def renew_library():
         logging._startTime = time.time_ns() if isinstance(logging._startTime, int) else time.time()
     mtrand = sys.modules.get("numpy.random.mtrand")
     generator = getattr(getattr(mtrand, "_rand", None), "_bit_generator", None)
-    if getattr(generator, "_seed_seq", None) is not None:  # by chance, not by a number that the module gave
+    if getattr(generator, "_seed_seq", None) is not None:  # seeded randomly, not with a number of the module
         mtrand.seed()
 
 
 def begin(job, loaded, ready):
-    """In the new process: becomes the job."""
+    """Turns the new process into the job."""
     try:
         os.setsid()
         job.enter(loaded.changed)
@@ -333,9 +334,9 @@ def begin(job, loaded, ready):
 class Ending:
     """The end of a job.
 
-    A plain run takes down everything that it has loaded, by which objects are told (`__del__`) and files that nobody has
-    closed get what was written to them. That takes longer than many a job, and is left out where nobody can tell: where no
-    object is left that wants to be told, no thread, and no handler that was there before this file.
+    A plain run destroys everything that it has loaded: objects are finalized (`__del__`), and open files are flushed. That
+    can take longer than the job. It is skipped if it has no visible effect: no object with a finalizer is left, no thread,
+    and no exit handler that was registered before this file.
     """
 
     def __init__(self):
@@ -347,7 +348,7 @@ class Ending:
         atexit.register(self.last)
 
     def know_streams(self):
-        """Which objects the standard streams are made of: they want to be told of the end, and are flushed instead."""
+        """Collects the objects of the standard streams. They have finalizers, but are flushed instead."""
         self.standard = set()
         for text in (sys.__stdin__, sys.__stdout__, sys.__stderr__):
             self.standard |= {id(text), id(text.buffer), id(getattr(text.buffer, "raw", None))}
@@ -356,7 +357,7 @@ class Ending:
         self.whole = self.whole or self.exit is None or self.wanted()
 
     def wanted(self):
-        """Whether an object wants to be told of the end. Those that were loaded are no longer among these in a job."""
+        """Checks whether an object has a finalizer. In a job, the loaded objects are frozen and not checked."""
         wants = {}
         for it in gc.get_objects():
             kind = type(it)
@@ -399,7 +400,7 @@ def flushed():
 
 
 def c_function(name):
-    """A function of the C library that takes a number: `exit` flushes what extensions have printed, and `os._exit` does not."""
+    """Returns a function of the C library with one number. `exit` flushes the output of extensions, `os._exit` does not."""
     try:
         import _ctypes
 
@@ -410,23 +411,23 @@ def c_function(name):
 
 
 def be(run, ending):
-    """Runs the program. What it ends with is what the interpreter ends with."""
+    """Runs the program. The interpreter ends with the same exit code or exception."""
     try:
         run()
         ending.code = 0
         return
     except SystemExit as end:
         code = 0 if end.code is None else end.code
-        # What is no number is printed at the end.
+        # An exit code that is no number is printed at the end.
         ending.code = code & 0xFF if type(code) is int and abs(code) < 1 << 31 else None
         raise
     except BaseException as error:
-        # Without the lines of this file.
+        # The traceback must not contain lines of this file.
         kind, failed = type(error), error.with_traceback(error.__traceback__.tb_next.tb_next)
     sys.excepthook(kind, failed, failed.__traceback__)
     del failed
     if issubclass(kind, KeyboardInterrupt):
-        # The interpreter kills itself by the signal, when it has taken everything down; it has been told already.
+        # The interpreter kills itself with the signal at its end. The exception is already printed.
         sys.excepthook = lambda *_: None
         raise kind
     ending.code = 1
@@ -437,7 +438,7 @@ def be(run, ending):
 
 
 class Line:
-    """The socket: lengths and fields."""
+    """The socket. Messages have a length and fields."""
 
     def __init__(self):
         self.socket = _socket.socket(fileno=os.dup(0))
@@ -450,7 +451,7 @@ class Line:
         self.socket.sendall(len(data).to_bytes(4, "little") + data)
 
     def receive(self):
-        """A request and its descriptors; the process ends when nobody asks any more."""
+        """Receives a request and its descriptors. The process ends if the socket is closed."""
         room = _socket.CMSG_SPACE(3 * 4)
         head, control, _, _ = self.socket.recvmsg(4, room)
         fds = []
@@ -473,7 +474,7 @@ class Line:
 
 
 class Server:
-    """Forks and reaps."""
+    """Forks and reaps the processes of jobs."""
 
     def __init__(self, line, loaded):
         self.line = line
@@ -481,7 +482,7 @@ class Server:
         self.running = {}
 
     def serve(self):
-        """Comes back in each new process, and never in this one."""
+        """Serves requests. Returns in each new process and never in this one."""
         while True:
             poll = select.poll()
             poll.register(self.line.socket.fileno(), select.POLLIN)
@@ -500,7 +501,7 @@ class Server:
         self.line.send("end", pid, status)
 
     def fork(self, job):
-        """Whether this is the new process."""
+        """Forks a process for a job. Returns true in the new process."""
         entered, ready = os.pipe()
         pid = os.fork()
         if pid == 0:
@@ -525,7 +526,7 @@ class Server:
 
 
 def files():
-    """What the loaded modules were read from, and the directories in which others would have been found before them."""
+    """Returns the files of the loaded modules, and the directories that could contain other modules of the same names."""
     found = {TARGET if KIND == "script" else sys.executable, os.path.realpath(sys.executable)}
     found.add(os.path.join(sys.prefix, "pyvenv.cfg"))
     for module in list(sys.modules.values()):
@@ -538,7 +539,7 @@ def files():
 
 def prepare(line):
     if sys.version_info < (3, 9) or not hasattr(os, "pidfd_open"):
-        raise Cold("its interpreter is Python %d.%d on a system without what is needed of 3.9" % sys.version_info[:2])
+        raise Cold("its interpreter is Python %d.%d; it needs 3.9 or later and `os.pidfd_open`" % sys.version_info[:2])
     if MEMORY:
         resource.setrlimit(resource.RLIMIT_DATA, (int(MEMORY), resource.getrlimit(resource.RLIMIT_DATA)[1]))
     ending = Ending()
@@ -550,7 +551,7 @@ def prepare(line):
 
 
 def start():
-    """Gives what runs the program, in each new process."""
+    """Starts the server. Returns in each new process with the function that runs the program."""
     line = Line()
     try:
         run, ending, server = prepare(line)
@@ -558,11 +559,11 @@ def start():
         line.send("cold", str(why))
         os._exit(0)
     except BaseException as error:
-        line.send("cold", "it cannot be loaded ahead: %s: %s" % (type(error).__name__, error))
+        line.send("cold", "it cannot be loaded in advance: %s: %s" % (type(error).__name__, error))
         os._exit(0)
     line.send("ready", *files())
     server.serve()
-    # They are renewed in each.
+    # The streams are renewed in each process.
     ending.know_streams()
     return run, ending
 

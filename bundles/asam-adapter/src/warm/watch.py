@@ -1,18 +1,18 @@
-"""One interpreter that has imported a module, and forks a process for each job.
+"""Fork server: an interpreter that has imported a module and forks a process for each job.
 
-It is run by `python -c` with its socket as stdin. What it does before a job is what a plain run of the program does up to the
-end of its first imports; what it does in a job is the rest. Whatever of a plain run cannot be had this way makes it say why
-(`cold`), and the program is run plainly.
+It is run by `python -c` with its socket as stdin. Before a job it runs the first imports of the program, in a job the rest.
+If that would differ from a plain run, it reports the reason (`cold`), and the program is run plainly.
 
-This is the first part of it: what is imported, and what watches an import. `server.py` follows in the same text.
+This first part has its own imports and the watch over the program's imports. `server.py` follows in the same text.
 
-Modules that only this needs are taken out of `sys.modules` again: beside a program there may be another module of that name.
+Modules that only this file needs are removed from `sys.modules` again, because a program may have a module of the same
+name beside it.
 """
 
 import sys
 
 if sys.path and sys.path[0] == "":
-    del sys.path[0]  # `-c` looks in the working directory first
+    del sys.path[0]  # `-c` searches the working directory first
 
 at_start = set(sys.modules)
 import _ast
@@ -37,10 +37,10 @@ STANDARD = os.path.dirname(os.__file__) + os.sep
 
 
 class Cold(Exception):
-    """Why the program cannot be held."""
+    """The reason why the program cannot be loaded in advance."""
 
 
-# ---- what an import looks at that is another thing in each job
+# ---- watch over values that an import reads and that differ between jobs
 
 
 def varies(name):
@@ -54,8 +54,8 @@ def is_library(file):
 
 
 def by_known():
-    """Whether a package does it of which is known that no job can tell: NumPy asks for its process, and a program for what
-    the processor can do, for tests of its own."""
+    """Checks whether the caller is a package whose reads are known to have no effect on jobs. For its own tests, NumPy
+    reads its process id and runs a program that detects features of the processor."""
     frame = sys._getframe(2)
     while frame is not None and (is_library(frame.f_code.co_filename) or frame.f_code.co_filename == "<string>"):
         frame = frame.f_back
@@ -64,7 +64,7 @@ def by_known():
 
 
 class Watch:
-    """Notes what an import reads or does that would be another thing, or have to be done again, in each job."""
+    """Records the first action of an import that would differ between jobs or must be repeated in each job."""
 
     on = True
     seen = None
@@ -106,7 +106,7 @@ watch = Watch()
 
 
 def looks_for_proxies():
-    """Whether `urllib` looks through all variables, as it does to open even a file. It takes only those of proxies."""
+    """Checks whether `urllib` reads all variables, as it does even to open a file. It uses only those of proxies."""
     frame = sys._getframe(2)
     while frame is not None and is_library(frame.f_code.co_filename):
         if frame.f_code.co_name == "getproxies_environment":
@@ -116,7 +116,7 @@ def looks_for_proxies():
 
 
 class Environment(os._Environ):
-    """The environment while the module is imported."""
+    """The environment during the import."""
 
     def __getitem__(self, name):
         if varies(name) and not looks_for_proxies():
@@ -125,12 +125,12 @@ class Environment(os._Environ):
 
     def __iter__(self):
         if not looks_for_proxies():
-            watch.note("reads all variables of its environment")
+            watch.note("reads its whole environment")
         return super().__iter__()
 
 
 class Arguments(list):
-    """The arguments while the module is imported."""
+    """The arguments during the import."""
 
     def __getitem__(self, at):
         watch.note("reads its arguments")
@@ -146,7 +146,7 @@ class Arguments(list):
 
 
 class Watched:
-    """In the place of a function, notes its calls. Not a function itself: as a part of a class it would become a method."""
+    """Replaces a function and records its calls. It is no function itself, because a class would turn it into a method."""
 
     def __init__(self, module, name, what, of_library):
         self.module, self.name, self.what, self.of_library = module, name, what, of_library
@@ -155,7 +155,7 @@ class Watched:
 
     def __call__(self, *given, **named):
         caller = sys._getframe(1).f_code.co_filename
-        # What `multiprocessing` keeps is renewed in each job.
+        # The values of `multiprocessing` are renewed in each job.
         if watch.on and (self.of_library or not is_library(caller)) and not caller.endswith("/multiprocessing/process.py"):
             watch.note(self.what)
         return self.plain(*given, **named)
@@ -165,13 +165,13 @@ class Watched:
 
 
 def watching():
-    """Begins to watch; gives what ends it."""
+    """Starts the watch and returns the function that ends it."""
     sys.addaudithook(watch.audit)
     os.environ.__class__ = os.environb.__class__ = Environment
-    undo = [Watched(os, name, "looks for its working directory", True) for name in ("getcwd", "getcwdb")]
-    undo += [Watched(os, name, "reads the id of its process", False) for name in ("getpid", "getppid")]
+    undo = [Watched(os, name, "reads its working directory", True) for name in ("getcwd", "getcwdb")]
+    undo += [Watched(os, name, "reads its process id", False) for name in ("getpid", "getppid")]
     clocks = ("time", "time_ns", "localtime", "gmtime", "strftime", "ctime")
-    undo += [Watched(time, name, "looks at the clock", False) for name in clocks]
+    undo += [Watched(time, name, "reads the clock", False) for name in clocks]
 
     def end():
         watch.on = False

@@ -310,7 +310,7 @@ pub const REFUSED: &[(&str, &str, &str)] = &[
 import threading, time
 threading.Thread(target=time.sleep, args=(600,), daemon=True).start()
 ",
-        "loading it starts threads (1 run), and they would be missing in each job",
+        "loading it starts threads (1 running), which would be missing in each job",
     ),
     (
         "fails",
@@ -350,7 +350,7 @@ os._exit(9)
 import os
 x = os.environ.get('ASAM_QC_FRAMEWORK_CONFIG_FILE')
 ",
-        "loading it reads the variable ASAM_QC_FRAMEWORK_CONFIG_FILE, which is another thing in each job",
+        "loading it reads the variable ASAM_QC_FRAMEWORK_CONFIG_FILE, which differs between jobs",
     ),
     (
         "reads_all",
@@ -358,7 +358,7 @@ x = os.environ.get('ASAM_QC_FRAMEWORK_CONFIG_FILE')
 import os
 x = dict(os.environ)
 ",
-        "loading it reads all variables of its environment, which is another thing in each job",
+        "loading it reads its whole environment, which differs between jobs",
     ),
     (
         "reads_args",
@@ -366,14 +366,14 @@ x = dict(os.environ)
 import sys
 x = sys.argv[1:]
 ",
-        "loading it reads its arguments, which is another thing in each job",
+        "loading it reads its arguments, which differs between jobs",
     ),
     (
         "keeps_args",
         r"
 from sys import argv
 ",
-        "loading it keeps its arguments, which is another thing in each job",
+        "loading it keeps its arguments, which differs between jobs",
     ),
     (
         "parses",
@@ -381,7 +381,7 @@ from sys import argv
 import argparse
 args = argparse.ArgumentParser().parse_args()
 ",
-        "loading it reads its arguments, which is another thing in each job",
+        "loading it reads its arguments, which differs between jobs",
     ),
     (
         "where",
@@ -389,7 +389,7 @@ args = argparse.ArgumentParser().parse_args()
 import os
 x = os.path.abspath('x')
 ",
-        "loading it looks for its working directory, which is another thing in each job",
+        "loading it reads its working directory, which differs between jobs",
     ),
     (
         "which",
@@ -397,7 +397,7 @@ x = os.path.abspath('x')
 import os
 x = os.getpid()
 ",
-        "loading it reads the id of its process, which is another thing in each job",
+        "loading it reads its process id, which differs between jobs",
     ),
     (
         "when",
@@ -405,7 +405,7 @@ x = os.getpid()
 import time
 x = time.time()
 ",
-        "loading it looks at the clock, which is another thing in each job",
+        "loading it reads the clock, which differs between jobs",
     ),
     (
         "when_else",
@@ -414,7 +414,7 @@ from datetime import datetime
 class A:
     x = datetime.now()
 ",
-        "loading `when_else_main` calls `now`, whose result would be that of another job",
+        "loading `when_else_main` calls `now`, and its result would be the same in each job",
     ),
     (
         "seeds",
@@ -422,7 +422,7 @@ class A:
 import random
 random.seed(1)
 ",
-        "loading `seeds_main` calls `seed`, whose result would be that of another job",
+        "loading `seeds_main` calls `seed`, and its result would be the same in each job",
     ),
     (
         "logs",
@@ -430,14 +430,14 @@ random.seed(1)
 import logging
 logging.FileHandler('log')
 ",
-        "loading it looks for its working directory, which is another thing in each job",
+        "loading it reads its working directory, which differs between jobs",
     ),
     (
         "writes",
         r"
 open('/dev/full', 'w')
 ",
-        "loading it writes `/dev/full`, which is another thing in each job",
+        "loading it writes `/dev/full`, which differs between jobs",
     ),
     (
         "reads_here",
@@ -445,7 +445,7 @@ open('/dev/full', 'w')
 import os
 os.path.exists('x') or open('/proc/../etc/passwd').read(); open('etc/passwd')
 ",
-        "loading it reads `etc/passwd` in its working directory, which is another thing in each job",
+        "loading it reads `etc/passwd` in its working directory, which differs between jobs",
     ),
     (
         "keeps_open",
@@ -460,7 +460,7 @@ f = open('/etc/passwd')
 import subprocess
 subprocess.run(['true'])
 ",
-        "loading it starts another process (subprocess.Popen), which is another thing in each job",
+        "loading it starts another process (subprocess.Popen), which differs between jobs",
     ),
     (
         "floods",

@@ -111,7 +111,7 @@ impl Workshop {
 
     pub fn why_cold(&self, command: &str) -> String {
         match self.start(command) {
-            Ok(_) => panic!("`{command}` is kept warm"),
+            Ok(_) => panic!("`{command}` must not have a fork server"),
             Err(why) => why.to_string(),
         }
     }
@@ -222,6 +222,6 @@ pub fn wait_for(server: &Server) {
     };
     assert!(
         poll(&mut fds, Some(&limit)).unwrap() > 0,
-        "nothing came from the server"
+        "the server must send something"
     );
 }

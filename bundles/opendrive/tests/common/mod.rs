@@ -1,6 +1,6 @@
 //! Documents made from text, for tests.
 
-#![expect(clippy::expect_used, reason = "helpers of tests may fail a test")]
+#![expect(clippy::expect_used, reason = "test helpers may panic")]
 
 use std::path::Path;
 
@@ -22,6 +22,6 @@ pub fn image(xml: &str) -> Vec<u8> {
 pub fn with_map<T>(roads: &str, test: impl FnOnce(&RoadMap<'_>) -> T) -> T {
     let xml = format!("<OpenDRIVE><header revMajor=\"1\" revMinor=\"9\"/>{roads}</OpenDRIVE>");
     let image = image(&xml);
-    let document = Document::open(&image).expect("the image is sound");
+    let document = Document::open(&image).expect("the image is valid");
     test(&RoadMap::new(document))
 }

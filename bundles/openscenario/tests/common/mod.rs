@@ -1,6 +1,6 @@
 //! Scenarios made from text, for tests.
 
-#![expect(clippy::expect_used, reason = "helpers of tests may fail a test")]
+#![expect(clippy::expect_used, reason = "test helpers may panic")]
 
 use std::path::Path;
 
@@ -35,7 +35,7 @@ pub fn with_catalogs<T>(body: &str, catalogs: &[&str], test: impl FnOnce(&Scenar
             image(&format!("c{number}.xosc"), &text)
         })
         .collect();
-    let document = Document::open(&root).expect("the image is sound");
+    let document = Document::open(&root).expect("the image is valid");
     let directories: Vec<u32> = document
         .elements("Directory")
         .map(|node| node.offset())
@@ -44,7 +44,7 @@ pub fn with_catalogs<T>(body: &str, catalogs: &[&str], test: impl FnOnce(&Scenar
         .iter()
         .enumerate()
         .map(|(number, image)| LinkedCatalog {
-            document: Document::open(image).expect("the image is sound"),
+            document: Document::open(image).expect("the image is valid"),
             referred_at: directories.get(number).copied().unwrap_or(0),
         });
     let inputs = Inputs {
@@ -55,7 +55,7 @@ pub fn with_catalogs<T>(body: &str, catalogs: &[&str], test: impl FnOnce(&Scenar
         catalogs: linked.collect(),
         incomplete: Vec::new(),
     };
-    test(&Scenario::new(&inputs).expect("there is a root"))
+    test(&Scenario::new(&inputs).expect("the document has a root"))
 }
 
 /// Runs `test` on the scenario with this `body` in a file of version 1.3.

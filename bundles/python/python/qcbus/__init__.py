@@ -1,6 +1,6 @@
 """Checks of your own for qcbus, in Python.
 
-A rule is a function that looks at a document and says what it found::
+A rule is a function that reads a document and reports findings::
 
     import qcbus
 
@@ -15,14 +15,14 @@ A rule is a function that looks at a document and says what it found::
 
     bundle.main()
 
-``docs/writing-a-bundle.md`` shows the way from nothing to a bundle that runs beside a farm.
+``docs/writing-a-bundle.md`` shows every step to a bundle that runs on a broker.
 """
 
 import os
 
 if "QCBUS_LAUNCH" in os.environ:
-    # Started by a broker, before the script can import anything that computes: a bundle is confined when it has one
-    # thread, and its rules run one after the other, beside others on the same processors.
+    # A broker has started this process. The limits must be set before the script imports a numerical library: only a
+    # process with one thread can be confined. Its rules run one after the other and share the processors with others.
     for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS"):
         os.environ.setdefault(_name, "1")
 

@@ -1,4 +1,4 @@
-"""Bundles and rules, as a script describes them."""
+"""Bundles and rules of a script."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import io
 import re
 import signal
 import sys
-import traceback  # noqa: F401  Needed when a rule raises, and then nothing can be read from the disk any more.
+import traceback  # noqa: F401  Needed when a rule raises, because a confined process cannot load it then.
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,7 +22,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 
 @dataclass(frozen=True)
 class Param:
-    """A parameter of a rule, which a configuration may set: ``found.param(name)`` has its value."""
+    """A parameter of a rule. A configuration may set it; ``found.param(name)`` returns its value."""
 
     name: str
     default: Union[float, bool, str]
@@ -32,10 +32,10 @@ class Param:
 
 @dataclass(frozen=True)
 class Example:
-    """A piece of a document, and what its rule is to say of it.
+    """A part of a document, and the expected findings of its rule.
 
-    ``text`` is a whole document, or what lies directly in its root. ``at`` are the XPaths at which something must be
-    found, in document order; ``None`` means: something, somewhere; an empty list: nothing.
+    ``text`` is a whole document or the content of its root. ``at`` are the XPaths of the expected findings in document
+    order. ``None`` means at least one finding anywhere, an empty list no finding.
     """
 
     text: str
@@ -45,7 +45,7 @@ class Example:
 
 @dataclass
 class Rule:
-    """A rule of a bundle: what it is called, and the function that looks."""
+    """A rule of a bundle: its names, its documentation and its function."""
 
     id: str
     uids: Sequence[str]
@@ -62,7 +62,7 @@ class Rule:
 
 
 class Bundle:
-    """A checker bundle: a name, the kinds of file that it takes, and rules."""
+    """A checker bundle: a name, the kinds of its files, and rules."""
 
     def __init__(
         self,
@@ -75,12 +75,12 @@ class Bundle:
         reads: str = "written",
     ) -> None:
         if not _NAME.fullmatch(name):
-            raise ValueError(f"`{name}` is no name of a bundle: 1 to 64 of A-Z a-z 0-9 . _ -, not beginning with . _ -")
+            raise ValueError(f"`{name}` is not a valid bundle name: use 1 to 64 of A-Z a-z 0-9 . _ -, and no . _ - at the start")
         self.name = name
         self.version = version
         self.kinds = tuple(kinds)
         if not self.kinds:
-            raise ValueError("a bundle takes at least one kind of file: xodr, xosc or mosc")
+            raise ValueError("a bundle must have at least one kind of file: xodr, xosc or mosc")
         self.rules: list[Rule] = []
         self._native = _native.Native(
             name, alias or name, version, description or f"checks of {name}", list(self.kinds), reads
@@ -99,15 +99,15 @@ class Bundle:
         good: Iterable[Union[str, Example]] = (),
         bad: Iterable[Union[str, Example, tuple[str, ...]]] = (),
     ) -> Callable[[Check], Rule]:
-        """Makes a rule of a function ``(doc, found)``. Its first line of documentation says what is demanded.
+        """Turns a function ``(doc, found)`` into a rule. The first line of its docstring states the requirement.
 
-        ``uids``: the rules that it answers for, ``acme.example:xodr:1.0.0:road.named``. ``id``: the checker's name,
-        without it ``check_BUNDLE_FUNCTION``. ``versions``: those of the standard that it applies to (``1.7.0..``).
-        ``after``: rules that must have found no error before this one can look. ``good``, ``bad``: examples, which
-        ``python -m qcbus.test`` tries.
+        ``uids``: UIDs of the rules that it checks, such as ``acme.example:xodr:1.0.0:road.named``. ``id``: name of the
+        checker, by default ``check_BUNDLE_FUNCTION``. ``versions``: versions of the standard that it applies to
+        (``1.7.0..``). ``after``: rules that must be without errors before this one runs. ``good``, ``bad``: examples,
+        tested by ``python -m qcbus.test``.
         """
         if not uids:
-            raise ValueError("a rule needs a UID: @bundle.rule(\"acme.example:xodr:1.0.0:road.named\")")
+            raise ValueError("a rule must have a UID: @bundle.rule(\"acme.example:xodr:1.0.0:road.named\")")
         def take(check: Check) -> Rule:
             title, summary, text = _said(check)
             name = re.sub(r"[^A-Za-z0-9_]", "_", self.name)
@@ -123,7 +123,7 @@ class Bundle:
                 bad=[_example(it, at=None) for it in bad],
             )
             if any(rule.id == other.id for other in self.rules):
-                raise ValueError(f"the bundle has a rule `{rule.id}` already")
+                raise ValueError(f"the bundle already has a rule `{rule.id}`")
             self._native.add(
                 id=rule.id,
                 uids=list(uids),
@@ -142,27 +142,27 @@ class Bundle:
         return take
 
     def main(self, arguments: Sequence[str] | None = None) -> None:
-        """Runs the bundle as its arguments say, if its script is the program that runs: on the bus
-        (``--instance-dir``), on one file, or on a configuration of ASAM's framework. Ends the program."""
+        """Runs the bundle if its script is the main program, and exits. The arguments choose the mode: on the bus
+        (``--instance-dir``), on one file, or on a configuration of ASAM's framework."""
         frame = inspect.currentframe()
         caller = frame.f_back if frame else None
         if arguments is None and caller is not None and caller.f_globals.get("__name__") != "__main__":
-            # The script is read by somebody else, such as its test.
+            # Another module, such as a test, imports the script.
             return
         sys.stdout.flush()
-        # What was found goes to stdout; what rules print is for people. In lines, because a process on the bus may be
-        # killed at any time.
+        # Findings go to stdout, so the output of rules goes to stderr. It is line-buffered, because a process on the bus
+        # may be killed at any time.
         if isinstance(sys.stderr, io.TextIOWrapper):
             sys.stderr.reconfigure(line_buffering=True)
         sys.stdout = sys.stderr
-        # Python would only take a note of it, and look at that when the check is over.
+        # Python would handle SIGINT only after the check.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         sys.exit(self._native.run(list(sys.argv[1:] if arguments is None else arguments), *_places()))
 
 
 def _places() -> tuple[list[Path], list[Path]]:
-    """Where this interpreter finds modules: what it reads, and what it lists. A bundle on the bus may read nothing else
-    once it has joined. Of the directory of the script that is what can be a module, and not whatever else lies there."""
+    """Returns the paths that this interpreter reads for modules, and the directories that it lists. A registered bundle
+    on the bus may read nothing else. Of the script's directory only files that can be modules are included."""
     script = Path(sys.argv[0]).resolve().parent
     reads = [entry.resolve() for entry in map(Path, sys.path) if entry.is_absolute() and entry.resolve() != script]
     try:
@@ -174,13 +174,13 @@ def _places() -> tuple[list[Path], list[Path]]:
 
 
 def _said(check: Check) -> tuple[str, str, str]:
-    """Title, first paragraph and the rest of what a function says of itself."""
+    """Returns the title of a function, and the first paragraph and the rest of its docstring."""
     documentation = inspect.getdoc(check) or ""
     summary, _, text = documentation.partition("\n\n")
     summary = " ".join(summary.split())
     if not summary:
         raise ValueError(
-            f"`{check.__name__}` does not say what it demands: begin it with a sentence of documentation, "
+            f"`{check.__name__}` has no docstring: begin it with a sentence that states the requirement, "
             'such as """Every road has a name."""'
         )
     return check.__name__.replace("_", " "), summary, text

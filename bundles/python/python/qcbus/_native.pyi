@@ -1,4 +1,4 @@
-"""What the Rust part offers; see the classes' own documentation."""
+"""Interface of the Rust part; see the documentation of the classes."""
 
 from builtins import float as _float
 from builtins import int as _int
@@ -12,10 +12,10 @@ _T = TypeVar("_T")
 __version__: str
 
 class Closed(RuntimeError):
-    """The job that this belonged to is over, and its document is no longer there."""
+    """The job of this object has ended, and its document is closed."""
 
 class Element:
-    """An element of a document, valid until the rule's job is over."""
+    """An element of a document, valid until the rule's job ends."""
 
     @property
     def tag(self) -> str: ...
@@ -56,13 +56,13 @@ class Element:
     def getpath(self) -> str: ...
 
 class Elements(Iterator[Element]):
-    """Elements one after the other."""
+    """Iterator over elements."""
 
     def __iter__(self) -> Elements: ...
     def __next__(self) -> Element: ...
 
 class Document:
-    """A document, read in place and valid until the rule's job is over."""
+    """A document, read in place and valid until the rule's job ends."""
 
     @property
     def root(self) -> Element | None: ...
@@ -94,7 +94,7 @@ class Document:
     def is_well_formed(self) -> bool: ...
 
 class Column(Sequence[float]):
-    """Numbers of one kind, one after the other; a buffer of Python's, also for NumPy. It outlives the job."""
+    """Numbers of one type as a Python buffer, also for NumPy. It outlives the job."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, number: int, /) -> float: ...  # type: ignore[override]
@@ -104,7 +104,7 @@ class Column(Sequence[float]):
     def numpy(self) -> Any: ...
 
 class Table:
-    """Columns of the same length under names."""
+    """Named columns of the same length."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, name: str, /) -> Column: ...
@@ -112,7 +112,7 @@ class Table:
     def keys(self) -> list[str]: ...
 
 class Rows:
-    """All elements of one name, with columns out of their attributes."""
+    """All elements of one name, with columns of their attributes."""
 
     def __len__(self) -> int: ...
     @overload
@@ -123,7 +123,7 @@ class Rows:
     def keys(self) -> list[str]: ...
 
 class Pose:
-    """A place on a reference line, in metres, with the line's direction there, in radians."""
+    """A point of a reference line in metres, with the direction of the line at this point in radians."""
 
     @property
     def x(self) -> float: ...
@@ -135,7 +135,7 @@ class Pose:
     def curvature(self) -> float: ...
 
 class Road:
-    """A road of a map, valid until the rule's job is over."""
+    """A road of a map, valid until the rule's job ends."""
 
     @property
     def id(self) -> str: ...
@@ -153,7 +153,7 @@ class Road:
     def sections(self) -> list[Section]: ...
 
 class Section:
-    """A lane section, valid until the rule's job is over."""
+    """A lane section, valid until the rule's job ends."""
 
     @property
     def s(self) -> float | None: ...
@@ -166,7 +166,7 @@ class Section:
     def lane(self, id: int) -> Lane | None: ...
 
 class Lane:
-    """A lane of a section, valid until the rule's job is over."""
+    """A lane of a section, valid until the rule's job ends."""
 
     @property
     def id(self) -> int | None: ...
@@ -179,7 +179,7 @@ class Lane:
 Place = Union[Document, Element, Road, Section, Lane]
 
 class Finding:
-    """One finding, to be completed."""
+    """One finding. Its methods add details."""
 
     def at(self, place: Place, description: str, *, attribute: str | None = None) -> Finding: ...
     def here(self, description: str) -> Finding: ...
@@ -188,7 +188,7 @@ class Finding:
     def level(self, level: str) -> Finding: ...
 
 class Found:
-    """Takes what a rule finds."""
+    """Collector of the findings of a rule."""
 
     def issue(
         self,
@@ -208,7 +208,7 @@ class Found:
     def __len__(self) -> int: ...
 
 class Native:
-    """A bundle that a script describes; `qcbus.Bundle` is for people."""
+    """Native part of a bundle; scripts use `qcbus.Bundle`."""
 
     def __init__(
         self, name: str, alias: str, version: str, description: str, kinds: list[str], reads: str

@@ -1,6 +1,6 @@
-"""A plugin of pytest: the examples of rules are tests.
+"""A plugin of pytest that runs the examples of rules as tests.
 
-``pytest acme.py`` tries them where ``acme.py`` makes a bundle; so does any test module that imports one.
+``pytest acme.py`` tests them if ``acme.py`` defines a bundle. So does every test module that imports one.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class _Examples(pytest.Collector):
 
 class _NoExample(pytest.Item):
     def runtest(self) -> None:
-        pytest.skip("it has no example: a rule that was never seen to find anything may find nothing")
+        pytest.skip("no example: without one, nothing shows that the rule finds anything")
 
 
 class _Example(pytest.Item):
@@ -59,4 +59,4 @@ class _Example(pytest.Item):
 
 
 class _Wrong(Exception):
-    """An example's rule says otherwise than it should."""
+    """The findings of an example differ from the expected ones."""

@@ -1,7 +1,7 @@
-"""Tries the examples of rules: ``python -m qcbus.test acme.py …``.
+"""Tests the examples of rules: ``python -m qcbus.test acme.py …``.
 
-Every ``good`` example must give no finding of its rule, every ``bad`` one a finding at each of its places. Ends with 0
-when all do.
+Every ``good`` example must give no finding of its rule, every ``bad`` one a finding at each of its places. The exit code
+is 0 if all examples pass.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ _ROOTS = {
 
 
 def load(path: Path) -> list[Bundle]:
-    """The bundles that a script makes, which is read and not run as a program."""
+    """Returns the bundles of a script. The script is imported, not run as a program."""
     spec = importlib.util.spec_from_file_location(f"qcbus_bundle_{path.stem}", path)
     if spec is None or spec.loader is None:
-        raise ImportError(f"{path} is no Python script")
+        raise ImportError(f"{path} is not a Python script")
     module = importlib.util.module_from_spec(spec)
     sys.path.insert(0, str(path.parent))
     try:
@@ -40,7 +40,7 @@ def load(path: Path) -> list[Bundle]:
 
 
 def document(bundle: Bundle, example: Example) -> tuple[str, str]:
-    """An example as a whole document, and the name of its file."""
+    """Returns an example as a whole document, and its file name."""
     kind = "xosc" if bundle.kinds[0] == "mosc" else bundle.kinds[0]
     head, tail, root, newest = _ROOTS[kind]
     text = example.text.strip()
@@ -52,7 +52,7 @@ def document(bundle: Bundle, example: Example) -> tuple[str, str]:
 
 
 def wrong(bundle: Bundle, rule: Rule, example: Example) -> str | None:
-    """What an example's rule says otherwise than it should; ``None`` when it says what it should."""
+    """Returns how the findings of an example differ from the expected ones, or ``None``."""
     text, name = document(bundle, example)
     found, unlooked = bundle._native.check(name, text.encode(), rule.id)
     if unlooked:
@@ -60,7 +60,7 @@ def wrong(bundle: Bundle, rule: Rule, example: Example) -> str | None:
     said = "\n".join(f"  {it.get('xpath', '')} {it['level']}: {it['text']}" for it in found) or "  nothing"
     places = [it.get("xpath", "") for it in found]
     if example.at is None:
-        return None if found else f"nothing was found in\n{text}"
+        return None if found else f"expected a finding, found nothing in\n{text}"
     if list(example.at) != places:
         expected = "\n".join(f"  {at}" for at in example.at) or "  nothing"
         return f"expected\n{expected}\nbut found\n{said}\nin\n{text}"
@@ -68,7 +68,7 @@ def wrong(bundle: Bundle, rule: Rule, example: Example) -> str | None:
 
 
 def examples(bundle: Bundle) -> Iterator[tuple[str, Rule, Example]]:
-    """All examples of a bundle with names for people."""
+    """Yields all examples of a bundle with their names."""
     for rule in bundle.rules:
         for kind in ("good", "bad"):
             for number, example in enumerate(getattr(rule, kind), 1):
@@ -82,16 +82,16 @@ def main(arguments: list[str]) -> int:
     tried = failed = 0
     for path in map(Path, arguments):
         if not path.is_file():
-            print(f"{path}: there is no such script", file=sys.stderr)
+            print(f"{path}: script not found", file=sys.stderr)
             return 2
         bundles = load(path)
         if not bundles:
-            print(f"{path}: makes no qcbus.Bundle", file=sys.stderr)
+            print(f"{path}: no qcbus.Bundle found", file=sys.stderr)
             return 2
         for bundle in bundles:
             untried = [rule.id for rule in bundle.rules if not (rule.good or rule.bad)]
             for id in untried:
-                print(f"{id}: has no example: a rule that was never seen to find anything may find nothing")
+                print(f"{id}: no example: without one, nothing shows that the rule finds anything")
             for name, rule, example in examples(bundle):
                 tried += 1
                 why = wrong(bundle, rule, example)

@@ -21,7 +21,8 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let Ok(schema) = compile("fuzz", &[xsd]) else {
         return;
     };
-    let again = Schema::from_notation(&schema.to_notation()).expect("tables of our own");
+    let again = Schema::from_notation(&schema.to_notation()).expect("the notation of a compiled schema is \
+        readable");
     let found = schema.validate(&document, Limits::default());
     assert_eq!(found.total(), again.validate(&document, Limits::default()).total());
 });

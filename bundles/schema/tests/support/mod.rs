@@ -2,7 +2,7 @@
 
 #![expect(
     clippy::expect_used,
-    reason = "a test fails where its data is not as expected"
+    reason = "a test panics if its data is not as expected"
 )]
 
 use std::path::Path;
@@ -23,10 +23,10 @@ pub fn image(name: &str, text: &str) -> Vec<u8> {
 
 /// Opens the document of an image.
 pub fn open(image: &[u8]) -> Document<'_> {
-    Document::open(image).expect("an image of our own")
+    Document::open(image).expect("the image is valid")
 }
 
-#[allow(dead_code, reason = "not every test names tables")]
+#[allow(dead_code, reason = "not every test uses tables")]
 /// Returns the name of a shipped table's file.
 pub fn name_of(shipped: &Shipped) -> String {
     let kind = if shipped.kind == FileKind::Xodr {
@@ -37,25 +37,25 @@ pub fn name_of(shipped: &Shipped) -> String {
     format!("{kind}-{}", shipped.version)
 }
 
-#[allow(dead_code, reason = "not every test names tables")]
+#[allow(dead_code, reason = "not every test uses tables")]
 /// Returns a shipped table by name, e.g. `xodr-1.7`.
 pub fn table(name: &str) -> &'static Schema {
     let found = SHIPPED.iter().find(|one| name_of(one) == name);
     found
-        .expect("a shipped table")
+        .expect("the table is a shipped table")
         .schema()
-        .expect("a sound table")
+        .expect("the table is valid")
 }
 
 /// Compiles the text of one XSD.
-#[allow(dead_code, reason = "not every test compiles")]
+#[allow(dead_code, reason = "not every test compiles a schema")]
 pub fn compiled(text: &str) -> Result<Schema, String> {
     let image = image("test.xsd", text);
     qcbus_schema::compile("Test", &[open(&image)]).map_err(|error| error.to_string())
 }
 
 /// Returns the codes and texts of all violations of a document.
-#[allow(dead_code, reason = "not every test asks for texts")]
+#[allow(dead_code, reason = "not every test needs the texts")]
 pub fn violations(schema: &Schema, name: &str, text: &str) -> Vec<(&'static str, String)> {
     let image = image(name, text);
     let report = schema.validate(&open(&image), qcbus_schema::Limits::default());

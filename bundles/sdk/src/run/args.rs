@@ -148,10 +148,10 @@ mod tests {
         let Ok(Mode::Bus(options)) =
             of(&["--instance-dir", "/d", "--launch", "7", "--die-with-parent"])
         else {
-            panic!("the bus was meant")
+            panic!("expected the bus mode")
         };
         assert_eq!((options.launch, options.die_with_parent), (Some(7), true));
-        assert!(!options.no_sandbox, "confined unless told otherwise");
+        assert!(!options.no_sandbox, "sandboxed by default");
         let open = of(&["--no-sandbox"]);
         assert!(matches!(open, Ok(Mode::Bus(options)) if options.no_sandbox));
     }

@@ -55,7 +55,7 @@ impl Edit {
     fn parse(line: &str) -> Edit {
         let mut fields = line.split(" | ").map(str::trim);
         let (Some(selector), Some(action)) = (fields.next(), fields.next()) else {
-            panic!("no edit: {line}");
+            panic!("not an edit: {line}");
         };
         let mut edit = Edit {
             text: format!("{selector} | {action}"),
@@ -69,7 +69,7 @@ impl Edit {
             match field.split_once(": ") {
                 Some(("also", list)) => edit.companions = words(list),
                 Some(("only", list)) => edit.only = words(list),
-                _ => panic!("neither `also: …` nor `only: …`: {line}"),
+                _ => panic!("expected `also: …` or `only: …`: {line}"),
             }
         }
         edit

@@ -1,6 +1,6 @@
 //! Common helpers of the tests.
 
-#![allow(dead_code, reason = "every test file uses a part of it")]
+#![allow(dead_code, reason = "each test file uses a part of it")]
 
 use qcbus_formats::pool::{BundleOutcome, CheckerOutcome, Ending, PoolInput, Scope};
 use qcbus_formats::xqar::{

@@ -33,7 +33,10 @@ pub struct Command {
 /// Returns the commands that a runner executes in a report. Asserts that groups end, and that the
 /// number of annotations is allowed.
 pub fn run(report: &str) -> Vec<Command> {
-    assert!(!report.contains('\r'), "a runner ends lines there as well");
+    assert!(
+        !report.contains('\r'),
+        "a runner also ends lines at carriage returns"
+    );
     let commands: Vec<Command> = report.lines().filter_map(command).collect();
     let mut open = false;
     for command in &commands {
@@ -43,13 +46,16 @@ pub fn run(report: &str) -> Vec<Command> {
                 open = !open;
             }
             "error" | "warning" | "notice" => assert!(!open, "{command:?}"),
-            _ => panic!("nobody asked for {command:?}"),
+            _ => panic!("unexpected command {command:?}"),
         }
     }
-    assert!(!open, "a group has no end");
+    assert!(!open, "every group must end");
     for level in ["error", "warning", "notice"] {
         let count = commands.iter().filter(|it| it.name == level).count();
-        assert!(count <= MOST_ANNOTATIONS, "{count} of {level}");
+        assert!(
+            count <= MOST_ANNOTATIONS,
+            "{count} annotations of level {level}"
+        );
     }
     commands
 }

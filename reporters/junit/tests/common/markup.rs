@@ -31,12 +31,12 @@ impl Element {
 pub fn read(document: &str) -> Element {
     assert!(
         document.chars().all(is_legal),
-        "a character that XML has not"
+        "every character must be allowed in XML"
     );
     let declaration = r#"<?xml version="1.0" encoding="UTF-8"?>"#;
     let mut rest = document.strip_prefix(declaration).unwrap().trim_start();
     let root = element(&mut rest);
-    assert_eq!(rest, "\n", "one root, and a line feed");
+    assert_eq!(rest, "\n", "exactly one root, then a line feed");
     root
 }
 

@@ -80,9 +80,9 @@ pub fn assert_keeps_the_rules(text: &str) {
         let order = ["properties", "testcase", "system-out"];
         let places = suite.children.iter().map(|child| {
             let place = order.iter().position(|name| *name == child.name);
-            place.unwrap_or_else(|| panic!("a suite has no {}", child.name))
+            place.unwrap_or_else(|| panic!("unexpected element {} in a suite", child.name))
         });
-        assert!(places.is_sorted(), "{order:?} is the order");
+        assert!(places.is_sorted(), "the order must be {order:?}");
         let cases: Vec<&Element> = suite.named("testcase").collect();
         let counts = [cases.len(), with(&cases, "failure"), with(&cases, "error")];
         assert_eq!(counts, suite.numbers(["tests", "failures", "errors"]));

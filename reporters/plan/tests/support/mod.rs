@@ -1,11 +1,7 @@
 //! Maps made from text, and a decoder of their plans that is based only on `docs/html-report.md`.
 
-#![allow(dead_code, reason = "each test takes what it needs")]
-#![expect(
-    clippy::expect_used,
-    clippy::panic,
-    reason = "helpers of tests may fail a test"
-)]
+#![allow(dead_code, reason = "each test uses only a part of it")]
+#![expect(clippy::expect_used, clippy::panic, reason = "test helpers may panic")]
 
 use std::path::Path;
 
@@ -24,7 +20,7 @@ pub fn with_map<T>(elements: &str, test: impl FnOnce(&RoadMap<'_>) -> T) -> T {
 pub fn with_bytes<T>(bytes: Vec<u8>, test: impl FnOnce(&RoadMap<'_>) -> T) -> T {
     let prepared = prepare_bytes(Path::new("map.xodr"), bytes, &Limits::default());
     let image = prepared.build();
-    let document = Document::open(&image).expect("the image is sound");
+    let document = Document::open(&image).expect("the image is valid");
     test(&RoadMap::new(document))
 }
 
@@ -162,7 +158,10 @@ struct Reader<'b> {
 
 impl Reader<'_> {
     fn take<const N: usize>(&mut self) -> [u8; N] {
-        let (head, rest) = self.rest.split_first_chunk().expect("enough bytes");
+        let (head, rest) = self
+            .rest
+            .split_first_chunk()
+            .expect("enough bytes are left");
         self.rest = rest;
         *head
     }
@@ -173,7 +172,7 @@ impl Reader<'_> {
             let [byte] = self.take();
             value |= u64::from(byte & 0x7f) << shift;
             if byte < 0x80 {
-                assert!(value < 1 << 53, "{value} is beyond 53 bits");
+                assert!(value < 1 << 53, "{value} exceeds 53 bits");
                 return value;
             }
         }
@@ -202,7 +201,7 @@ impl Reader<'_> {
         let len = self.u() as usize;
         let (text, rest) = self.rest.split_at(len);
         self.rest = rest;
-        String::from_utf8(text.to_vec()).expect("a string is UTF-8")
+        String::from_utf8(text.to_vec()).expect("the string is valid UTF-8")
     }
 
     fn outline(&mut self) -> Vec<[i64; 2]> {
@@ -327,7 +326,7 @@ pub fn decode(bytes: &[u8]) -> Decoded {
     };
     assert!(
         reader.rest.is_empty(),
-        "{} bytes are left",
+        "no byte may be left, found {}",
         reader.rest.len()
     );
     decoded

@@ -52,7 +52,7 @@ fn queue_is_quiet_when_nothing_waits_or_is_checked() {
         files.set_stage(0, stage.clone());
         assert!(!files.is_quiet(), "{stage:?}");
         files.set_stage(1, stage.clone());
-        assert!(!files.is_quiet(), "two of {stage:?}");
+        assert!(!files.is_quiet(), "two files in {stage:?}");
         files.set_stage(0, Stage::Idle);
         files.set_stage(1, Stage::Idle);
         assert!(files.is_quiet(), "{stage:?}");
@@ -82,8 +82,15 @@ fn promoted_file_is_not_taken_at_its_former_place() {
     files.enqueue(0, Priority::Fresh, at(1));
     files.enqueue(1, Priority::Background, at(1));
     files.since_background = BACKGROUND_SHARE;
-    assert_eq!(files.dequeue(at(2)), Some(1), "the background has its turn");
-    assert!(files.background.is_empty(), "its former place is void");
+    assert_eq!(
+        files.dequeue(at(2)),
+        Some(1),
+        "a background file is taken next"
+    );
+    assert!(
+        files.background.is_empty(),
+        "the former queue entry is dropped"
+    );
     assert_eq!(files.dequeue(at(2)), Some(0));
 }
 

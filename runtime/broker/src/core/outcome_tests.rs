@@ -200,7 +200,7 @@ fn issue_weight_grows_with_each_text() {
     let mut more = place("", 0);
     let known = more.locations[0].places[0].clone();
     more.locations[0].places.push(known);
-    assert!(weight(&more) > empty, "a place costs something");
+    assert!(weight(&more) > empty, "each place adds weight");
 }
 
 #[test]

@@ -173,9 +173,15 @@ fn present_reporter_gets_withdrawal_at_once() {
     assert!(is_told(&actions), "{actions:?}");
     let named =
         |it: &Action| matches!(it, Action::Withdraw { reporters, .. } if reporters == &[TEXT]);
-    assert!(actions.iter().any(named), "the journal knows: {actions:?}");
+    assert!(
+        actions.iter().any(named),
+        "the journal records the withdrawal: {actions:?}"
+    );
     assert!(is_over(&requests.say(session, withdrawn())));
-    assert!(!is_over(&requests.say(session, withdrawn())), "only once");
+    assert!(
+        !is_over(&requests.say(session, withdrawn())),
+        "reported only once"
+    );
 }
 
 /// Checks that a report is withdrawn only after the journal has recorded it. If the broker were
@@ -200,7 +206,7 @@ fn withdrawal_is_sent_only_after_journal_entry() {
     let once = requests.event(Event::Withdrawn { path: path.clone() });
     assert!(
         !is_told(&once),
-        "the second time may still be lost: {once:?}"
+        "the second withdrawal is not in the journal yet: {once:?}"
     );
     assert!(is_told(&requests.event(Event::Withdrawn { path })));
     assert!(is_over(&requests.say(session, withdrawn())));
@@ -267,12 +273,18 @@ fn child_role_is_refused_without_launch_id() {
         let mut actions = actions.iter();
         actions.any(|it| matches!(it, Action::Refuse { .. }))
     };
-    assert!(is_refused(&requests.join().1), "it is just being started");
+    assert!(
+        is_refused(&requests.join().1),
+        "refused while the child is starting"
+    );
     let (session, actions) = requests.join_as(Some(launch.0));
     assert!(!is_refused(&actions), "{actions:?}");
     assert!(is_refused(&requests.join().1), "it runs");
     requests.event(Event::Gone { session });
-    assert!(is_refused(&requests.join().1), "it has died");
+    assert!(
+        is_refused(&requests.join().1),
+        "refused after the child has died"
+    );
 }
 
 #[test]
@@ -302,7 +314,11 @@ fn newer_result_waits_for_previous_acknowledgement() {
     Arc::make_mut(entry.judged.as_mut().unwrap()).job = JobId(8);
     let mut actions = Actions::default();
     requests.state.deliver_to_all(id, &mut actions);
-    assert_eq!(sent(&actions), [], "both would be read back side by side");
+    assert_eq!(
+        sent(&actions),
+        [],
+        "two results of one file must not be sent at the same time"
+    );
     let done = |job| FromPeer::ResultDone {
         job,
         report: PeerReport::Written,
@@ -339,17 +355,20 @@ fn an_upgraded_reporter_finishes(ends: fn(&mut Requests, SessionId, Launch) -> V
     let drained = |it: &Action| matches!(it, Action::Send { session, message: ToPeer::Drain } if *session == old);
     assert!(
         actions.iter().any(drained),
-        "it is not cut off: {actions:?}"
+        "the old process is drained: {actions:?}"
     );
     let cut = |it: &Action| matches!(it, Action::Disconnect { session } if *session == old);
     assert!(!actions.iter().any(cut), "{actions:?}");
     let given = |it: &Action| matches!(it, Action::Deliver { session, .. } if *session == new);
     assert!(
         !actions.iter().any(given),
-        "the older may still write the same report"
+        "the old process may still write the same report"
     );
     let actions = requests.event(exited(Launch(first.0 + 1)));
-    assert!(!actions.iter().any(given), "that was another: {actions:?}");
+    assert!(
+        !actions.iter().any(given),
+        "another process has ended: {actions:?}"
+    );
     let actions = ends(&mut requests, old, first);
     assert!(actions.iter().any(given), "{actions:?}");
 }
@@ -392,7 +411,11 @@ fn results_with_many_findings_are_sent_in_turn() {
     let mut requests = Requests::new(true);
     more(&mut requests, &[1_500, 500, 1, 3_000, 1]);
     let (session, actions) = requests.join();
-    assert_eq!(sent(&actions), [8, 9], "2,000 are the most under way");
+    assert_eq!(
+        sent(&actions),
+        [8, 9],
+        "at most 2,000 findings are in transit"
+    );
     assert_eq!(sent(&requests.say(session, written(8))), [10]);
     assert!(sent(&requests.say(session, written(9))).is_empty());
     assert_eq!(sent(&requests.say(session, written(10))), [11], "alone");
@@ -414,16 +437,24 @@ fn few_reporters_hold_large_result_at_once() {
         hello.name = name.to_owned();
         let actions = requests.event(Event::Hello { session, hello });
         sessions.push(session);
-        assert_eq!(sent(&actions), [7], "the small one reaches everybody");
+        assert_eq!(
+            sent(&actions),
+            [7],
+            "the small result is sent to every reporter"
+        );
         let next = requests.say(session, written(7));
         given.push(sent(&next) == [8]);
     }
     assert_eq!(given, [true, true, false, false]);
     let next = requests.say(sessions[0], written(8));
-    assert_eq!(sent(&next), [8], "the third has it when the first is done");
+    assert_eq!(
+        sent(&next),
+        [8],
+        "sent to the third reporter when the first is done"
+    );
     assert!(sent(&requests.event(Event::Tick)).is_empty());
     let next = requests.say(sessions[2], written(8));
-    assert_eq!(sent(&next), [8], "then the fourth");
+    assert_eq!(sent(&next), [8], "then sent to the fourth reporter");
 }
 
 #[test]
@@ -433,7 +464,11 @@ fn reporter_has_at_most_its_announced_pending_results() {
     requests.vanish();
     let (session, actions) = requests.join();
     assert!(is_told(&actions));
-    assert_eq!(sent(&actions), [8, 9, 10], "and what it is to take back");
+    assert_eq!(
+        sent(&actions),
+        [8, 9, 10],
+        "the results are sent in addition to the withdrawal"
+    );
     assert_eq!(sent(&requests.say(session, withdrawn())), [11]);
 }
 
@@ -467,7 +502,7 @@ fn not(mut report: FromPeer, why: &str) -> FromPeer {
     let (FromPeer::ResultDone { report: how, .. } | FromPeer::WithdrawalDone { report: how, .. }) =
         &mut report
     else {
-        panic!("{report:?} is no report");
+        panic!("expected a report, found {report:?}");
     };
     *how = PeerReport::Failed(why.to_owned());
     report
@@ -550,7 +585,11 @@ fn file_that_vanishes_twice_keeps_its_withdrawal() {
         let path = requests.path.clone();
         let stamp = Stamp::default();
         requests.event(Event::Settled { path, stamp });
-        assert_eq!(named(&requests.vanish()), [TEXT], "it has not yet done so");
+        assert_eq!(
+            named(&requests.vanish()),
+            [TEXT],
+            "the reporter has not withdrawn its report yet"
+        );
     }
 }
 
@@ -609,20 +648,20 @@ fn run_ends_only_after_every_report_is_written() {
     let path = requests.path.clone();
     requests.event(Event::Present { path });
     let (session, _) = requests.join();
-    assert!(!requests.state.all_delivered(), "a result is under way");
+    assert!(!requests.state.all_delivered(), "a result is pending");
     requests.say(session, written(7));
     assert!(requests.state.all_delivered());
     requests.vanish();
     assert!(
         !requests.state.all_delivered(),
-        "a report is to be taken back"
+        "a report must still be withdrawn"
     );
     requests.say(session, withdrawn());
     assert!(requests.state.all_delivered());
     requests.state.reporters[0].queue.push_back(0);
-    assert!(!requests.state.all_delivered(), "a result waits");
+    assert!(!requests.state.all_delivered(), "a result is waiting");
     requests.say(session, FromPeer::Leaving);
-    assert!(requests.state.all_delivered(), "nobody is there");
+    assert!(requests.state.all_delivered(), "no reporter is connected");
 }
 
 #[test]
@@ -631,7 +670,10 @@ fn reporter_of_ended_process_is_missing_at_once() {
     let launch = requests.wants(1);
     requests.join_as(Some(launch.0));
     requests.event(exited(Launch(launch.0 + 1)));
-    assert!(requests.state.reporters[0].session.is_some(), "another one");
+    assert!(
+        requests.state.reporters[0].session.is_some(),
+        "another process has ended"
+    );
     let actions = requests.event(exited(launch));
     assert!(requests.state.reporters[0].session.is_none());
     let said =
@@ -659,7 +701,7 @@ fn failed_report_is_retried_after_pause_then_the_rest() {
         .handle(after - Duration::from_millis(1), Event::Tick);
     assert!(sent(&early).is_empty(), "{early:?}");
     let mut given = sent(&requests.state.handle(after, Event::Tick));
-    assert_eq!(given.len(), 4, "as many as it takes at once");
+    assert_eq!(given.len(), 4, "as many as the reporter accepts at once");
     let mut all = 0;
     while let Some(job) = given.pop() {
         all += 1;
@@ -707,10 +749,10 @@ fn client_is_answered_when_all_reports_are_written() {
     requests.makes_it_stand();
     let launch = requests.wants(1);
     let actions = waits(&mut requests, None);
-    assert_eq!(answer(&actions), None, "the reporter is still to come");
+    assert_eq!(answer(&actions), None, "the reporter has not joined yet");
     let (session, _) = requests.join_as(Some(launch.0));
     let failed = requests.say(session, not(written(7), "no room"));
-    assert_eq!(answer(&failed), None, "it is tried again");
+    assert_eq!(answer(&failed), None, "the report is retried");
     let after = Duration::from_secs(1) + requests.state.settings.retry_after;
     assert_eq!(sent(&requests.state.handle(after, Event::Tick)), [7]);
     let done = requests.say(session, written(7));

@@ -121,13 +121,16 @@ mod tests {
         let probes = retries.probes(seconds(1));
         assert_eq!(probes.len(), PROBES);
         for file in &probes {
-            assert!(!retries.failed(*file, seconds(1), FIRST), "not said again");
+            assert!(
+                !retries.failed(*file, seconds(1), FIRST),
+                "reported only once"
+            );
         }
         let others = retries.probes(seconds(3));
         assert!(others.iter().all(|file| !probes.contains(file)));
         let rest = retries.written(others[0]);
         assert_eq!(rest.len(), 100 - PROBES);
-        assert_eq!(retries.len(), PROBES - 1, "the others that are being tried");
+        assert_eq!(retries.len(), PROBES - 1, "the other probes remain");
     }
 
     #[test]

@@ -215,7 +215,7 @@ proptest! {
             let id = world.state.files.id(&path_of(*file)).unwrap();
             let judged = world.state.files.get(id).unwrap().judged.clone().unwrap();
             prop_assert_eq!(named(&judged.required_set), world.expected_set());
-            prop_assert_eq!(&world.journal[file], &*judged, "the journal knows the same");
+            prop_assert_eq!(&world.journal[file], &*judged, "the journal has the same verdict");
             prop_assert_eq!(judged.verdict, world.verdict_with_all(*file, judged.own));
             // When all bundles are present, only a file that kills bundles may prevent a verdict.
             let why = &world.failures[file];
@@ -259,7 +259,10 @@ impl World {
         };
         let accepted: Vec<u8> = self.judged.iter().filter_map(accepted).collect();
         let published: Vec<u8> = self.gate.keys().copied().collect();
-        assert_eq!(published, accepted, "behind the gate lies what is accepted");
+        assert_eq!(
+            published, accepted,
+            "exactly the accepted files are published"
+        );
         let newest: BTreeMap<u8, JobId> = self
             .journal
             .iter()
@@ -267,20 +270,29 @@ impl World {
             .collect();
         assert_eq!(
             self.requests.reports, newest,
-            "the reporter has every result"
+            "the reporter has every newest result"
         );
-        assert_eq!(self.requests.delivered, newest, "and the journal knows");
+        assert_eq!(
+            self.requests.delivered, newest,
+            "the journal records every delivery"
+        );
         assert_eq!(self.requests.voids, BTreeSet::new());
         let judged = self.judged.keys();
         let needed: BTreeSet<u8> = judged
             .flat_map(|file| dependencies_of(*file).iter().copied())
             .collect();
-        assert_eq!(self.watched, needed, "what verdicts depend on is watched");
+        assert_eq!(
+            self.watched, needed,
+            "every dependency of a verdict is watched"
+        );
         let members = self.members.iter();
         let members: BTreeMap<String, Option<u8>> = members
             .map(|(name, it)| (name.clone(), it.version.parse().ok()))
             .collect();
-        assert_eq!(members, self.demanded, "who must judge is in the journal");
+        assert_eq!(
+            members, self.demanded,
+            "the required bundles are in the journal"
+        );
     }
 }
 
@@ -333,7 +345,7 @@ fn file_that_kills_bundle_twice_alone_is_not_retried() {
         world.store(0, true);
         world.pass(Duration::from_millis(10));
         rounds += 1;
-        assert!(rounds < 100, "a poison pair must end");
+        assert!(rounds < 100, "the attempts with a deadly file must end");
     }
     // It dies once together with other jobs (this does not count), then twice alone in a fresh
     // process.
@@ -368,7 +380,7 @@ fn killed_bundle_stays_required_until_absence_limit() {
     world.prepare(0, true);
     world.kill(0);
     world.store(0, true);
-    assert!(world.judged.is_empty(), "its job waits for it");
+    assert!(world.judged.is_empty(), "the job waits for the bundle");
     world.pass(world.state.settings.absence_limit);
     world.store(0, true);
     assert_eq!(world.judged[&1].1, Verdict::Undetermined);
@@ -419,7 +431,7 @@ fn world_with_an_unwanted_bundle() -> (World, SessionId) {
     let drained = actions.iter().any(|action| {
         matches!(action, Action::Send { session: to, message: ToPeer::Drain } if *to == session)
     });
-    assert!(drained, "nobody wants it: {actions:?}");
+    assert!(drained, "an unwanted bundle is drained: {actions:?}");
     world.say(
         session,
         FromPeer::Catalogue(Box::new(catalogue("LeftOver"))),
@@ -512,7 +524,7 @@ fn jobs_wait_while_findings_exceed_memory_limit() {
     world.answer(2);
     assert!(held(&world) > world.state.settings.max_findings_bytes);
     let given: usize = world.peers.values().map(|bundle| bundle.jobs.len()).sum();
-    assert_eq!(given, 0, "the others wait");
+    assert_eq!(given, 0, "the other jobs wait");
     world.settle();
     assert_eq!(world.judged.len(), 4);
 }

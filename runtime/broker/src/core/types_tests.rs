@@ -45,7 +45,10 @@ fn touched_stamp_differs_in_ctime_only() {
         ..stamp
     };
     assert!(touched.differs_in_ctime_only(&stamp));
-    assert!(!stamp.differs_in_ctime_only(&stamp), "nothing differs");
+    assert!(
+        !stamp.differs_in_ctime_only(&stamp),
+        "equal stamps do not differ"
+    );
     for other in [
         Stamp { size: 9, ..touched },
         Stamp {

@@ -564,7 +564,11 @@ mod tests {
         let start = clock.last;
         let at = |millis| start + Duration::from_millis(millis);
         assert_eq!(clock.now(at(50)), Duration::from_millis(50));
-        assert_eq!(clock.now(at(40)), Duration::from_millis(50), "never back");
+        assert_eq!(
+            clock.now(at(40)),
+            Duration::from_millis(50),
+            "time never goes back"
+        );
         assert_eq!(clock.now(at(30_050)), Duration::from_millis(1050));
         assert_eq!(clock.now(at(30_150)), Duration::from_millis(1150));
     }

@@ -149,7 +149,11 @@ fn file_is_published_with_dependencies_and_removed_before_them() {
     let bench = Bench::new(Outside::Name);
     bench.accept("t.xosc");
     bench.accept("s.xosc");
-    assert_eq!(bench.behind(), names(&[]), "they wait for their maps");
+    assert_eq!(
+        bench.behind(),
+        names(&[]),
+        "the scenarios wait for their maps"
+    );
     bench.accept("a.xodr");
     assert_eq!(bench.behind(), names(&["a.xodr", "part.xml", "s.xosc"]));
     bench.accept("b.xodr");
@@ -167,7 +171,11 @@ fn file_is_published_with_dependencies_and_removed_before_them() {
     bench.refuse("a.xodr");
     assert_eq!(bench.said(), [""; 0], "said once");
     bench.gate.revoke(&bench.path("b.xodr")).unwrap();
-    assert_eq!(bench.behind(), names(&[]), "nobody needs the fragment");
+    assert_eq!(
+        bench.behind(),
+        names(&[]),
+        "the fragment is no longer needed"
+    );
     // The same bytes are accepted again.
     bench.accept("a.xodr");
     bench.accept("b.xodr");
@@ -228,7 +236,7 @@ fn input_outside_gate_root_is_named_or_refused() {
         assert_eq!(
             bench.gate.outside(&judged.inputs).len(),
             0,
-            "it is not available"
+            "the input is not available"
         );
         let map = bench.dir.path().join("map.xodr");
         std::fs::write(&map, "map").unwrap();
@@ -334,13 +342,16 @@ fn gate_file_is_restored_only_in_own_directory() {
     std::fs::remove_file(&file).unwrap();
     bench.accept("b.xodr");
     assert_eq!(bench.behind(), names(&["a.xodr", "b.xodr", "part.xml"]));
-    assert!(file.exists(), "whoever writes there puts it back, too");
+    assert!(file.exists(), "a publication also restores the file");
 
     std::fs::rename(directory, bench.dir.path().join("aside")).unwrap();
     std::fs::create_dir(directory).unwrap();
     std::fs::write(directory.join("precious"), "").unwrap();
     bench.gate.keep_its_file();
-    assert!(!file.exists(), "a directory of others is not ours to have");
+    assert!(
+        !file.exists(),
+        "a directory of another owner is left unchanged"
+    );
 }
 
 /// An operation on a file.

@@ -88,7 +88,11 @@ async fn scenarios_share_map_image_while_bytes_are_unchanged() {
     let (a, b) = (farm.map_of("a.xosc"), farm.map_of("b.xosc"));
     assert_eq!((a.doc, a.digest), (b.doc, b.digest));
     farm.put("town.xodr", MAP);
-    assert_eq!(farm.map_of("a.xosc").doc, a.doc, "written again as it was");
+    assert_eq!(
+        farm.map_of("a.xosc").doc,
+        a.doc,
+        "the same bytes were written again"
+    );
 }
 
 #[tokio::test]
@@ -145,7 +149,7 @@ async fn equal_maps_at_two_paths_are_two_documents() {
     assert_eq!(a.digest, b.digest);
     assert_ne!(
         a.doc, b.doc,
-        "what is found in one is not found in the other"
+        "equal bytes in different files are different documents"
     );
     assert!(a.path.ends_with("one.xodr") && b.path.ends_with("two.xodr"));
 }
@@ -163,7 +167,10 @@ async fn map_with_changed_include_is_new_document() {
     assert_eq!(farm.map_of("a.xosc").doc, before.doc);
     farm.put("part.xml", b"<OpenDRIVE><road id=\"2\"/></OpenDRIVE>");
     let after = farm.map_of("a.xosc");
-    assert_eq!(after.digest, before.digest, "of the map's own bytes");
+    assert_eq!(
+        after.digest, before.digest,
+        "the digest covers only the map's own bytes"
+    );
     assert_ne!(after.doc, before.doc);
 }
 
@@ -178,8 +185,12 @@ async fn young_map_is_read_again_for_later_requests() {
     let first = farm.begun("town.xodr");
     assert!(first >= asked);
     let prepared = farm.prepare("a.xosc", asked);
-    assert_eq!(farm.begun("town.xodr"), first, "asked for before");
-    assert!(prepared.racy, "and as young as it was");
+    assert_eq!(
+        farm.begun("town.xodr"),
+        first,
+        "not read again, because the request is older"
+    );
+    assert!(prepared.racy, "the reading is still too recent");
     farm.prepare("a.xosc", Instant::now());
     assert!(farm.begun("town.xodr") > first);
 }
@@ -231,7 +242,11 @@ async fn cached_documents_make_room_for_needed_ones() {
         farm.map_of(&scenario);
     }
     let last = farm.map_of("39.xosc").doc;
-    assert_eq!(farm.map_of("39.xosc").doc, last, "the newest is kept");
+    assert_eq!(
+        farm.map_of("39.xosc").doc,
+        last,
+        "the newest document is cached"
+    );
 }
 
 const LIBRARY: &[u8] = b"<OpenSCENARIO><ManeuverGroup name=\"G\"/></OpenSCENARIO>";
@@ -263,7 +278,7 @@ async fn modular_scenario_includes_library_and_expansion() {
     assert_eq!(whys.collect::<Vec<_>>(), [Scenario, Expanded]);
     assert!(
         depends_on(&prepared, &farm.path("library.xosc")),
-        "it is awaited"
+        "the missing library is a dependency"
     );
 
     farm.put("library.xosc", LIBRARY);
@@ -284,7 +299,7 @@ async fn modular_scenario_includes_library_and_expansion() {
     farm.put("main.mosc", &archive);
     let prepared = farm.prepare("main.mosc", Instant::now());
     assert_eq!(roles(&prepared), [Root, Listing, Scenario, Expanded]);
-    assert_eq!(prepared.inputs.len(), 1, "all of it lies in the archive");
+    assert_eq!(prepared.inputs.len(), 1, "the archive contains all files");
 }
 
 #[tokio::test]

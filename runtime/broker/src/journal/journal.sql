@@ -1,47 +1,47 @@
--- The journal of one qcbus state directory. Safe to read with `sqlite3` while the broker runs.
--- A path that is no UTF-8 is written as `bytes:` and the path with its strange bytes as %XX.
+-- Journal of one qcbus state directory. `sqlite3` can read it safely while the broker runs.
+-- A path that is not UTF-8 is stored as `bytes:` and the path with its invalid bytes as %XX.
 -- Digests are SHA-256 in hexadecimal, times are milliseconds since 1970 (UTC).
 
--- One row per file with a verdict: what the broker remembers over a restart.
+-- One row per file with a verdict. The broker reads it after a restart.
 CREATE TABLE IF NOT EXISTS files (
     path     TEXT PRIMARY KEY,      -- absolute
-    job      INTEGER NOT NULL,      -- the job that gave the verdict: a number that never comes back (`Settings::numbers`)
+    job      INTEGER NOT NULL,      -- the job that gave the verdict; numbers are never reused (`Settings::numbers`)
     verdict  TEXT NOT NULL,         -- accepted, rejected, undetermined
     digest   TEXT NOT NULL,         -- of the file's bytes
-    basis    TEXT NOT NULL,         -- digest over everything that the verdict depends on
+    basis    TEXT NOT NULL,         -- digest of everything that the verdict depends on
     config   TEXT NOT NULL,         -- digest of the configuration
     required_set TEXT NOT NULL,     -- JSON list of [bundle, version digest]; null: the bundle was missing
     errors   INTEGER NOT NULL,
     warnings INTEGER NOT NULL,
     information INTEGER NOT NULL,
     why      TEXT NOT NULL,         -- JSON list: for undetermined, the checkers that failed
-    xqar     TEXT NOT NULL,         -- where the result lies; empty: it could not be written anywhere
-    inputs   TEXT NOT NULL,         -- JSON list of [path, [size, mtime_ns, inode, digest, ctime_ns]]; null: absent, digest null: not readable
-    racy     INTEGER NOT NULL,      -- 1: read so soon after a write that the stamps prove nothing
+    xqar     TEXT NOT NULL,         -- path of the result; empty: it could not be written
+    inputs   TEXT NOT NULL,         -- JSON list of [path, [size, mtime_ns, inode, digest, ctime_ns]]; null: missing, digest null: not readable
+    racy     INTEGER NOT NULL,      -- 1: read so soon after a write that the stamps are not reliable
     at       INTEGER NOT NULL,
-    epoch    INTEGER NOT NULL DEFAULT 0, -- of who had to judge
-    written  TEXT NOT NULL DEFAULT '',   -- size, mtime_ns, inode of the verdict file as it was written
-    own      TEXT NOT NULL DEFAULT '',   -- the verdict without the files that it rests on
+    epoch    INTEGER NOT NULL DEFAULT 0, -- epoch of the required set
+    written  TEXT NOT NULL DEFAULT '',   -- size, mtime_ns, inode of the verdict file after its write
+    own      TEXT NOT NULL DEFAULT '',   -- the verdict without the files that it depends on
     own_errors INTEGER NOT NULL DEFAULT 0, -- errors without the findings about those files
-    rests_on TEXT NOT NULL DEFAULT ''    -- JSON list of [path, digest, verdict or null, errors]; empty: not known
+    rests_on TEXT NOT NULL DEFAULT ''    -- JSON list of [path, digest, verdict or null, errors]; empty: unknown
 ) WITHOUT ROWID;
 
--- The registry: the bundles that must judge until they are removed, whether they are running or not.
+-- The registry of required bundles. They are required until they are removed, whether they run or not.
 CREATE TABLE IF NOT EXISTS members (
     name      TEXT PRIMARY KEY,
-    version   TEXT NOT NULL,        -- that joined last
-    origin    TEXT NOT NULL,        -- supervised: by manifest, or it comes with qcbus; joined: by hand
-    catalogue TEXT NOT NULL,        -- JSON: what it offered then
+    version   TEXT NOT NULL,        -- version of the last registration
+    origin    TEXT NOT NULL,        -- supervised: with a manifest or part of qcbus; joined: by hand
+    catalogue TEXT NOT NULL,        -- JSON: its catalogue at that time
     at        INTEGER NOT NULL
 ) WITHOUT ROWID;
 
--- Where the result lay of a file that has gone, while a reporter has not yet taken back its report.
+-- Paths of the results of removed files, until all reporters have withdrawn their reports.
 CREATE TABLE IF NOT EXISTS gone (
     path     TEXT PRIMARY KEY,
     xqar     TEXT NOT NULL
 ) WITHOUT ROWID;
 
--- Every job that gave a verdict, for statistics; pruned after the retention time.
+-- Every job that gave a verdict, for statistics. Rows are deleted after the retention time.
 CREATE TABLE IF NOT EXISTS jobs (
     job      INTEGER PRIMARY KEY,
     path     TEXT NOT NULL,
@@ -58,17 +58,17 @@ CREATE TABLE IF NOT EXISTS jobs (
 CREATE INDEX IF NOT EXISTS jobs_by_path ON jobs (path, at);
 CREATE INDEX IF NOT EXISTS jobs_by_time ON jobs (at);
 
--- What each bundle did in a job.
+-- The part of each bundle in a job.
 CREATE TABLE IF NOT EXISTS job_bundles (
     job      INTEGER NOT NULL REFERENCES jobs (job) ON DELETE CASCADE,
     bundle   TEXT NOT NULL,
     version  TEXT NOT NULL,
-    micros   INTEGER NOT NULL,      -- time spent checking, as the bundle says
-    failure  TEXT NOT NULL,         -- empty: it did its work
+    micros   INTEGER NOT NULL,      -- time of the check as the bundle reports it
+    failure  TEXT NOT NULL,         -- empty: no failure
     PRIMARY KEY (job, bundle)
 ) WITHOUT ROWID;
 
--- Checkers with findings, or that failed.
+-- Checkers that have findings or failed.
 CREATE TABLE IF NOT EXISTS job_findings (
     job      INTEGER NOT NULL REFERENCES jobs (job) ON DELETE CASCADE,
     bundle   TEXT NOT NULL,
@@ -78,8 +78,8 @@ CREATE TABLE IF NOT EXISTS job_findings (
     PRIMARY KEY (job, bundle, checker)
 ) WITHOUT ROWID;
 
--- The checkers that were skipped, as a list of which there is one for all jobs that skip the same: most
--- files of one version do, and it is a hundred checkers.
+-- The skipped checkers as a list. Jobs that skip the same checkers share one list, as most files of one
+-- version do. It has about a hundred checkers.
 CREATE TABLE IF NOT EXISTS job_skipped (
     job      INTEGER NOT NULL REFERENCES jobs (job) ON DELETE CASCADE,
     bundle   TEXT NOT NULL,
@@ -88,22 +88,22 @@ CREATE TABLE IF NOT EXISTS job_skipped (
 ) WITHOUT ROWID;
 
 CREATE TABLE IF NOT EXISTS checker_lists (
-    list     INTEGER PRIMARY KEY,   -- the first eight bytes of the digest of what is in it
+    list     INTEGER PRIMARY KEY,   -- the first eight bytes of the digest of its content
     checkers TEXT NOT NULL          -- JSON list of checkers
 );
 
--- Checkers with findings, or that did not complete.
+-- Checkers that have findings or did not complete.
 CREATE VIEW IF NOT EXISTS job_checkers AS
     SELECT job, bundle, checker, status, issues FROM job_findings
     UNION ALL
     SELECT job, bundle, value AS checker, 'skipped' AS status, 0 AS issues
     FROM job_skipped JOIN checker_lists USING (list), json_each(checkers);
 
--- What each reporter has said of a file.
+-- The acknowledged reports of each reporter.
 CREATE TABLE IF NOT EXISTS deliveries (
     path     TEXT NOT NULL,
     reporter TEXT NOT NULL,
-    job      INTEGER,               -- whose result it has acknowledged; null: the file has gone, and the
-                                    -- reporter has not yet taken back its report about it
+    job      INTEGER,               -- the job of the acknowledged result; null: the file is removed, and the
+                                    -- reporter has not yet withdrawn its report
     PRIMARY KEY (path, reporter)
 ) WITHOUT ROWID;

@@ -254,7 +254,11 @@ mod tests {
         assert!(!place.outputs.is_lost(&output));
         let other = place.write("b.xqar");
         std::fs::remove_file(&other).unwrap();
-        assert_eq!(place.next(), other, "nothing was told of the first one");
+        assert_eq!(
+            place.next(),
+            other,
+            "the loss of the first output is not reported"
+        );
     }
 
     #[test]

@@ -157,7 +157,7 @@ fn child_with_replaced_program_counts_as_changed() {
     assert_ne!(
         sources.fingerprint(&missing.read),
         missing.read,
-        "it has come"
+        "the program exists now"
     );
     let old = sources.load().unwrap();
     assert_eq!(sources.fingerprint(&old.read), old.read);
@@ -171,7 +171,7 @@ fn child_with_replaced_program_counts_as_changed() {
     assert_ne!(digest(&old), digest(&new));
     assert_eq!(
         old.children[0], new.children[0],
-        "those that come with qcbus"
+        "the bundles of qcbus itself are unchanged"
     );
 }
 
@@ -188,13 +188,13 @@ fn missing_manifest_directory_removes_no_bundle() {
     std::fs::rename(&bundles_d, &aside).unwrap();
     assert!(still_has().is_err(), "gone");
     std::fs::create_dir(&bundles_d).unwrap();
-    assert!(still_has().is_err(), "an empty one in its place");
+    assert!(still_has().is_err(), "an empty directory in its place");
     std::fs::write(bundles_d.join("b.json"), &mine).unwrap();
-    assert_eq!(still_has(), Ok(()), "somebody has put another there");
+    assert_eq!(still_has(), Ok(()), "another manifest in its place");
     std::fs::remove_dir_all(&bundles_d).unwrap();
     std::fs::rename(&aside, &bundles_d).unwrap();
     std::fs::remove_file(bundles_d.join("a.json")).unwrap();
-    assert_eq!(still_has(), Ok(()), "somebody has taken it out");
+    assert_eq!(still_has(), Ok(()), "a manifest was removed on purpose");
 }
 
 #[test]

@@ -218,7 +218,7 @@ impl Disk {
         };
         let flags = rustix::fs::AtFlags::empty();
         rustix::fs::utimensat(rustix::fs::CWD, path, &times, flags)
-            .expect("a file of the simulation takes a time");
+            .expect("the times of the file can be set");
     }
 
     /// Returns the simulated modification time of an existing file.
@@ -245,21 +245,21 @@ impl Disk {
         let before = self.modified(&path);
         let parent = path
             .parent()
-            .expect("a file lies in a directory")
+            .expect("the file has a parent directory")
             .to_path_buf();
         if !parent.exists() {
-            fs::create_dir_all(&parent).expect("a directory is made");
+            fs::create_dir_all(&parent).expect("the directory can be created");
             self.sub_is_away = false;
         }
         if how == How::Renamed {
             let aside = self.root.with_extension("aside");
-            fs::write(&aside, &bytes).expect("a file is written aside");
+            fs::write(&aside, &bytes).expect("the temporary file can be written");
             self.mark_times(&aside, wall, None);
-            fs::rename(&aside, &path).expect("a file is renamed");
+            fs::rename(&aside, &path).expect("the file can be renamed");
             return self.lies(file, step, Some(digest));
         }
-        let mut open = File::create(&path).expect("a file is made");
-        open.write_all(&bytes).expect("a file is written");
+        let mut open = File::create(&path).expect("the file can be created");
+        open.write_all(&bytes).expect("the file can be written");
         if how == How::Torn {
             self.open.push(open);
         }
@@ -272,8 +272,8 @@ impl Disk {
         let path = self.path(file);
         let before = self.modified(&path).filter(|_| how == How::Touched);
         if how == How::Again {
-            let bytes = fs::read(&path).expect("a file is read");
-            fs::write(&path, bytes).expect("a file is written");
+            let bytes = fs::read(&path).expect("the file can be read");
+            fs::write(&path, bytes).expect("the file can be written");
         }
         self.mark_times(&path, wall, before);
     }
@@ -293,7 +293,7 @@ impl Disk {
             return;
         };
         let modified = self.modified(&old);
-        fs::rename(&old, &new).expect("a file is renamed");
+        fs::rename(&old, &new).expect("the file can be renamed");
         self.mark_times(&new, wall, modified);
         self.lies(from, step, None);
         // Both changes happen in the same step.
@@ -305,13 +305,13 @@ impl Disk {
         let (here, away) = (self.root.join("sub"), self.root.with_extension("away"));
         let file = 4;
         if self.sub_is_away && !here.exists() {
-            fs::rename(&away, &here).expect("a directory is moved");
+            fs::rename(&away, &here).expect("the directory can be moved");
             self.sub_is_away = false;
             let bytes = fs::read(self.path(file)).ok();
             self.lies(file, step, bytes.map(|it| digest_of(&it)));
         } else if here.exists() {
             let _ = fs::remove_dir_all(&away);
-            fs::rename(&here, &away).expect("a directory is moved");
+            fs::rename(&here, &away).expect("the directory can be moved");
             self.sub_is_away = true;
             self.lies(file, step, None);
         }

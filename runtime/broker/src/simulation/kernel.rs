@@ -121,7 +121,7 @@ impl Telling {
     pub fn hear(&mut self) {
         let Some(kernel) = &self.kernel else { return };
         self.waiting
-            .extend(kernel.events().expect("the kernel tells"));
+            .extend(kernel.events().expect("the kernel reports events"));
     }
 
     /// Drops the events about the latest changes: only the first `of` events stay.

@@ -56,7 +56,7 @@ pub fn play(stage: &Stage, seed: u64, verbose: bool) -> Result<(Figures, Vec<Str
     let dir = stage.dir.join(format!("{seed}"));
     let root = dir.join("farm");
     for made in [root.join("sub"), dir.join("i")] {
-        std::fs::create_dir_all(made).expect("a directory is made");
+        std::fs::create_dir_all(made).expect("the directory can be created");
     }
     let mut world = World::new(seed, root, dir.join("out"), dir.join("gate"));
     world.verbose = verbose;

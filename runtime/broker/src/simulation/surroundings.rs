@@ -18,7 +18,7 @@ use crate::supervise::{self, Surroundings};
 
 fn simulation() -> Arc<Simulation> {
     here()
-        .expect("a broker is started in tests by a simulation")
+        .expect("in tests, a simulation starts the broker")
         .simulation
 }
 

@@ -90,10 +90,13 @@ fn all_parts_agree_after_any_event_order() {
         }
     }
     println!("{count} schedules in {took:.1?}: {sum:?}");
-    assert!(sum.stored as u64 > count, "too little was stored: {sum:?}");
+    assert!(
+        sum.stored as u64 > count,
+        "too few results were stored: {sum:?}"
+    );
     assert!(
         sum.kills > count / 2,
-        "hardly any broker was killed: {sum:?}"
+        "too few brokers were killed: {sum:?}"
     );
 }
 
@@ -146,7 +149,7 @@ fn seed_gives_same_schedule_every_time() {
             let (one, other) = (once.1.get(at), again.1.get(at));
             assert!(
                 differs.is_none(),
-                "seed {seed}, line {at}: {one:?} is {other:?}"
+                "seed {seed}, line {at}: {one:?} differs from {other:?}"
             );
         }
     });

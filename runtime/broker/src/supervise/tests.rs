@@ -34,7 +34,7 @@ fn spec(command: &[&str]) -> ChildSpec {
 async fn end(inbox: &mut UnboundedReceiver<Event>) -> (Launch, ChildEnd) {
     let watchdog = Duration::from_secs(60);
     let event = tokio::time::timeout(watchdog, inbox.recv()).await;
-    match event.expect("the watchdog: no child has ended") {
+    match event.expect("watchdog timeout: no child has ended") {
         Some(Event::Exited { launch, end }) => (launch, end),
         other => panic!("{other:?}"),
     }
@@ -75,7 +75,7 @@ async fn child_that_ends_at_once_still_counts_as_own() {
     let spec = spec(&["sh", "-c", "exit 3", "sh"]);
     children.start_early(std::slice::from_ref(&spec));
     let [pid] = pids_of(&children)[..] else {
-        panic!("one child was started");
+        panic!("exactly one child must be started");
     };
     let launch = Launch::first_of(2).next(&spec);
     assert_eq!(children.ours(), BTreeMap::from([(launch, Some(pid))]));
@@ -118,7 +118,7 @@ async fn early_started_process_is_used_when_requested() {
     let launch = Launch::first_of(2).next(&spec);
     children.spawn(launch, &spec);
     let own = children.own[&launch].process.clone().unwrap();
-    assert_eq!(early, [own.id()], "one process");
+    assert_eq!(early, [own.id()], "only one process is started");
     assert!(children.early.is_empty());
     children.kill(launch);
     assert_eq!(end(&mut inbox).await.0, launch);
@@ -154,7 +154,7 @@ async fn unused_early_started_process_is_ended() {
     let spec = spec(&["sh", "-c", "exec sleep 1000", "sh"]);
     children.start_early(std::slice::from_ref(&spec));
     let [unasked] = pids_of(&children)[..] else {
-        panic!("one is started");
+        panic!("exactly one child must be started");
     };
     drop(children);
     is_gone(unasked).await;

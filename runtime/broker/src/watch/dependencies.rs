@@ -229,15 +229,18 @@ mod tests {
         assert!(events_tell(&root.join("to_come.xodr")));
         assert!(
             !events_tell(&root),
-            "a catalog directory is known by its names"
+            "events do not report the contents of a catalog directory"
         );
         symlink(outside.join("map.xodr"), root.join("map.xodr")).unwrap();
         assert!(
             !events_tell(&root.join("map.xodr")),
-            "it is written elsewhere"
+            "events do not report a change through a symbolic link"
         );
         std::fs::hard_link(root.join("view.xml"), outside.join("view.xml")).unwrap();
-        assert!(!events_tell(&root.join("view.xml")), "it has another name");
+        assert!(
+            !events_tell(&root.join("view.xml")),
+            "events do not report a change under another hard link"
+        );
     }
 
     #[test]

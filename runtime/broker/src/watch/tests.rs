@@ -84,7 +84,7 @@ fn every_change_of_a_linked_file_is_noticed() {
     let gone = ["unseen a.xodr", "vanished a.xodr"];
     assert_eq!(then(&mut scanner), gone, "dangling");
     scanner.scan_all(false);
-    assert!(then(&mut scanner).is_empty(), "it has been said");
+    assert!(then(&mut scanner).is_empty(), "reported once");
     std::fs::write(outside.join("other"), "back").unwrap();
     let back = ["seen again a.xodr", "settled a.xodr"];
     assert_eq!(then(&mut scanner), back, "back again");
@@ -231,7 +231,7 @@ fn file_missed_by_the_broker_is_reported_again() {
     scanner.scan_all(false);
     assert!(
         words(&root, &told).is_empty(),
-        "it is known that it has gone"
+        "the removal is already known"
     );
 }
 

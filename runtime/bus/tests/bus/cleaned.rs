@@ -81,7 +81,7 @@ fn removed_runtime_directory_is_created_again() {
         // The lock keeps a second broker out, as before.
         let second = Host::start(&site.instance, HostOptions::default());
         let Err(StartError::AlreadyRunning { pid, .. }) = second else {
-            panic!("two brokers on one instance");
+            panic!("a second broker must be refused");
         };
         assert_eq!(pid, Some(std::process::id()));
         host.set_config(Digest([1; 32]), b"x");

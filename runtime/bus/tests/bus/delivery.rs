@@ -169,7 +169,10 @@ fn flooding_peer_does_not_starve_other_peers() {
                 event = polite.next() => panic!("{event:?}"),
             }
         }
-        assert!(flood < 100_000, "the polite peer waited for {flood} others");
+        assert!(
+            flood < 100_000,
+            "the polite peer waited for {flood} messages of another peer"
+        );
     });
 }
 
@@ -380,7 +383,7 @@ fn second_broker_is_refused_and_names_the_first() {
         let _host = site.host();
         let second = Host::start(&site.instance, HostOptions::default());
         let Err(StartError::AlreadyRunning { pid, .. }) = second else {
-            panic!("two brokers on one instance");
+            panic!("a second broker must be refused");
         };
         assert_eq!(pid, Some(std::process::id()));
         assert_eq!(site.instance.broker_pid(), Some(std::process::id()));

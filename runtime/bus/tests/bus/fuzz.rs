@@ -324,7 +324,8 @@ impl Table {
                         there = true;
                     }
                     HostEvent::Garbage { peer, what } if peer == id => panic!("{what}"),
-                    HostEvent::Gone { peer } if peer == id => panic!("it is there"),
+                    HostEvent::Gone { peer } if peer == id => panic!("the message must arrive before the peer \
+                        leaves"),
                     other => self.deal_with(&other),
                 },
                 event = self.polite.1.next() => {
@@ -371,7 +372,7 @@ fn whatever_rogues_say_a_polite_peer_is_served() {
         deeds.stop.store(true, Ordering::Relaxed);
         for rogue in rogues {
             let ended = rogue.join();
-            assert!(ended.is_ok(), "a rogue has failed by itself");
+            assert!(ended.is_ok(), "no rogue may fail on its own");
         }
         // A peer that joins after all this finds a place.
         watched(join_among_the_late(&mut table, &site)).await;

@@ -81,7 +81,7 @@ impl Helper {
     pub fn line(&mut self) -> String {
         self.lines
             .recv_timeout(WATCHDOG)
-            .expect("the helper has ended, or never said anything")
+            .expect("the helper must print a line in time")
     }
 
     /// Returns the lines that the helper has printed meanwhile.
@@ -135,7 +135,7 @@ fn other_process() {
             "writes_into_a_document" => writes_into_a_document(&instance).await,
             "serves" => serves(&instance).await,
             "rewrites_images" => rewrite_images(&instance),
-            other => panic!("no role {other}"),
+            other => panic!("unknown role {other}"),
         }
     });
 }
@@ -400,7 +400,7 @@ fn answer(peer: &mut Peer, job: &Job) -> bool {
     true
 }
 
-#[expect(unsafe_code, reason = "what is tested is that this cannot be done")]
+#[expect(unsafe_code, reason = "the test checks that this write fails")]
 async fn writes_into_a_document(instance: &Instance) {
     let mut peer = member(instance, "scribbler").await.unwrap();
     loop {
@@ -426,7 +426,7 @@ fn rewrite_images(instance: &Instance) {
             let at = find_image(&file)?;
             Some((file, at))
         })
-        .expect("there is an image");
+        .expect("an image exists");
     let mut random = qcbus_document::fuzzing::Random(crate::support::fresh_number());
     let mut sound = vec![0; IMAGE_AT_MOST];
     let len = segment.read_at(&mut sound, at).unwrap();

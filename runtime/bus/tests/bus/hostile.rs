@@ -195,17 +195,17 @@ fn receive_budget_is_a_megabyte_and_rotates_between_peers() {
                     std::future::poll_fn(|context| Poll::Ready(next.as_mut().poll(context))).await;
                 assert!(polled.is_pending(), "{polled:?}");
             }
-            let mut receive_budget = 0;
+            let mut frames = 0;
             for (number, (rogue, header)) in rogues.iter_mut().enumerate() {
                 while rogue.receive().is_some() {}
                 let sent = fill(rogue, header);
                 read[number] += sent;
-                receive_budget += sent;
+                frames += sent;
             }
             // A megabyte is 64 frames. The broker reads a peer to the end of its quota.
             assert!(
-                receive_budget <= 64 + 8,
-                "{receive_budget} frames in one turn"
+                frames <= 64 + 8,
+                "{frames} frames in one turn"
             );
         }
         let least = read.iter().min().unwrap();

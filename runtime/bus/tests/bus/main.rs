@@ -5,7 +5,7 @@
     clippy::expect_used,
     clippy::panic,
     clippy::print_stdout,
-    reason = "all of this is test code, also what is no `#[test]` itself"
+    reason = "this is all test code, including functions without `#[test]`"
 )]
 
 mod helper;

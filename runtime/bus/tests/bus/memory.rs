@@ -149,7 +149,7 @@ fn start_without_memory_suggests_a_sufficient_size() {
     let text = later.to_string();
     assert!(text.contains("remove what they left"), "{text}");
     let more = "docker run --shm-size=128m`";
-    assert!(text.ends_with(more), "more than there is: {text}");
+    assert!(text.ends_with(more), "more than the present size: {text}");
     let never = refused(4 << 20, 8 << 20);
     assert!(!never.may_pass());
     let text = never.to_string();

@@ -91,7 +91,7 @@ fn files_of_the_bus_are_closed_to_other_users() {
         assert_eq!(
             open_to_nobody(&[above.to_owned()]).lines().count(),
             2,
-            "the way is not free"
+            "the path must be accessible"
         );
         assert_eq!(open_to_nobody(&found), "");
     });
@@ -193,7 +193,7 @@ fn slot_rewritten_while_it_is_read_does_no_harm() {
         });
         let refused = reading.recv_timeout(WATCHDOG);
         rewriter.kill();
-        let refused = refused.expect("reading ended neither well nor at all");
+        let refused = refused.expect("reading must end without a panic");
         println!("refused {refused} times");
         drop(ours);
     });

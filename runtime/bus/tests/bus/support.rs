@@ -61,7 +61,7 @@ pub fn run_forever(test: impl Future<Output = ()>) {
 pub async fn watched<T>(future: impl Future<Output = T>) -> T {
     tokio::time::timeout(WATCHDOG, future)
         .await
-        .expect("the watchdog: this never happened")
+        .expect("watchdog timeout: this did not happen")
 }
 
 pub fn hello(name: &str) -> Hello {

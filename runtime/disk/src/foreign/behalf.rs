@@ -124,11 +124,17 @@ mod tests {
         assert!(is_denied(list(&at("closed"))));
         assert!(read(&at("open"), 100).is_ok());
         lchown(at("shared"), None, Some(STRANGER)).unwrap();
-        assert!(read(&at("shared"), 100).is_ok(), "his group's");
+        assert!(
+            read(&at("shared"), 100).is_ok(),
+            "a file of the user's group"
+        );
         lchown(at("private"), Some(STRANGER), None).unwrap();
         assert!(read(&at("private"), 100).is_ok(), "his own");
         lchown(at("private"), Some(0), None).unwrap();
         drop(behalf);
-        assert!(read(&at("private"), 100).is_ok(), "on nobody's behalf");
+        assert!(
+            read(&at("private"), 100).is_ok(),
+            "not on behalf of another user"
+        );
     }
 }

@@ -53,7 +53,11 @@ mod tests {
             at("/farm/with space/a.xodr"),
             Some("/farm/with space".into())
         );
-        assert_eq!(at("/farmer/a.xodr"), None, "it lies on the root");
+        assert_eq!(
+            at("/farmer/a.xodr"),
+            None,
+            "the file is on the root file system"
+        );
         assert_eq!(nearest(b"", Path::new("/farm")), None);
         assert_eq!(plain(b"a\\"), Path::new("a\\"), "cut off");
         let proc = mount_of(Path::new("/proc/self/maps"));

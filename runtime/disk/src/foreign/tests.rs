@@ -14,7 +14,7 @@ fn in_time<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
     let (done, wait) = channel();
     std::thread::spawn(move || done.send(work()));
     wait.recv_timeout(WATCHDOG)
-        .expect("the watchdog: it waits for ever")
+        .expect("watchdog timeout: the work has not ended")
 }
 
 fn fifo(path: &Path) {
@@ -41,7 +41,10 @@ fn only_regular_files_are_opened_without_waiting() {
         let refused = matches!(&opened, Err(Refused::Special(_)));
         assert!(refused, "{}: {opened:?}", path.display());
         let read = in_time(move || read(&path, 10)).unwrap_err();
-        assert!(crate::is_for_good(&read), "no waiting helps: {read:?}");
+        assert!(
+            crate::is_for_good(&read),
+            "the error is permanent: {read:?}"
+        );
         assert!(!is_of_the_moment(&read));
     }
     assert!(matches!(
@@ -144,7 +147,7 @@ fn hanging_watcher_is_reported_and_resumes_on_an_answer() {
 
     let (was_given_up, further) = watcher.end();
     assert!(!was_given_up);
-    assert_eq!(further, Ok(()), "it looks at others as ever");
+    assert_eq!(further, Ok(()), "the watcher continues with other paths");
     assert!(io_watchdog.hanging().is_empty());
 }
 
@@ -166,7 +169,7 @@ fn nested_accesses_are_tracked_separately() {
     assert_eq!(
         io_watchdog.overdue(Duration::ZERO)[0].path,
         directory,
-        "it is gone on with the directory"
+        "the access to the directory continues"
     );
     drop(outer);
     assert!(io_watchdog.hanging().is_empty());
@@ -183,33 +186,40 @@ fn hanging_reader_is_reported_once_and_given_up() {
     let overdue = io_watchdog.overdue(Duration::ZERO);
     assert_eq!(overdue.len(), 1);
     assert_eq!((overdue[0].owner, &*overdue[0].path), (Some(7), path));
-    assert_eq!(io_watchdog.overdue(Duration::ZERO), [], "it is said once");
+    assert_eq!(io_watchdog.overdue(Duration::ZERO), [], "reported once");
     assert_eq!(io_watchdog.hanging(), [path]);
 
     let attendance = io_watchdog.attend(8);
     assert_eq!(metadata(path).unwrap_err().kind(), io::ErrorKind::TimedOut);
     assert!(
         attendance.moment().is_some(),
-        "what was read does not count"
+        "the data read does not count"
     );
-    assert!(metadata(Path::new("/")).is_ok(), "others are looked at");
+    assert!(
+        metadata(Path::new("/")).is_ok(),
+        "other paths are accessible"
+    );
     assert!(!attendance.was_given_up());
     drop(attendance);
     assert!(
         metadata(Path::new("/")).is_ok(),
-        "nobody attends this thread any more"
+        "the thread is no longer attended"
     );
 
     let (was_given_up, further) = patient.end();
     assert!(was_given_up);
-    assert_eq!(further, Err(io::ErrorKind::TimedOut), "it goes no further");
-    assert!(io_watchdog.hanging().is_empty(), "it has answered");
+    assert_eq!(
+        further,
+        Err(io::ErrorKind::TimedOut),
+        "the abandoned thread makes no further access"
+    );
+    assert!(io_watchdog.hanging().is_empty(), "the access has ended");
     let _attendance = io_watchdog.attend(9);
     let answer = metadata(path).unwrap_err();
     assert_eq!(
         answer.kind(),
         io::ErrorKind::NotFound,
-        "it may be asked again"
+        "the path may be accessed again"
     );
 }
 
@@ -248,9 +258,12 @@ fn hanging_file_system_blocks_few_threads() {
     let attendance = io_watchdog.attend(2);
     let other = Path::new("/proc/self/status");
     assert_eq!(metadata(other).unwrap_err().kind(), io::ErrorKind::TimedOut);
-    assert!(metadata(Path::new("/")).is_ok(), "that is another one");
+    assert!(
+        metadata(Path::new("/")).is_ok(),
+        "another file system is not affected"
+    );
     for it in hanging {
-        assert!(it.end().0, "it was given up");
+        assert!(it.end().0, "the thread must have been given up");
     }
     assert!(metadata(other).is_ok());
     drop(attendance);

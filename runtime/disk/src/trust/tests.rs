@@ -154,7 +154,7 @@ fn file_of_another_user_is_not_trusted() {
     // In a directory that everybody can write to, the files of others stay theirs.
     mode(dir.path(), 0o1777);
     assert!(make_directory(&below.join("more")).is_err());
-    assert!(!below.join("more").exists(), "nothing is made in it");
+    assert!(!below.join("more").exists(), "nothing is created in it");
 }
 
 #[test]
@@ -177,7 +177,7 @@ fn private_directory_is_owned_and_closed() {
     assert_eq!(mode_of(&fresh), 0o700);
     mode(&fresh, 0o755);
     make_private_directory(&fresh).unwrap();
-    assert_eq!(mode_of(&fresh), 0o700, "it is closed");
+    assert_eq!(mode_of(&fresh), 0o700, "the directory is private again");
     if !may_give_away() {
         return;
     }
@@ -192,9 +192,13 @@ fn private_directory_is_owned_and_closed() {
     assert_eq!(
         mode_of(&target),
         0o755,
-        "nothing was changed behind the link"
+        "the target of the link is unchanged"
     );
     chown(&target, Some(STRANGER), None).unwrap();
     assert!(make_private_directory(&target).is_err());
-    assert_eq!(mode_of(&target), 0o755, "what is not ours stays as it is");
+    assert_eq!(
+        mode_of(&target),
+        0o755,
+        "a directory of another user is unchanged"
+    );
 }

@@ -353,7 +353,7 @@ mod tests {
         assert_eq!(
             scan(" a='1' b=2 c='3'").0.len(),
             1,
-            "what stands before the fault is kept"
+            "attributes before the fault are kept"
         );
     }
 }

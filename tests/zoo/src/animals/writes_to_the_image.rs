@@ -25,10 +25,7 @@ fn job(peer: &mut Peer, job: &Job) -> Mood {
     Mood::GoOn
 }
 
-#[expect(
-    unsafe_code,
-    reason = "no safe code can do what this animal is there for"
-)]
+#[expect(unsafe_code, reason = "this animal needs unsafe code")]
 fn overwrite(image: &[u8]) {
     let first = image.as_ptr().cast_mut();
     // SAFETY: none is claimed. The memory is mapped without write permission, and the process must

@@ -56,7 +56,7 @@ impl Socket {
                         let _ = asked.answer.send(Response::TimedOut);
                     }
                 },
-                () = &mut watchdog => panic!("the watchdog: nothing was answered"),
+                () = &mut watchdog => panic!("watchdog timeout: no answer"),
             }
         }
         String::from_utf8(line).unwrap()
@@ -65,7 +65,7 @@ impl Socket {
     async fn until_kept(&mut self, count: usize) {
         while self.kept.len() < count {
             let asked = timeout(Duration::from_secs(60), self.asked.recv()).await;
-            self.kept.push(asked.expect("the watchdog").unwrap());
+            self.kept.push(asked.expect("watchdog timeout").unwrap());
         }
     }
 }
@@ -94,7 +94,11 @@ async fn request_length_is_bounded_but_request_count_is_not() {
     let mut client = socket.connect(&" ".repeat(MAX_REQUEST + 1)).await;
     let said = socket.hear(&mut client).await;
     assert!(said.contains("at most 65536 bytes"), "{said}");
-    assert_eq!(socket.hear(&mut client).await, "", "it was closed");
+    assert_eq!(
+        socket.hear(&mut client).await,
+        "",
+        "the connection is closed"
+    );
     let mut client = socket.connect("what?\n").await;
     let said = socket.hear(&mut client).await;
     assert!(said.contains("invalid request"), "{said}");
@@ -114,7 +118,11 @@ async fn silent_or_incomplete_client_is_disconnected() {
         let mut client = socket.connect(said).await;
         let heard = socket.hear(&mut client).await;
         assert!(heard.contains("no request was received"), "{said}: {heard}");
-        assert_eq!(socket.hear(&mut client).await, "", "it was closed");
+        assert_eq!(
+            socket.hear(&mut client).await,
+            "",
+            "the connection is closed"
+        );
     }
     // A client that was answered may not stay either.
     let mut client = socket.connect(STATUS).await;

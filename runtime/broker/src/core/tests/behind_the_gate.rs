@@ -42,7 +42,11 @@ impl World {
             let on_the_way = self.told.iter().any(|(it, _)| it.0 == *file);
             if !on_the_way {
                 let now = self.inputs(*file);
-                assert_eq!(bytes(inputs), bytes(&now), "{file} stays published");
+                assert_eq!(
+                    bytes(inputs),
+                    bytes(&now),
+                    "the published bytes of {file} must be current"
+                );
             }
         }
     }

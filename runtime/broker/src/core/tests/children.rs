@@ -26,7 +26,7 @@ fn world_with_an_upgrade() -> World {
     world.write(0);
     world.settle();
     world.manifest(Some(2));
-    assert_eq!(world.launched.len(), 1, "the newer one is started");
+    assert_eq!(world.launched.len(), 1, "the newer version is started");
     world
 }
 
@@ -66,7 +66,7 @@ fn bundle_started_by_other_command_judges_anew() {
     };
     let answered = |it: &Action| matches!(it, Action::Answer { .. });
     assert!(!world.state.handle(world.now, waits).iter().any(answered));
-    assert_eq!(world.preparing.len(), 1, "it is judged again");
+    assert_eq!(world.preparing.len(), 1, "the file is judged again");
     assert_eq!(world.stored.len(), stored);
 }
 
@@ -84,7 +84,7 @@ fn slow_starting_child_may_join_later() {
         world.pass(Duration::from_secs(16));
         assert_eq!(!world.killed.contains(&launch), patient);
         world.pass(Duration::from_secs(110));
-        assert!(world.killed.contains(&launch), "not for ever");
+        assert!(world.killed.contains(&launch), "killed after the limit");
     }
 }
 
@@ -102,7 +102,10 @@ fn child_replaced_by_newer_manifest_before_joining_is_killed() {
             let old = world.launched[0].launch;
             world.manifest(Some(3));
             world.pass(Duration::ZERO);
-            assert!(world.killed.contains(&old), "nobody wants it any more");
+            assert!(
+                world.killed.contains(&old),
+                "the process is no longer wanted"
+            );
             if let Some(known) = late {
                 world.child_joins_too_late(known);
             }
@@ -117,11 +120,11 @@ fn upgrade_that_dies_before_joining_is_retried() {
     let mut world = world_with_an_upgrade();
     world.child_ends(ChildEnd::Failed("it crashed".to_owned()));
     assert!(notices(&world).contains(&"not-upgraded"));
-    assert_eq!(child_version(&world), "1", "the older goes on");
+    assert_eq!(child_version(&world), "1", "the older version continues");
     world.pass(Duration::from_millis(1));
-    assert!(world.launched.is_empty(), "not without a pause");
+    assert!(world.launched.is_empty(), "not restarted without a pause");
     world.pass(Duration::from_secs(1));
-    assert_eq!(world.launched.len(), 1, "it is started again");
+    assert_eq!(world.launched.len(), 1, "the upgrade is started again");
     world.child_joins();
     assert_eq!(child_version(&world), "2");
 }
@@ -200,13 +203,16 @@ fn child_that_never_joins_is_awaited_once() {
     world.prepare(0, true);
     world.answer(0);
     world.store(0, true);
-    assert!(world.judged.is_empty(), "it may come yet");
+    assert!(world.judged.is_empty(), "the child may still join");
     world.pass(Duration::from_secs(16));
     world.answer(0);
     world.store(0, true);
     assert_eq!(world.judged[&0].1, Verdict::Undetermined);
     let why = &world.failures[&0][0];
-    assert!(!why.contains("bundle remove"), "it has a manifest: {why}");
+    assert!(
+        !why.contains("bundle remove"),
+        "the bundle has a manifest: {why}"
+    );
     // A child that joins late still judges.
     world.pass(Duration::from_secs(60));
     world.child_joins();
@@ -231,7 +237,7 @@ fn slow_starting_child_is_awaited_up_to_its_limit() {
         world.pass(Duration::from_secs(100));
         world.answer(0);
         world.store(0, true);
-        assert!(world.judged.is_empty(), "it may come yet");
+        assert!(world.judged.is_empty(), "the child may still join");
         world
     };
     let mut world = starting();
@@ -256,7 +262,7 @@ fn manually_joined_bundle_stays_required_after_restart() {
     world.prepare(0, true);
     world.answer(0);
     world.store(0, true);
-    assert!(world.judged.is_empty(), "the second is waited for");
+    assert!(world.judged.is_empty(), "the second bundle is waited for");
     world.pass(Duration::from_secs(25));
     world.store(0, true);
     assert_eq!(world.judged[&0].1, Verdict::Undetermined);
@@ -322,7 +328,10 @@ fn restart_keeps_standing_verdicts() {
     world.members.clear();
     world.settle();
     assert_eq!(world.stored.len(), stored);
-    assert!(world.members.is_empty(), "they are what the journal knows");
+    assert!(
+        world.members.is_empty(),
+        "the journal already has these required bundles"
+    );
     world.members = members;
 }
 
@@ -361,7 +370,11 @@ fn child_wanted_again_before_leaving_is_replaced() {
     world.child_joins();
     let there = world.peers.values().filter(|it| it.name == CHILD);
     let drained: Vec<bool> = there.map(|it| it.drained).collect();
-    assert_eq!(drained, [true, false], "the older goes, the newer is there");
+    assert_eq!(
+        drained,
+        [true, false],
+        "the older process is drained, the newer one is connected"
+    );
     world.leave(0);
     world.settle();
     assert_eq!(world.members[CHILD].version, "1");
@@ -373,7 +386,10 @@ fn replaced_process_that_does_not_leave_is_killed() {
     let old = world.state.bundles[CHILD].launch.unwrap();
     world.child_joins();
     world.pass(Duration::from_secs(10));
-    assert!(!world.killed.contains(&old), "it may finish");
+    assert!(
+        !world.killed.contains(&old),
+        "the old process may still finish"
+    );
     world.pass(Duration::from_millis(1));
     assert!(world.killed.contains(&old));
 }
@@ -421,7 +437,10 @@ fn child_is_restarted_according_to_manifest() {
     world.event(Event::Drain);
     world.leave(0);
     world.pass(Duration::from_secs(2));
-    assert!(world.launched.is_empty(), "the broker stops");
+    assert!(
+        world.launched.is_empty(),
+        "nothing is restarted while the broker stops"
+    );
 }
 
 #[test]

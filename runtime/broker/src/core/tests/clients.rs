@@ -115,14 +115,14 @@ impl World {
         let files = self.state.present_files();
         assert!(files.iter().all(|path| file_of(path) < 8), "{files:?}");
         let total = self.state.status().files.total;
-        assert_eq!(total, files.len() as u64, "a file counts once");
+        assert_eq!(total, files.len() as u64, "each file counts once");
         let at_bundles = self.state.jobs.values().filter(|job| {
             let at_work = job.stage.is_before_storing();
             at_work && job.on_demand.is_some() && !job.is_trial()
         });
         for on_demand in at_bundles.filter_map(|job| job.on_demand.as_ref()) {
             let open = self.clients.open.contains_key(&on_demand.request_id);
-            assert!(open, "nobody is asked for a client that has gone");
+            assert!(open, "no bundle works for a client that has left");
         }
     }
 
@@ -134,7 +134,10 @@ impl World {
             Action::Undepend { paths } => (paths.iter().collect(), "watched"),
             Action::Store(job) => {
                 let on_demand = &self.state.jobs[&job.job].on_demand;
-                assert!(on_demand.is_none(), "a result for a client is not stored");
+                assert!(
+                    on_demand.is_none(),
+                    "a result for a client must not be stored"
+                );
                 (vec![&job.path], "stored")
             }
             Action::Restamp { path, .. } | Action::Withdraw { path, .. } => {
@@ -147,12 +150,15 @@ impl World {
             _ => return,
         };
         let theirs = paths.iter().find(|path| file_of(path) >= 8);
-        assert_eq!(theirs, None, "it is {what}");
+        assert_eq!(
+            theirs, None,
+            "a file that only clients know must not be {what}"
+        );
     }
 
     pub fn is_to_be_pooled(&mut self, job: FinishedJob) {
         let on_demand = &self.state.jobs[&job.job].on_demand;
-        assert!(on_demand.is_some(), "only for a client");
+        assert!(on_demand.is_some(), "only results for clients are pooled");
         self.clients.pooling.push(job);
     }
 
@@ -192,14 +198,14 @@ impl World {
     /// Returns whether this was an answer to one of these clients.
     pub fn client_is_answered(&mut self, request_id: RequestId, response: &Response) -> bool {
         let once = !self.clients.answers.contains_key(&request_id);
-        assert!(once, "one answer for each");
+        assert!(once, "each request is answered once");
         let Some(client) = self.clients.open.remove(&request_id) else {
             return false;
         };
         match response {
             Response::Checked(checked) => self.must_be_true(&client, checked),
             Response::Elsewhere { .. } => {}
-            other => panic!("no answer to a client that wants a file checked: {other:?}"),
+            other => panic!("invalid answer to a client that requests a check: {other:?}"),
         }
         self.clients.answers.insert(request_id, response.clone());
         true
@@ -216,7 +222,7 @@ impl World {
         assert_eq!(
             named(&job.required_set),
             client.required_set,
-            "exactly those, and as such"
+            "exactly the requested bundles, with the same version digests"
         );
         let names = job.bundles.iter().map(|it| &it.name);
         assert!(names.eq(client.required_set.iter().map(|it| &it.0)));
@@ -235,13 +241,19 @@ impl World {
     /// Asserts that no client is left that asked under an earlier check context.
     pub fn context_differs(&self) {
         let open: Vec<&RequestId> = self.clients.open.keys().collect();
-        assert!(open.is_empty(), "{open:?} asked under other terms");
+        assert!(
+            open.is_empty(),
+            "no request of an earlier check context may be open: {open:?}"
+        );
     }
 
     /// Asserts that all clients have left or have their answers, and that no trace of them remains.
     pub fn clients_are_content(&self) {
         let open: Vec<&RequestId> = self.clients.open.keys().collect();
-        assert!(open.is_empty(), "{open:?} wait for ever");
+        assert!(
+            open.is_empty(),
+            "every request must be answered, still open: {open:?}"
+        );
         assert!(self.state.on_demand_checks.is_empty());
         let on_demand_checks = self
             .state

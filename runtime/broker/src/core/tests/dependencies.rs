@@ -29,7 +29,7 @@ fn changed_dependency_has_its_file_judged_again() {
             assert_eq!(
                 world.waiting.len(),
                 1,
-                "whoever asks waits for the new verdict"
+                "the client waits for the new verdict"
             );
             world.settle();
             assert_eq!(world.judged[&file].0, world.inputs(file));
@@ -62,7 +62,7 @@ fn dependency_with_only_new_stamp_costs_no_new_verdict() {
         assert_eq!(
             world.judged[&5].0,
             world.inputs(5),
-            "the new stamp is known"
+            "the new stamp is recorded"
         );
         assert_eq!(world.stored.len(), before);
         // A repeated event with the same stamp causes no further reads.
@@ -137,7 +137,7 @@ fn restored_file_is_published_again() {
     }
     world.state.settings.max_active = 4;
     world.pass(Duration::ZERO);
-    assert!(world.preparing.is_empty(), "nothing need be read");
+    assert!(world.preparing.is_empty(), "no file needs to be read");
     assert!(world.gate.contains_key(&1));
 }
 
@@ -168,7 +168,7 @@ fn young_file_rewritten_under_same_stamp_is_read_again() {
         assert_eq!(
             world.preparing.len(),
             usize::from(young),
-            "while it is read"
+            "changed while the file is read"
         );
         world.prepare(0, true);
         written_again(&mut world);
@@ -177,7 +177,7 @@ fn young_file_rewritten_under_same_stamp_is_read_again() {
         assert_eq!(
             world.preparing.len(),
             usize::from(young),
-            "while it is checked"
+            "changed while the file is checked"
         );
         world.settle();
     }
@@ -215,7 +215,10 @@ fn unreadable_file_is_retried_and_reported_once() {
     world.event(Event::Stored { job, outcome });
     world.pass(Duration::from_secs(61));
     not_read(&mut world);
-    assert!(world.storing.is_empty(), "it is known");
+    assert!(
+        world.storing.is_empty(),
+        "the same failure is not stored again"
+    );
     world.pass(Duration::from_secs(61));
     world.settle();
     assert_eq!(world.judged[&0].1, Verdict::Accepted);
@@ -264,7 +267,7 @@ fn reader_gets_time_since_file_was_last_requested() {
         world.pass(2 * second);
         deed(&mut world, 3);
         world.pass(second);
-        assert_eq!(world.preparing.len(), 1, "one at a time");
+        assert_eq!(world.preparing.len(), 1, "only one file is read at a time");
         world.prepare(0, true);
         let (job, file) = world.preparing[0];
         assert_eq!(file, 3);

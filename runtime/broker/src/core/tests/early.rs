@@ -19,12 +19,18 @@ fn run(once: bool) -> World {
 #[test]
 fn files_are_read_before_bundles_join() {
     let mut world = run(true);
-    assert_eq!(world.preparing.len(), 1, "it is being read");
+    assert_eq!(world.preparing.len(), 1, "the file is being read");
     world.prepare(0, true);
-    assert!(world.storing.is_empty(), "nobody has looked at it");
+    assert!(
+        world.storing.is_empty(),
+        "no bundle has checked the file yet"
+    );
     world.child_joins();
     let (session, job) = at_work(&world);
-    assert!(world.peers.contains_key(&session), "{job:?} is given out");
+    assert!(
+        world.peers.contains_key(&session),
+        "{job:?} must be assigned"
+    );
     world.until_judged(1);
     assert_eq!(world.names_that_judged(0), [CHILD]);
 }

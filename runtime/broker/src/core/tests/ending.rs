@@ -7,7 +7,7 @@ fn draining_broker_finishes_jobs_and_begins_none() {
     let mut world = World::at_work();
     world.event(Event::Drain);
     world.write(4);
-    assert!(world.preparing.is_empty(), "nothing is begun");
+    assert!(world.preparing.is_empty(), "no new job is started");
     assert_eq!(world.stopped, 0);
     world.answer(0);
     world.store(0, true);
@@ -48,7 +48,7 @@ fn run_stops_when_every_file_is_judged() {
     let mut world = world_that_runs_once(false);
     world.until_judged(2);
     world.pass(Duration::ZERO);
-    assert_eq!(world.stopped, 0, "there may be more");
+    assert_eq!(world.stopped, 0, "more files may be found");
     world.event(Event::Scanned);
     world.pass(Duration::ZERO);
     assert_eq!(world.stopped, 1);
@@ -68,7 +68,7 @@ fn run_waits_for_file_that_must_pause() {
     world.write(0);
     world.prepare(0, false);
     world.pass(Duration::ZERO);
-    assert_eq!(world.stopped, 0, "there was no room for it");
+    assert_eq!(world.stopped, 0, "the file waits because there was no room");
     world.pass(world.state.settings.retry_after);
     world.until_judged(1);
     world.pass(Duration::ZERO);
@@ -84,8 +84,11 @@ fn world_that_says_goodbye() -> (World, Launch) {
     let launch = world.state.bundles[CHILD].launch.unwrap();
     world.event(Event::Drain);
     world.pass(Duration::ZERO);
-    assert!(world.peers.values().all(|it| it.drained), "it is told");
-    assert_eq!(world.stopped, 0, "it has its time to leave");
+    assert!(
+        world.peers.values().all(|it| it.drained),
+        "every process is drained"
+    );
+    assert_eq!(world.stopped, 0, "the process may still leave");
     (world, launch)
 }
 
@@ -132,7 +135,7 @@ fn nothing_is_read_before_bundles_had_time_to_join() {
     world.pass(Duration::from_millis(999));
     assert!(
         world.preparing.is_empty(),
-        "somebody may still join by hand"
+        "another bundle may still join manually"
     );
     world.manifest(Some(1));
     world.pass(Duration::from_millis(1));

@@ -29,7 +29,10 @@ fn bundle_of_ended_process_is_missing_at_once() {
     let other = Launch(launch.0 + 1);
     let end = crashed();
     world.event(Event::Exited { launch: other, end });
-    assert!(world.state.bundles[CHILD].session.is_some(), "another one");
+    assert!(
+        world.state.bundles[CHILD].session.is_some(),
+        "another process has ended"
+    );
     let end = crashed();
     world.event(Event::Exited { launch, end });
     assert!(world.state.bundles[CHILD].session.is_none());
@@ -42,7 +45,7 @@ fn bundle_of_ended_process_is_missing_at_once() {
 fn child_without_work_restarts_late_unless_always_wanted() {
     let mut world = world_that_starts(Restart::OnFailure);
     world.child_ends(done());
-    assert!(notices(&world).is_empty(), "that is no failure");
+    assert!(notices(&world).is_empty(), "a normal end is not a failure");
     assert!(pause(&mut world) >= world.state.settings.backoff_max);
     let mut world = world_that_starts(Restart::Always);
     world.child_ends(done());

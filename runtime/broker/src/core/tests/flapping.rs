@@ -76,7 +76,10 @@ fn flapping_bundle_delays_no_job_but_prevents_acceptance() {
     let job = *world.peers[&second].jobs.first().unwrap();
     assert!(world.peers[&session].jobs.is_empty());
     world.say(second, FromPeer::JobDone { job, micros: 1 });
-    let finished = world.storing.first().expect("nobody waits for it");
+    let finished = world
+        .storing
+        .first()
+        .expect("the result must not wait for the flapping bundle");
     let first = finished.bundles.iter().find(|it| it.name == "First");
     let why = first.unwrap().failure.clone().unwrap();
     assert!(why.contains("gets no tasks for now"), "{why}");
@@ -95,7 +98,7 @@ fn flapping_bundle_loses_its_jobs_until_accepted_again() {
     say(&mut world, session, changed(9));
     say(&mut world, session, FromPeer::JobDone { job, micros: 1 });
     let task = &world.state.jobs[&job].tasks["First"];
-    assert!(task.missing, "what it says as another counts for nothing");
+    assert!(task.missing, "an answer from a changed bundle is ignored");
     over(&mut world, 3 * SECOND, SECOND, |_| {});
     let first = &world.state.bundles["First"];
     let is_it = first.catalogue.as_ref().unwrap().build_date == "9";
@@ -169,7 +172,10 @@ fn endless_new_names_are_accepted_less_often() {
     });
     // A bundle that is not accepted is not in the registry. Therefore its end changes nothing.
     let epochs = world.state.epoch().0 - before;
-    assert!(epochs < 100, "{epochs} epochs of 600 newcomers");
+    assert!(
+        epochs < 100,
+        "too many epochs for 600 new bundles: {epochs}"
+    );
 }
 
 #[derive(Debug, Clone)]

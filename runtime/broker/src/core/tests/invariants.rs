@@ -77,16 +77,19 @@ impl World {
     fn is_sent(&mut self, session: SessionId, message: ToPeer) {
         match message {
             ToPeer::Job(job) => {
-                assert!(!self.released.contains(&job.job), "its documents are there");
+                assert!(
+                    !self.released.contains(&job.job),
+                    "the documents of the job must still be available"
+                );
                 let bundle = self
                     .peers
                     .get_mut(&session)
-                    .expect("no job goes to a closed session");
+                    .expect("no job may go to a closed session");
                 assert!(
                     bundle.jobs.insert(job.job),
-                    "a job is given out once per session"
+                    "a job is sent once per session"
                 );
-                assert!(bundle.jobs.len() <= CAPACITY, "the credit window is kept");
+                assert!(bundle.jobs.len() <= CAPACITY, "the credit limit is kept");
             }
             ToPeer::Cancel { job } => {
                 if let Some(bundle) = self.peers.get_mut(&session) {
@@ -106,20 +109,20 @@ impl World {
         let names: BTreeSet<_> = job.bundles.iter().map(|it| it.name.clone()).collect();
         assert!(
             !names.contains(SHADOW),
-            "nothing of a shadow is in a result"
+            "a result must contain nothing of a shadow"
         );
         assert_eq!(
             names.len(),
             job.bundles.len(),
-            "no bundle is in a result twice"
+            "no bundle may be in a result twice"
         );
         for bundle in job.bundles.iter().filter(|it| it.catalogue.is_some()) {
             let said = bundle.said();
-            assert_eq!(said.checkers.len(), 2, "every demanded checker is there");
+            assert_eq!(said.checkers.len(), 2, "every required checker is present");
             let mut checkers = said.checkers.iter();
             assert!(
                 checkers.all(|it| it.issues.len() <= 2),
-                "what a session said that has ended counts for nothing"
+                "findings of an ended session are ignored"
             );
         }
         self.storing.push(job);
@@ -134,7 +137,7 @@ impl World {
         assert_eq!(
             known,
             Some(judged.job),
-            "nothing is told before it is stored"
+            "a verdict is stored before it is reported"
         );
         let verdict = (judged.inputs.clone(), judged.verdict);
         self.judged.insert(file, verdict);
@@ -147,20 +150,27 @@ impl World {
         let file = self
             .waiting
             .remove(&request_id)
-            .expect("one answer for each");
+            .expect("each request is answered once");
         let until = self.until.remove(&request_id);
         if *response == Response::TimedOut {
-            assert!(until.is_some_and(|until| until <= self.now), "not too soon");
+            assert!(
+                until.is_some_and(|until| until <= self.now),
+                "not before the time limit"
+            );
         }
         if matches!(response, Response::Verdict(_)) {
             let judged = self.verdict_on(file);
             self.must_be_earned(&judged);
             let told = self.state.inputs_of(&path_of(file));
-            assert_eq!(told, self.inputs(file), "the answer is true at that moment");
+            assert_eq!(
+                told,
+                self.inputs(file),
+                "the answer is correct at this time"
+            );
             let with_all = self.verdict_with_all(file, judged.own);
             assert_eq!(
                 judged.verdict, with_all,
-                "so are the verdicts that it rests on"
+                "the verdicts of its dependencies are correct"
             );
         }
     }
@@ -197,6 +207,9 @@ impl World {
         }
         assert_eq!(required_set.len(), expected.len());
         let config = digest(self.reconfigured.into());
-        assert_eq!(judged.config, config, "of the configuration in force");
+        assert_eq!(
+            judged.config, config,
+            "judged with the current configuration"
+        );
     }
 }

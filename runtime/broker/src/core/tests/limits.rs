@@ -30,9 +30,9 @@ fn is_ended_after(
         meanwhile(world);
     }
     world.pass(end - world.now);
-    assert!(!world.peers.is_empty(), "not before its time");
+    assert!(!world.peers.is_empty(), "not closed before the time limit");
     world.pass(Duration::from_millis(1));
-    assert!(world.peers.is_empty(), "not after its time");
+    assert!(world.peers.is_empty(), "closed at the time limit");
     let notice = world.state.notices.back().map(|(it, _)| it.why());
     notice.unwrap_or_default()
 }
@@ -254,7 +254,10 @@ fn checker_endings_count_to_memory_limit() {
         2 * fact
     );
     world.say(session, done(job, 1, "", 2));
-    assert!(kept(&world, job, 1).0.is_open(), "there is no room for it");
+    assert!(
+        kept(&world, job, 1).0.is_open(),
+        "there is no room for the second outcome"
+    );
     // A repeated message replaces the earlier one.
     world.say(session, done(job, 0, "", 1));
     world.say(session, done(job, 1, "", 2));
@@ -365,6 +368,9 @@ fn number_of_known_names_is_limited() {
     for role in [Role::Bundle, Role::Reporter] {
         let refused = (0..300).filter(|it| is_refused(&format!("{role:?}{it}"), role));
         assert_eq!(refused.count(), 300 - 256);
-        assert!(!is_refused(&format!("{role:?}0"), role), "it is known");
+        assert!(
+            !is_refused(&format!("{role:?}0"), role),
+            "a known name is accepted"
+        );
     }
 }

@@ -33,7 +33,7 @@ fn file_in_progress_is_also_judged_by_joining_bundle() {
     assert_eq!(
         world.peers[&second].jobs.len(),
         1,
-        "it gets its share at once"
+        "the new bundle gets its task at once"
     );
     world.settle();
     assert_eq!(world.names_that_judged(1), ["First", "Second"]);
@@ -67,7 +67,11 @@ fn waiting_client_gets_no_verdict_without_new_bundle() {
     for file in 0..6 {
         world.wait(file);
     }
-    assert_eq!(world.waiting.len(), 6, "the second has not judged");
+    assert_eq!(
+        world.waiting.len(),
+        6,
+        "the second bundle has not judged yet"
+    );
     world.settle();
     assert!(world.waiting.is_empty());
 }
@@ -79,7 +83,11 @@ fn waiting_client_gets_no_verdict_of_old_configuration() {
     for file in 0..6 {
         world.wait(file);
     }
-    assert_eq!(world.waiting.len(), 6, "some wait in the background");
+    assert_eq!(
+        world.waiting.len(),
+        6,
+        "some files wait in the background queue"
+    );
     world.settle();
     assert!(world.waiting.is_empty());
 }
@@ -103,7 +111,10 @@ fn late_messages_on_cancelled_jobs_are_no_violation() {
             world.say(session, FromPeer::JobDone { job, micros: 1 });
         }
     }
-    assert!(world.peers.contains_key(&session), "it did nothing wrong");
+    assert!(
+        world.peers.contains_key(&session),
+        "the bundle made no error"
+    );
 }
 
 #[test]
@@ -128,7 +139,10 @@ fn forgotten_job_is_noticed_while_others_finish() {
     let forgotten = *world.peers[&session].jobs.first().unwrap();
     let mut passed = Duration::ZERO;
     while world.peers.contains_key(&session) {
-        assert!(passed < Duration::from_secs(600), "nobody notices");
+        assert!(
+            passed < Duration::from_secs(600),
+            "the forgotten job must be noticed"
+        );
         world.write(4);
         world.prepare(0, true);
         let others: Vec<JobId> = world.peers[&session].jobs.iter().copied().collect();
@@ -208,10 +222,13 @@ fn findings_are_kept_when_bundle_joins_before_writing() {
     assert_eq!(world.storing.len(), 1);
     world.join("Second");
     world.store(0, true);
-    assert!(world.judged.is_empty(), "it is of an older epoch");
-    assert!(world.preparing.is_empty(), "nothing is read again");
+    assert!(
+        world.judged.is_empty(),
+        "the result belongs to an older epoch"
+    );
+    assert!(world.preparing.is_empty(), "no file is read again");
     let first = world.peers.values().find(|it| it.name == "First").unwrap();
-    assert!(first.jobs.is_empty(), "nor is anybody asked twice");
+    assert!(first.jobs.is_empty(), "no bundle is asked twice");
     world.settle();
     assert_eq!(world.names_that_judged(0), ["First", "Second"]);
 }

@@ -38,7 +38,7 @@ fn is_checked(world: &World, request_id: RequestId) -> bool {
     match world.clients.answers.get(&request_id) {
         Some(Response::Checked(_)) => true,
         Some(Response::Elsewhere { .. }) => false,
-        other => panic!("there is no answer: {other:?}"),
+        other => panic!("expected an answer, found {other:?}"),
     }
 }
 
@@ -56,7 +56,7 @@ fn client_gets_findings_of_named_bundles_in_unwatched_file() {
     let (mut world, request_id) = world_with_a_client();
     world.prepare(0, true);
     assert_eq!(jobs_of(&world, CHILD), 1);
-    assert_eq!(jobs_of(&world, "First"), 0, "it is not named");
+    assert_eq!(jobs_of(&world, "First"), 0, "this bundle is not requested");
     go_round(&mut world);
     assert!(is_checked(&world, request_id));
     world.clients_are_content();
@@ -117,7 +117,7 @@ fn on_demand_check_with_unavailable_bundle_is_refused() {
         let mut world = world_that_can_be_asked();
         world.write(8);
         let request_id = asks(&mut world);
-        assert!(!is_open(&world, request_id), "{number}: at once");
+        assert!(!is_open(&world, request_id), "{number}: answered at once");
         assert!(!is_checked(&world, request_id), "{number}");
         world.clients_are_content();
     }
@@ -211,7 +211,7 @@ fn bundle_crash_fails_only_its_on_demand_check() {
     world.prepare(0, true);
     world.kill(1);
     assert!(!is_checked(&world, request_id));
-    assert!(is_open(&world, waits), "the bundle did not have it");
+    assert!(is_open(&world, waits), "the bundle did not have this job");
     world.settle();
     assert!(is_checked(&world, waits));
 }
@@ -222,7 +222,7 @@ fn on_demand_check_fails_if_bundle_does_not_return() {
     world.kill(1);
     world.prepare(0, true);
     world.pass(Duration::from_secs(1));
-    assert!(is_open(&world, request_id), "it may come back");
+    assert!(is_open(&world, request_id), "the bundle may still return");
     world.child_ends(ChildEnd::NotStarted("no such program".to_owned()));
     assert!(!is_checked(&world, request_id));
     world.clients_are_content();
@@ -249,8 +249,11 @@ fn on_demand_findings_are_kept_when_others_join() {
     world.join("Second");
     world.pool(0, true);
     world.tell_pooled();
-    assert!(is_open(&world, request_id), "of an older epoch");
-    assert_eq!(jobs_of(&world, CHILD), 0, "nobody is asked twice");
+    assert!(
+        is_open(&world, request_id),
+        "the result belongs to an older epoch"
+    );
+    assert_eq!(jobs_of(&world, CHILD), 0, "no bundle is asked twice");
     world.pool(0, true);
     world.tell_pooled();
     assert!(is_checked(&world, request_id));
@@ -370,7 +373,7 @@ fn watched_file_is_judged_despite_many_on_demand_checks() {
             return;
         }
     }
-    panic!("it waits for ever");
+    panic!("the file must be judged");
 }
 
 #[test]

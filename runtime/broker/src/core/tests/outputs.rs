@@ -26,7 +26,7 @@ fn lost_result_is_written_again_without_changed_bytes() {
     assert!(!world.gate.contains_key(&1), "at once");
     world.settle();
     assert_eq!(world.stored.len(), before + 1);
-    assert!(world.gate.contains_key(&1), "it is published again");
+    assert!(world.gate.contains_key(&1), "the file is published again");
 }
 
 #[test]
@@ -36,7 +36,11 @@ fn result_lost_during_rereading_is_written() {
     world.step(&Step::Touch(1));
     world.lose(1);
     world.settle();
-    assert_eq!(world.stored.len(), before + 1, "not only confirmed");
+    assert_eq!(
+        world.stored.len(),
+        before + 1,
+        "written again and not only confirmed"
+    );
 }
 
 #[test]
@@ -81,7 +85,7 @@ fn accepted_file_missing_from_gate_is_published_at_start() {
     world.gate.remove(&1);
     world.restart();
     world.settle();
-    assert_eq!(world.stored.len(), before, "nothing is judged again");
+    assert_eq!(world.stored.len(), before, "no file is judged again");
     assert!(world.gate.contains_key(&1));
 }
 

@@ -65,22 +65,25 @@ impl World {
                 let about = |it: &Letter| matches!(it, Letter::Result(it, _) if *it == file);
                 assert!(
                     !self.requests.processes.values().flatten().any(about),
-                    "two results of one file are not under way side by side"
+                    "two results of one file must not be sent at the same time"
                 );
                 let process = self.requests.processes.get_mut(session);
-                let process = process.expect("no result goes to a closed session");
+                let process = process.expect("no result may go to a closed session");
                 process.push_back(Letter::Result(file, delivery.job));
             }
             Action::Void { session, path, .. } => {
                 let process = self.requests.processes.get_mut(session);
-                let process = process.expect("nothing goes to a closed session");
+                let process = process.expect("nothing may go to a closed session");
                 // A result that is still to be read back is no longer sent.
                 let file = file_of(path);
                 process.retain(|it| !matches!(it, Letter::Result(it, _) if *it == file));
                 process.push_back(Letter::Gone(file));
             }
             Action::Delivered { path, job, .. } => {
-                assert!(self.requests.written.contains(job), "only what was written");
+                assert!(
+                    self.requests.written.contains(job),
+                    "only written results are recorded as delivered"
+                );
                 self.requests.delivered.insert(file_of(path), *job);
             }
             Action::Voided { path, .. } => {

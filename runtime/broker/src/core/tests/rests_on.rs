@@ -52,11 +52,7 @@ fn waiting_scenario_leaves_room_for_its_map() {
     world.find(0);
     world.settle();
     assert_eq!(world.judged[&1].1, Verdict::Accepted);
-    assert_eq!(
-        world.stored.len(),
-        2,
-        "each once, and none without the other"
-    );
+    assert_eq!(world.stored.len(), 2, "each file is stored exactly once");
 }
 
 #[test]
@@ -106,7 +102,7 @@ fn scenario_waits_for_its_map_up_to_limit() {
     answer(&mut world);
     assert_eq!(storing(&world), [0]);
     world.pass(Duration::from_secs(11));
-    assert_eq!(storing(&world), [0, 1], "patience has an end");
+    assert_eq!(storing(&world), [0, 1], "the waiting time is limited");
     // The first result did not know the map's verdict. The second one does.
     world.settle();
     assert_eq!(world.said_of_maps[&1], [0]);
@@ -130,10 +126,10 @@ fn run_reports_scenario_once_despite_late_map() {
     world.write(1);
     world.prepare(0, true);
     answer(&mut world);
-    assert!(storing(&world).is_empty(), "the map may be found yet");
+    assert!(storing(&world).is_empty(), "the map may still be found");
     world.find(0);
     world.event(Event::Scanned);
-    assert!(storing(&world).is_empty(), "and now it is its turn");
+    assert!(storing(&world).is_empty(), "the map is judged first");
     world.settle();
     assert_eq!(world.said_of_maps[&1], [0]);
     let told = world.stored.iter().filter(|it| **it == 1);
@@ -175,7 +171,7 @@ fn client_gets_scenario_verdict_only_after_its_map() {
     // verdict.
     world.store(1, true);
     assert_eq!(world.judged[&1].1, Verdict::Undetermined);
-    assert!(!world.waiting.is_empty(), "its map has no verdict yet");
+    assert!(!world.waiting.is_empty(), "the map has no verdict yet");
     world.settle();
     assert!(world.waiting.is_empty());
     assert_eq!(world.judged[&1].1, Verdict::Rejected);

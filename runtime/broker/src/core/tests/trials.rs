@@ -59,7 +59,7 @@ impl World {
             self.prepare(0, true);
             self.pass(Duration::from_millis(100));
         }
-        panic!("it is asked nothing: {:#?}", self.state.jobs);
+        panic!("the shadow must get a job: {:#?}", self.state.jobs);
     }
 }
 
@@ -80,7 +80,7 @@ impl World {
                 return;
             }
         }
-        panic!("it does not come to rest: {:#?}", self.state.jobs);
+        panic!("the world must settle: {:#?}", self.state.jobs);
     }
 }
 
@@ -88,7 +88,7 @@ impl World {
 pub fn found_in(job: &FinishedJob) -> TrialEnd {
     let said: Vec<_> = job.bundles.iter().map(TaskOutcome::said).collect();
     let names: Vec<&str> = said.iter().map(|it| &*it.name).collect();
-    assert_eq!(names, [SHADOW], "nobody else is asked");
+    assert_eq!(names, [SHADOW], "only the shadow is asked");
     let mut checkers = said.iter().flat_map(|it| &it.checkers);
     let errors = checkers.any(|it| !it.issues.is_empty());
     let adds = match errors {
@@ -136,7 +136,7 @@ fn shadow_checks_all_files_without_delaying_verdicts() {
     assert_eq!(
         world.stored.len(),
         2,
-        "nothing is judged again because of it"
+        "no file is judged again because of the shadow"
     );
     assert!(world.members.contains_key("First") && !world.members.contains_key(SHADOW));
     world.comes_to_rest();
@@ -180,7 +180,11 @@ fn hanging_shadow_delays_neither_verdicts_nor_drain() {
     assert_eq!(world.judged.len(), 6);
     assert_eq!(world.jobs_at(SHADOW), 1);
     world.event(Event::Drain);
-    assert_eq!(world.jobs_at(SHADOW), 0, "its trial is not waited for");
+    assert_eq!(
+        world.jobs_at(SHADOW),
+        0,
+        "the broker does not wait for the trial"
+    );
     world.drain();
 }
 
@@ -207,7 +211,7 @@ fn shadow_that_dies_with_file_is_retried_once() {
     assert_eq!(
         world.judged[&0].1,
         Verdict::Accepted,
-        "that is no matter of the verdict"
+        "a failed trial does not change the verdict"
     );
     assert_eq!(world.stored.len(), 1);
 }
@@ -329,8 +333,14 @@ fn bundle_is_required_only_while_it_is_no_shadow() {
             .state
             .stands(entry.kind, entry.judged.as_ref().unwrap())
     };
-    assert!(!stands(&world), "a verdict without it stands no more");
-    assert!(world.members.contains_key(SHADOW), "and the journal knows");
+    assert!(
+        !stands(&world),
+        "a verdict without the new bundle is no longer valid"
+    );
+    assert!(
+        world.members.contains_key(SHADOW),
+        "the journal records the new required bundle"
+    );
     assert_eq!(world.state.trials(SHADOW), None);
     world.event(Event::Children {
         specs: vec![shadow(1)],
@@ -352,7 +362,10 @@ fn shadow_is_never_treated_as_flapping() {
             world.pass(Duration::from_millis(100));
         }
         world.child_joins();
-        assert!(world.state.bundles[SHADOW].ready, "it is believed at once");
+        assert!(
+            world.state.bundles[SHADOW].ready,
+            "the shadow is accepted at once"
+        );
     }
     assert_eq!(world.stored.len(), 1);
 }

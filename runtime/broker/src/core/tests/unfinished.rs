@@ -28,7 +28,7 @@ fn file_being_written_leaves_gate_and_has_no_verdict() {
     assert!(!unpublishes(&write_slowly(&mut world), 1), "once");
     let asked = comes_of(&mut world, waits(1, None, None));
     assert!(answers(&asked).is_empty());
-    assert!(world.preparing.is_empty(), "it is not read");
+    assert!(world.preparing.is_empty(), "the file is not read");
 }
 
 #[test]
@@ -95,7 +95,7 @@ fn verdict_stands_when_unfinished_file_is_restored() {
     let (path, stamp) = (path_of(0), before);
     world.event(Event::Settled { path, stamp });
     world.settle();
-    assert_eq!(world.stored.len(), stored, "nothing is judged again");
+    assert_eq!(world.stored.len(), stored, "no file is judged again");
     let asked = asked_for_1(&mut world);
     assert!(matches!(answers(&asked)[..], [Response::Verdict(_)]));
 }

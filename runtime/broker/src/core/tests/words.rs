@@ -137,7 +137,7 @@ fn invalid_message_ends_the_session() {
     assert!(world.state.bundles["First"].session.is_none());
     assert!(
         world.state.bundles["First"].origin.is_some(),
-        "it must judge"
+        "the bundle is still required"
     );
 }
 
@@ -152,7 +152,10 @@ fn unreadable_file_is_undetermined() {
     world.event(Event::Prepared { job, result });
     let finished = &world.storing[0];
     assert_eq!(finished.unreadable.as_deref(), Some("it is a directory"));
-    assert!(finished.prepared.is_none(), "there is nothing to refer to");
+    assert!(
+        finished.prepared.is_none(),
+        "there are no documents to refer to"
+    );
     assert_eq!(named(&finished.required_set), world.expected_set());
     let failure = finished.bundles[0].failure.as_deref();
     assert_eq!(failure, Some("it is a directory"));
@@ -198,13 +201,13 @@ fn restored_file_is_rewritten_if_another_result_was_begun() {
     world.put(0, content);
     world.pass(world.state.settings.retry_after);
     world.store(0, true);
-    assert_eq!(world.stored.len(), 1, "what is stale is not stored");
+    assert_eq!(world.stored.len(), 1, "a stale result is not stored");
     world.until_stored(2);
     world.put(0, content);
     world.prepare(0, true);
     assert!(
         world.storing.is_empty() && world.stored.len() == 2,
-        "its own result lies there"
+        "the stored result matches the file"
     );
 }
 
@@ -218,12 +221,12 @@ fn ended_job_retries_one_file_waiting_for_bus() {
         world.event(Event::Prepared { job, result });
     }
     let waiting = |world: &World| world.preparing.iter().map(|it| it.1).collect::<Vec<_>>();
-    assert!(waiting(&world).is_empty(), "no job has ended");
+    assert!(waiting(&world).is_empty(), "no job has ended yet");
     world.until_judged(1);
     assert_eq!(
         waiting(&world),
         [1],
-        "the one that came first, and no other"
+        "only the file that came first is retried"
     );
     let pause = world.state.settings.busy_pause;
     world.pass(pause);
@@ -247,7 +250,7 @@ fn temporary_read_error_is_retried_and_then_reported() {
         hinder(&mut world);
         world.pass(pause - tick);
         assert!(world.preparing.is_empty(), "not yet");
-        assert!(world.storing.is_empty(), "nothing is said of it");
+        assert!(world.storing.is_empty(), "nothing is stored yet");
         world.pass(tick);
         pause *= 2;
     }
@@ -368,7 +371,7 @@ fn client_waiting_for_unchecked_file_is_informed() {
     world.write(4);
     let path = path_of(4);
     let actions = comes_of(&mut world, Event::Vanished { path });
-    assert!(answers(&actions).is_empty(), "it is being read");
+    assert!(answers(&actions).is_empty(), "the file is being read");
     let (job, _) = world.preparing.remove(0);
     let result = Err(PrepareFailure::Vanished);
     let actions = comes_of(&mut world, Event::Prepared { job, result });
@@ -408,7 +411,7 @@ fn inputs_of_result_being_written_are_known() {
     world.put(2, 20);
     assert!(
         world.state.inputs_of(&path_of(2)).is_empty(),
-        "nothing is read"
+        "no file is read yet"
     );
     world.prepare(0, true);
     world.answer(0);
@@ -489,7 +492,7 @@ fn client_waiting_for_missing_file_gets_no_old_verdict() {
         ends(&mut world);
         assert!(
             !world.waiting.contains_key(&request_id),
-            "now there is an answer"
+            "the client has an answer"
         );
     }
 }
@@ -507,7 +510,7 @@ fn findings_of_killed_process_are_discarded() {
     world.answer(0);
     let said = &world.storing[0].bundles[0].said();
     let found: Vec<usize> = said.checkers.iter().map(|it| it.issues.len()).collect();
-    assert_eq!(found, [0, 0], "the second process has found nothing");
+    assert_eq!(found, [0, 0], "the second process found nothing");
 }
 
 #[test]
@@ -520,7 +523,7 @@ fn reading_is_limited_by_room_for_documents() {
         for file in [0, 4, 6, 7, 2, 1] {
             world.write(file);
         }
-        assert_eq!(world.preparing.len(), 2, "more are not read at a time");
+        assert_eq!(world.preparing.len(), 2, "no more files are read at a time");
         while !world.preparing.is_empty() {
             world.prepare(0, true);
             assert!(world.preparing.len() <= 2);
@@ -566,7 +569,7 @@ fn run_does_not_wait_for_reporter_that_cannot_start() {
     world.write(0);
     world.until_judged(1);
     world.pass(Duration::ZERO);
-    assert_eq!(world.stopped, 0, "it may come yet");
+    assert_eq!(world.stopped, 0, "the reporter may still start");
     world.child_ends(ChildEnd::NotStarted("no such program".to_owned()));
     world.pass(Duration::ZERO);
     world.answer(0);

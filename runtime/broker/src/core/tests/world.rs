@@ -292,10 +292,7 @@ impl World {
         self.now += time;
         self.event(Event::Tick);
         let late = self.until.values().any(|until| *until <= self.now);
-        assert!(
-            !late,
-            "whoever does not wait for ever is told when it is over"
-        );
+        assert!(!late, "a request with a time limit is answered in time");
     }
 
     /// Lets the connected bundles work until this number of files is judged.
@@ -308,7 +305,7 @@ impl World {
                 return;
             }
         }
-        panic!("{files} are not judged: {:?}", self.judged);
+        panic!("expected {files} judged files, found {:?}", self.judged);
     }
 
     /// Lets the bundles work until this number of results is stored.
@@ -322,7 +319,7 @@ impl World {
             self.answer(1);
             self.store(0, true);
         }
-        panic!("only {:?} are stored", self.stored);
+        panic!("too few files are stored: {:?}", self.stored);
     }
 
     /// Connects all bundles and lets every participant do some work.
@@ -350,7 +347,7 @@ impl World {
             }
             self.go_on();
         }
-        panic!("it does not stop: {:#?}", self.state.jobs);
+        panic!("the broker must stop: {:#?}", self.state.jobs);
     }
 
     /// Finishes all work under way while both bundles are connected.
@@ -366,13 +363,10 @@ impl World {
             let all = all && self.state.files.is_quiet() && self.state.jobs.is_empty();
             let all = all && self.shadow_rests();
             if all && self.reporter_rests() {
-                assert_eq!(self.lost, BTreeSet::new(), "results are missing");
+                assert_eq!(self.lost, BTreeSet::new(), "no result may be missing");
                 return;
             }
         }
-        panic!(
-            "the state machine does not come to rest: {:#?}",
-            self.state.jobs
-        );
+        panic!("the state machine must settle: {:#?}", self.state.jobs);
     }
 }

@@ -88,7 +88,10 @@ fn checker_list_counts_as_written_only_with_its_job() {
     );
     let entry = with_history(1, history_of(&["old"]));
     journal.write(std::slice::from_ref(&entry)).unwrap_err();
-    assert!(journal.remembered().unwrap().is_empty(), "all or nothing");
+    assert!(
+        journal.remembered().unwrap().is_empty(),
+        "either everything is written or nothing"
+    );
     refuse(&journal, "DROP TRIGGER no");
     journal.write(&[entry]).unwrap();
     assert_eq!(checkers_of(&journal, 1).len(), 3);
@@ -116,7 +119,11 @@ fn history_of_schema_3_is_kept() {
     let skipped = ("old".to_owned(), "skipped".to_owned(), 0);
     assert_eq!(checkers_of(&journal, 7), [skipped]);
     assert_eq!(journal.prune(Duration::from_secs(60)).unwrap(), 1);
-    assert_eq!(checkers_of(&journal, 7), [], "it goes with its job");
+    assert_eq!(
+        checkers_of(&journal, 7),
+        [],
+        "removed together with its job"
+    );
 }
 
 #[test]
@@ -167,9 +174,13 @@ fn waiting_entries_are_written_together_and_fail_alone() {
     let first = shared.note(&[delivered("json")]);
     let bad = shared.note(&[delivered("half"), spoilt]);
     let last = shared.note(&[delivered("text")]);
-    assert_eq!(known(), 0, "nothing is written before somebody does");
+    assert_eq!(known(), 0, "nothing is written before `settle`");
     shared.settle(&last).unwrap();
-    assert_eq!(known(), 2, "and then all that waits, but what cannot be");
+    assert_eq!(
+        known(),
+        2,
+        "everything pending is written, except the invalid delivery"
+    );
     assert!(shared.settle(&bad).is_err());
     assert_eq!(known(), 2);
     shared.settle(&first).unwrap();

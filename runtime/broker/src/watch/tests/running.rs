@@ -79,7 +79,10 @@ impl Watched {
                 }
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
                     let some: Vec<&String> = missing.iter().take(5).collect();
-                    panic!("{} not told, such as {some:?}", missing.len());
+                    panic!(
+                        "{} events were not reported, for example {some:?}",
+                        missing.len()
+                    );
                 }
             }
         }
