@@ -1,10 +1,10 @@
-# What people type. Each recipe is one command that can be typed without `just` as well.
+# Common commands. Each recipe is a command that also works without `just`.
 
 # List the recipes.
 default:
     @just --list
 
-# Everything that must hold before a change is merged: what CI runs.
+# Run all checks that must pass before a change is merged, as CI does.
 ready:
     .ci/run
 
@@ -24,37 +24,37 @@ test *ARGS:
 bless:
     INSTA_UPDATE=always QCBUS_BLESS=1 cargo test --workspace
 
-# Check the sample farm; ends with exit code 1, because of its faulty files.
+# Check the sample farm. The exit code is 1, because the farm has faulty files.
 farm:
     cargo run --release -- check tests/farm
 
-# Try the pages of the HTML report in Chromium, those of the sample farm among them; needs node and npm.
+# Test the pages of the HTML report in Chromium, including those of the sample farm; needs node and npm.
 browser:
     cargo build -p qcbus
     -target/debug/qcbus check tests/farm --quiet --out target/pages/out --output-format html=target/pages/farm.html
     reporters/html/browser/run target/pages
 
-# Make the wheel of the Python package, with the program `qcbus` in it; needs Python.
+# Build the wheel of the Python package with the program `qcbus`; needs Python.
 wheel *ARGS:
     bundles/python/wheel {{ARGS}}
 
-# Make it, install it into an empty environment and test it there; needs Python.
+# Build the wheel, install it into an empty environment and test it there; needs Python.
 python *ARGS:
     bundles/python/run-tests {{ARGS}}
 
-# Times beside a rival, whose command line is in QCBUS_RIVAL: 'PROGRAM ARGS {}'.
+# Compare times with a rival; QCBUS_RIVAL has its command line: 'PROGRAM ARGS {}'.
 bench-rivals *ARGS:
     cargo build --release -p qcbus
     python3 tests/rivals.py {{ARGS}}
 
-# Instructions of the hot paths beside the last ones; needs valgrind. QCBUS_BLESS=1 keeps the new ones.
+# Compare the instructions of the hot paths with the stored ones; needs valgrind. QCBUS_BLESS=1 stores the new ones.
 figures:
     cargo bench -p qcbus-benches --bench instructions
 
-# Advisories, licences and bans of dependencies; needs cargo-deny.
+# Check advisories, licences and bans of dependencies; needs cargo-deny.
 deny:
     cargo deny --all-features check
 
-# Documentation of all our crates.
+# Build the documentation of all our crates.
 doc:
     cargo doc --workspace --no-deps --open

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Times `qcbus expand` on an archive, and the reference tool on the same one, in one run.
+"""Times `qcbus expand` and the reference tool on the same archive in one run.
 
     cargo build --release -p qcbus
     python3 tests/modular_speed.py [--tool Modular2Simple.java] [--runs N]
 
-The archive is made here: a scenario with 16 references to a library. Prints a table in Markdown: the CPU time
-of a whole process of each, and the ratio. Without `--tool`, or without a JDK, only ours is timed, and that is
-said. Not part of CI: it measures.
+The script makes the archive: a scenario with 16 references to a library. It prints a table in Markdown: the CPU
+time of a whole process of each, and the ratio. Without `--tool` or a JDK it times only ours and prints a note.
+It is a benchmark and not part of CI.
 """
 
 import argparse
@@ -24,7 +24,7 @@ REFERENCES = 16
 
 
 def scenario(groups):
-    """A scenario whose only act has these groups."""
+    """Returns a scenario with one act that has these groups."""
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n<OpenSCENARIO>\n'
         '<FileHeader revMajor="1" revMinor="0" date="2026-01-01T00:00:00" description="d" author="a"/>\n'
@@ -34,7 +34,7 @@ def scenario(groups):
 
 
 def library_group(number):
-    """A group with a dozen attributes on offer."""
+    """Returns a group with a dozen parameter attributes."""
     positions = "\n".join(
         f'<Action name="a{at}"><PrivateAction><RoutingAction><AcquirePositionAction><Position>'
         f'<WorldPosition parameterAttributes="x,y,z,h" x="{at}" y="0" z="0" h="0"/></Position>'
@@ -49,7 +49,7 @@ def library_group(number):
 
 
 def reference(number):
-    """A group that takes one of the library's, with values of its own."""
+    """Returns a group that refers to one of the library, with its own values."""
     return (
         f'<ManeuverGroup name="P{number}" maximumExecutionCount="1">'
         '<Actors selectTriggeringEntities="false"><EntityRef entityRef="ego"/></Actors>'
@@ -61,7 +61,7 @@ def reference(number):
 
 
 def cpu(command, cwd, runs):
-    """Median CPU seconds of a process and its children."""
+    """Returns the median CPU seconds of a process and its children."""
     times = []
     for _ in range(runs):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -72,7 +72,7 @@ def cpu(command, cwd, runs):
 
 
 def main():
-    """Makes the archive and times both."""
+    """Makes the archive and times both tools."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tool", type=pathlib.Path, help="source of the reference tool")
     parser.add_argument("--runs", type=int, default=11)

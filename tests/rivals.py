@@ -1,18 +1,17 @@
 #!/usr/bin/env python3
-"""Times qcbus beside another checker, in turn and in one run, and prints tables with ratios.
+"""Times qcbus and another checker alternately in one run, and prints tables with ratios.
 
     cargo build --release -p qcbus
     python3 tests/rivals.py [--quick] [--rival 'PROGRAM ARGS {}'] [--qcbus PATH] [--cases DIR]
 
-The rival is any command line; `{}` becomes the file and `{out}` a temporary directory. The variable
-QCBUS_RIVAL names one, too. Another qcbus is a rival as well, and its `serve` is compared with ours:
+The rival is any command line; `{}` becomes the file and `{out}` a temporary directory. It can also be
+given in the variable QCBUS_RIVAL. If the rival is another qcbus, its `serve` is compared with ours:
 
     python3 tests/rivals.py --rival 'OTHER/qcbus check {} --quiet --out {out}'
 
-Times are medians of whole processes on the clock on the wall, ours and the rival's in turn; CPU is
-that of all processes of a run. Real maps are taken from the corpus (`../shared/cases` unless told
-otherwise); what is missing is skipped, and said. Ends with 1 when a run of ours failed: that is no
-figure. Not part of CI: it measures.
+Times are medians of the wall time of whole processes, ours and the rival's alternately. CPU is that of
+all processes of a run. Real maps are from the corpus (default `../shared/cases`). Missing maps are
+skipped with a message. The exit code is 1 if a run of ours failed. It is a benchmark and not part of CI.
 """
 
 import argparse
@@ -34,17 +33,17 @@ import sys
 import tempfile
 import time
 
-sys.dont_write_bytecode = True  # the tree stays as it is
+sys.dont_write_bytecode = True  # no cache files in the tree
 import xodr_speed
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-# Accepted, rejected, undetermined: a verdict. All else is none.
+# Exit codes with a verdict: accepted, rejected, undetermined.
 VERDICTS = (0, 1, 3)
-# Seconds that a run of ours, or a verdict, may take.
+# Maximum seconds for a run of ours or a verdict.
 LIMIT = 300
-# As a farm does: a file comes while nothing else is done.
+# Seconds of idle time before each file, as on a farm.
 REST = 0.03
-# Maps by what they are called here, and how many runs of each: all, and with --quick.
+# Maps by name, with the number of runs: normally, and with --quick.
 MAPS = {
     "7 KB": (xodr_speed.SMALL, 31, 9),
     "324 KB, 1.8": (xodr_speed.MOTORWAY, 21, 7),
@@ -77,18 +76,18 @@ def skip(what):
 
 
 class Failed(Exception):
-    """A run of ours that is no figure."""
+    """A run of ours that failed."""
 
 
 class Slow(Exception):
-    """A run of the rival that took too long, or failed."""
+    """A run of the rival that took too long or failed."""
 
 
 Run = collections.namedtuple("Run", "wall cpu code")
 
 
 def spawn(command, cores=None, log=None):
-    """Starts a process, on some cores only if told so. It inherits them, and so do its children."""
+    """Starts a process, on the given cores only if any. Its children inherit them."""
     before = os.sched_getaffinity(0)
     try:
         if cores:
@@ -101,18 +100,18 @@ def spawn(command, cores=None, log=None):
 
 
 def kill(process):
-    """Ends a process that was started here, and its children: they are a session of their own."""
+    """Kills a process started by this script, and its children. They are a session of their own."""
     try:
         os.killpg(process.pid, signal.SIGKILL)
     except ProcessLookupError:
-        pass  # it was quicker
+        pass  # it has ended already
 
 
 PR_SET_CHILD_SUBREAPER = 36
 
 
 def adopt():
-    """Who outlives its parent becomes a child of this process, so that its CPU time can be asked for."""
+    """Makes orphaned descendants children of this process, so that their CPU time can be read."""
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
@@ -121,12 +120,12 @@ def children():
     return {int(child) for task in tasks for child in (task / "children").read_text().split()}
 
 
-# Brokers that run.
+# Running brokers.
 serving = set()
 
 
 def reap():
-    """Waits for those that a process left behind, and gives their CPU seconds."""
+    """Waits for the processes that an ended process left, and returns their CPU seconds."""
     used, end = 0.0, time.monotonic() + 30
     while left := children() - serving:
         for pid in left:
@@ -139,7 +138,7 @@ def reap():
 
 
 def run(command, limit, cores=None):
-    """A whole process: milliseconds on the wall and on the CPU, and its exit code. None: too long."""
+    """Runs a process. Returns its wall and CPU milliseconds and its exit code, or None after the limit."""
     start = time.perf_counter()
     process = spawn(command, cores)
     watch = os.pidfd_open(process.pid)
@@ -161,7 +160,7 @@ def run(command, limit, cores=None):
 
 
 class Qcbus:
-    """A qcbus: ours, or another one that is the rival."""
+    """A qcbus: ours or the rival."""
 
     def __init__(self, program):
         self.program = program
@@ -187,13 +186,13 @@ class Qcbus:
 
 
 class Rival:
-    """Another checker, by its command line."""
+    """Another checker, given by its command line."""
 
     def __init__(self, line, limit, out):
         self.words = shlex.split(line)
         self.limit, self.out = limit, out
         if not any("{}" in word for word in self.words):
-            sys.exit("--rival: {} must stand where the file belongs")
+            sys.exit("--rival: {} must mark the place of the file")
         program = shutil.which(self.words[0])
         self.name = None if program is None else line
         self.qcbus = None
@@ -204,7 +203,7 @@ class Rival:
         self.given_up = set()
 
     def check(self, path):
-        """A process for one file. What once took too long is not tried again."""
+        """Runs a process for one file. A file that failed or took too long is not tried again."""
         if path in self.given_up:
             raise Slow("given up before")
         values = {"{}": str(path), "{out}": str(self.out)}
@@ -221,7 +220,7 @@ class Rival:
 
 
 class Arrivals:
-    """Hears of files that appear in a directory, without looking again and again."""
+    """Waits for files in a directory without polling."""
 
     CREATE, MOVED_TO = 0x100, 0x80
 
@@ -234,19 +233,19 @@ class Arrivals:
             raise OSError(ctypes.get_errno(), "inotify")
 
     def wait_for(self, names, alive, limit=LIMIT):
-        """The time at which the last of these files was there, while the one who makes them lives."""
+        """Returns the time at which the last of these files appeared. Fails if their writer ends."""
         missing, end = set(names), time.perf_counter() + limit
         while missing:
             ready, _, _ = select.select([self.events], [], [], 0.5)
             now = time.perf_counter()
             if ready:
                 missing -= self.heard()
-            else:  # an event may be lost, a file is not
+            else:  # an event may be lost, but the file exists
                 missing -= {name for name in missing if (self.directory / name).exists()}
             if missing and not alive():
                 raise Failed("the broker has ended")
             if missing and now > end:
-                raise Failed(f"{len(missing)} of {len(names)} files are not there, such as {min(missing)}")
+                raise Failed(f"{len(missing)} of {len(names)} files are missing, such as {min(missing)}")
         return now
 
     def heard(self):
@@ -263,7 +262,7 @@ class Arrivals:
 
 
 class Server:
-    """`qcbus serve`, warm: it has judged a few maps when this is made."""
+    """`qcbus serve`, warm: it has judged a few maps after the constructor."""
 
     def __init__(self, qcbus, base, cores=None):
         self.base = pathlib.Path(tempfile.mkdtemp(dir=base))
@@ -285,14 +284,14 @@ class Server:
             raise
 
     def stage(self, text):
-        """Puts a map beside the watched directory, ready to be renamed into it. Returns its name."""
+        """Writes a map beside the watched directory for a later rename. Returns its name."""
         self.count += 1
         path = self.staging / f"{self.count}.xodr"
         path.write_bytes(text)
         return path.name
 
     def deliver(self, *names):
-        """Milliseconds from the first rename into place to the last verdict file."""
+        """Returns the milliseconds from the first rename to the last verdict file."""
         start = time.perf_counter()
         for name in names:
             os.rename(self.staging / name, self.inbox / name)
@@ -307,7 +306,7 @@ class Server:
         return sum(1 for verdict in verdicts if verdict not in ("accepted", "rejected"))
 
     def stop(self):
-        """Asks it to finish, and waits until it has."""
+        """Stops the server and waits for its end."""
         self.process.terminate()
         try:
             code = self.process.wait(60)
@@ -323,12 +322,12 @@ class Server:
             fail(f"{self.name} serve ended with {code}: {' / '.join(said)}")
         elif open_ones := self.undetermined():
             note(f"{open_ones} verdicts of {self.name} serve are undetermined")
-        # What it wrote stays until all is measured: ext4 without a journal does not give an inode that was
-        # freed a minute ago to a new file, and looks for another past all of them, at the cost of who comes next.
+        # The files stay until the end of all measurements. ext4 without a journal does not reuse an inode that was
+        # freed a minute ago and searches past all of them, which would slow down the next measurement.
 
 
 def distinct(text, number):
-    """The map with another name in its header: other bytes, the same work."""
+    """Returns the map with another name in its header: different bytes, the same work."""
     start = text.index(b"<header")
     end = text.index(b">", start)
     header = re.sub(rb'\sname\s*=\s*"[^"]*"', b"", text[start:end])
@@ -336,7 +335,7 @@ def distinct(text, number):
 
 
 def in_turn(runs, ours, theirs):
-    """What both gave in so many runs; who is first changes. `theirs` may be None, or fail: then says why."""
+    """Returns the results of both in alternating order, and the reason why `theirs` has none, if it is None or fails."""
     gave, why = ([], []), None
     for turn in range(runs):
         order = (0, 1) if turn % 2 == 0 else (1, 0)
@@ -356,7 +355,7 @@ def number(value):
 
 
 def times(name, ours, theirs, without, ratio=lambda ours, theirs: theirs / ours):
-    """A row of medians and what they are to each other; `without` says why there is no other one."""
+    """Prints a row of medians and their ratio. `without` is the reason why the rival has no figure."""
     median = lambda runs: statistics.median(getattr(it, "wall", it) for it in runs)
     cpu = lambda runs: number(statistics.median(it.cpu for it in runs)) if runs and hasattr(runs[0], "cpu") else "–"
     mine = median(ours)
@@ -384,14 +383,14 @@ class Bench:
         for name, (file, runs, quick) in MAPS.items():
             source = xodr_speed.MADE.get(file, (file,))[0]
             if not (cases / source).is_file():
-                skip(f"maps of {name}: {cases / source} is not there (--cases DIR)")
+                skip(f"maps of {name}: {cases / source} not found (--cases DIR)")
                 continue
             path = xodr_speed.make_map(cases, made, file) if file in xodr_speed.MADE else cases / file
             found[name] = (path, quick if self.args.quick else runs)
         return found
 
     def row(self, name, measure):
-        """One row. A failure of ours takes its place, and the rest goes on."""
+        """Prints one row. A failure of ours is printed instead, and the other rows follow."""
         try:
             measure()
         except Failed as error:
@@ -423,12 +422,12 @@ class Bench:
         times("200 files of 10 KB, in one go", *in_turn(runs, ours, theirs))
 
     def warm(self):
-        """What `check` takes when a broker of the instance runs, whose bundles are warm."""
+        """Times `check` with a running broker of the instance and warm bundles."""
         if "7 KB" not in self.maps:
             return
         path, runs = self.maps["7 KB"]
         if not self.ours.has_warm:
-            print("| 7 KB, a broker runs | – | not there | – | – | – | – |", flush=True)
+            print("| 7 KB, a broker runs | – | not supported | – | – | – | – |", flush=True)
             return skip("a warm `check`: `qcbus check --help` has no --cold")
         server = Server(self.ours, self.base)
         try:
@@ -439,7 +438,7 @@ class Bench:
             server.stop()
 
     def servers(self, measure, cores=None):
-        """Calls with our server and, where the rival is a qcbus, its."""
+        """Calls a function with our server and, if the rival is a qcbus, with its server."""
         servers = [Server(self.ours, self.base, cores)]
         try:
             if self.rival and self.rival.qcbus:
@@ -517,7 +516,7 @@ class Bench:
                 self.row(say, lambda: self.stream(say, qcbus, one, two))
 
     def stream(self, say, qcbus, one, two):
-        """Many maps at once through `serve`, on one core and on two, in turn."""
+        """Measures many maps at once through `serve`, alternately on one core and on two."""
         text = self.maps["1.3 MB, 1.8"][0].read_bytes()
         count, runs = (12, 3) if self.args.quick else (40, 7)
 
@@ -536,14 +535,14 @@ class Bench:
 
 
 def gain(name, one, two, why, ratio):
-    """A row of what a second core gives. Ours is both: what fails on two cores failed."""
+    """Prints a row about the gain of a second core. Both runs are ours, so a failure on two cores is a failure."""
     if not two:
         raise Failed(why)
     times(name, one, two, why, ratio)
 
 
 def cores():
-    """Two cores that this process has, of different hearts if there are such."""
+    """Returns two cores of this process, on different physical cores if possible."""
     ours = sorted(os.sched_getaffinity(0))
 
     def heart(core):
@@ -570,14 +569,14 @@ def machine():
 
 
 def our_program(args):
-    """The program to measure, built if it is not there."""
+    """Returns the program to measure, and builds it if it is missing."""
     if args.qcbus:
         found = shutil.which(args.qcbus)
-        return found or sys.exit(f"--qcbus: there is no program {args.qcbus}")
+        return found or sys.exit(f"--qcbus: program not found: {args.qcbus}")
     program = ROOT / "target/release/qcbus"
     if not program.is_file():
         if shutil.which("cargo") is None:
-            skip("everything: there is no target/release/qcbus, and no cargo to build it")
+            skip("everything: target/release/qcbus is missing, and no cargo to build it")
             sys.exit(0)
         subprocess.run(["cargo", "build", "--release", "-p", "qcbus"], cwd=ROOT, check=True)
     return str(program)
@@ -587,11 +586,11 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rival", default=os.environ.get("QCBUS_RIVAL"), help="its command line; {} is the file")
     parser.add_argument("--rival-limit", type=float, default=120.0, help="seconds for a run of the rival")
-    parser.add_argument("--qcbus", help="ours (default: target/release/qcbus)")
+    parser.add_argument("--qcbus", help="our program (default: target/release/qcbus)")
     parser.add_argument("--cases", type=pathlib.Path, default=ROOT.parent / "shared/cases")
     parser.add_argument("--quick", action="store_true", help="fewer runs")
     args = parser.parse_args()
-    # Whoever ends this ends what it started, too.
+    # SIGTERM must also end the processes that this script started.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     adopt()
     ours = Qcbus(our_program(args))
@@ -599,7 +598,7 @@ def main():
         base = pathlib.Path(directory).resolve()
         rival = Rival(args.rival, args.rival_limit, base / "other") if args.rival else None
         if rival is None or rival.name is None:
-            missing = "no --rival and no QCBUS_RIVAL" if rival is None else f"no program {rival.words[0]}"
+            missing = "no --rival and no QCBUS_RIVAL" if rival is None else f"program not found: {rival.words[0]}"
             skip(f"the rival: {missing}")
             rival = None
         bench = Bench(args, base, ours, rival)

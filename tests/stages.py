@@ -1,13 +1,12 @@
 #!/usr/bin/env python3
-"""What a file costs each thread of `qcbus serve` and of its bundles, and what more cores would make of it.
+"""CPU time of a file in each thread of `qcbus serve` and its bundles, and a prediction for more cores.
 
     cargo build --release -p qcbus
     python3 tests/stages.py [--qcbus PATH] [--cases DIR]
 
-CPU time is that of the scheduler (`/proc/PID/task/TID/schedstat`), while many files come at once. From it follows a
-model: no more files per second than there are cores for all of it, and no more than the one thread of the
-broker's loop can pass on. The rate that was measured stands beside what the model says for this machine. Not part of
-CI: it measures.
+The CPU time is that of the scheduler (`/proc/PID/task/TID/schedstat`) while many files arrive at once. A model limits
+the files per second by the CPU time of all cores and by the single thread of the broker's loop. The table shows the
+measured rate beside the model. It is a benchmark and not part of CI.
 """
 
 import argparse
@@ -19,25 +18,25 @@ import signal
 import sys
 import tempfile
 
-sys.dont_write_bytecode = True  # the tree stays as it is
+sys.dont_write_bytecode = True  # no cache files in the tree
 import rivals
 import xodr_speed
 
-# Whose thread it is, by its name in the broker. All others of its threads are few and idle.
+# Stages of the broker by thread name. Its other threads are few and idle.
 BROKER = {"qcbus": "loop", "tokio-rt-worker": "readers", "write": "writers"}
 CORES = (2, 16, 64)
 RUNS = 3
 
 
 def below(pid):
-    """A process and all that it has started, and they have."""
+    """Returns a process and all its descendants."""
     tasks = pathlib.Path(f"/proc/{pid}/task").iterdir()
     children = {int(it) for task in tasks for it in (task / "children").read_text().split()}
     return [pid, *(one for child in children for one in below(child))]
 
 
 def used(server):
-    """Milliseconds of CPU by stage, since the threads were started."""
+    """Returns the milliseconds of CPU by stage since the start of the threads."""
     sums = collections.Counter()
     for pid in below(server.process.pid):
         for task in pathlib.Path(f"/proc/{pid}/task").iterdir():
@@ -45,14 +44,14 @@ def used(server):
                 name = re.sub(r"-?\d+$", "", (task / "comm").read_text().strip())
                 spent = int((task / "schedstat").read_text().split()[0]) / 1e6
             except OSError:
-                continue  # it has ended
+                continue  # the thread has ended
             is_broker = pid == server.process.pid
             sums[BROKER.get(name, "rest of the broker") if is_broker else "bundles"] += spent
     return sums
 
 
 def burst(server, texts):
-    """Milliseconds of CPU for each file, by stage, and files per second."""
+    """Returns the milliseconds of CPU per file by stage, and the files per second."""
     names = [server.stage(text) for text in texts]
     before = used(server)
     took = server.deliver(*names)
@@ -61,7 +60,7 @@ def burst(server, texts):
 
 
 def best_of(qcbus, base, texts):
-    """The burst with the highest rate: what else the machine does only takes away from it."""
+    """Returns the burst with the highest rate, because other load on the machine only lowers it."""
     server = rivals.Server(qcbus, base)
     try:
         numbers = itertools.count()
@@ -73,7 +72,7 @@ def best_of(qcbus, base, texts):
 
 
 def rate(costs, cores):
-    """Files per second by the model, and what they wait for."""
+    """Returns the files per second of the model and the limiting resource."""
     by_cores, by_loop = 1e3 * cores / sum(costs.values()), 1e3 / costs["loop"]
     return min((by_cores, "cores"), (by_loop, "loop"))
 
@@ -90,10 +89,10 @@ def row(name, costs, measured):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("--qcbus", help="ours (default: target/release/qcbus)")
+    parser.add_argument("--qcbus", help="our program (default: target/release/qcbus)")
     parser.add_argument("--cases", type=pathlib.Path, default=rivals.ROOT.parent / "shared/cases")
     args = parser.parse_args()
-    # Whoever ends this ends what it started, too.
+    # SIGTERM must also end the processes that this script started.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     rivals.adopt()
     print(rivals.machine())
@@ -106,7 +105,7 @@ def main():
         row("10 KB", *best_of(qcbus, base, small))
         cases, made = args.cases.resolve(), rivals.ROOT / "target/xodr-speed"
         if not (cases / xodr_speed.MOTORWAY).is_file():
-            return rivals.skip(f"maps of 1.3 MB: {cases} has none (--cases DIR)")
+            return rivals.skip(f"maps of 1.3 MB: not found in {cases} (--cases DIR)")
         made.mkdir(parents=True, exist_ok=True)
         text = xodr_speed.make_map(cases, made, "motorway-x4.xodr").read_bytes()
         row("1.3 MB, 1.8", *best_of(qcbus, base, [text] * 60))

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Times all OpenDRIVE rules on maps of four sizes, and ASAM's own bundle on the same maps.
+"""Times all OpenDRIVE rules and ASAM's own bundle on the same maps of four sizes.
 
     python3 tests/xodr_speed.py [--cases DIR] [--maps DIR] [--runs N] [--no-asam]
 
-Takes two maps of the corpus (`../shared/cases` unless told otherwise), makes large ones of them by
-repeating their roads and junctions with fresh ids, and prints a table in Markdown: the CPU time of
-our rules from the image of the document, in one thread; that of ASAM's bundle (from PyPI, if this
-Python has it: `pip install asam-qc-opendrive`), a process per map, start included; and the ratio.
-Not part of CI: it measures.
+Takes two maps of the corpus (default `../shared/cases`) and makes large ones of them by repeating their
+roads and junctions with new ids. Prints a table in Markdown: the CPU time of our rules from the image of
+the document in one thread; that of ASAM's bundle (from PyPI, if this Python has it:
+`pip install asam-qc-opendrive`), a process per map with its start; and the ratio. It is a benchmark and
+not part of CI.
 """
 
 import argparse
@@ -25,10 +25,10 @@ SMALL = "real/esmini/resources/xodr/straight_500m.xodr"
 TOWN = "real/esmini/resources/xodr/multi_intersections.xodr"
 MOTORWAY = "real/qc-framework/.github/workflows/linux-files/UC_Motorway-Exit-Entry.xodr"
 MEGABYTE = 1_000_000
-# Copies lie so far apart, in metres, that no road of one comes near those of another.
+# Distance between copies in metres, so large that their roads are never close to each other.
 APART = 5000.0
 
-# Attributes that hold ids of the whole file, by element.
+# Attributes with ids of the whole file, by element.
 IDS = {
     "road": ("id", "junction"),
     "predecessor": ("elementId",),
@@ -51,7 +51,7 @@ X = re.compile(r'(<geometry\b[^>]*?\sx\s*=\s*")([^"]*)"')
 
 
 def copied(text, copy):
-    """The elements under fresh ids (numbers stay numbers) and moved to the east."""
+    """Returns the elements with new ids (numbers stay numbers), moved to the east."""
     if copy == 0:
         return text
 
@@ -75,7 +75,7 @@ def copied(text, copy):
 
 
 def repeated(text, size=0, copies=0):
-    """The map with all that follows its header repeated, until it has that size or so many copies."""
+    """Returns the map with everything after its header repeated, up to this size or number of copies."""
     start = text.index("<road ")
     end = text.rindex("</OpenDRIVE>")
     head, body, tail = text[:start], text[start:end], text[end:]
@@ -87,7 +87,7 @@ def repeated(text, size=0, copies=0):
     return "".join(parts) + tail
 
 
-# What is made of which map, and how; `tests/rivals.py` measures some of them, too.
+# Large maps with their source and size; `tests/rivals.py` measures some of them too.
 MADE = {
     "motorway-x4.xodr": (MOTORWAY, {"copies": 4}),
     "town-10MB.xodr": (TOWN, {"size": 10 * MEGABYTE}),
@@ -99,7 +99,7 @@ MADE = {
 
 
 def make_map(cases, directory, name):
-    """The path of a large map, which is made if it is not there. Whoever breaks off leaves no half one."""
+    """Returns the path of a large map and makes it if it is missing. An interrupted run leaves no partial map."""
     path = directory / name
     if not path.exists():
         source, how = MADE[name]
@@ -111,7 +111,7 @@ def make_map(cases, directory, name):
 
 
 def make_maps(cases, directory):
-    """The maps to measure, small ones first."""
+    """Returns the maps to measure, small ones first."""
     large = ("motorway-x4", "town-10MB", "town-20MB", "motorway-10MB", "motorway-20MB")
     made = [make_map(cases, directory, f"{name}.xodr") for name in large]
     return [cases / SMALL, cases / TOWN, cases / MOTORWAY, *made]
@@ -141,7 +141,7 @@ GEOMETRY = """            <geometry s="{s!r}" x="{x!r}" y="{y!r}" hdg="{hdg!r}" 
 
 
 def generated(size, name):
-    """A map of about that size, without faults, for which no corpus is needed. One bend after the other."""
+    """Returns a map of about this size without faults and without the corpus: a series of bends."""
     parts = [
         '<?xml version="1.0" encoding="UTF-8"?>\n<OpenDRIVE>\n'
         f'    <header revMajor="1" revMinor="7" name="{name}" version="1" date="2026-03-02T08:00:00"\n'
@@ -161,7 +161,7 @@ def generated(size, name):
 
 
 def ours(maps, runs):
-    """Best and median CPU milliseconds per map."""
+    """Returns the best and median CPU milliseconds per map."""
     command = ["cargo", "run", "--quiet", "--release", "-p", "qcbus-xodr", "--example", "rule_times"]
     command += ["--", "--runs", str(runs), *map(str, maps)]
     lines = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
@@ -177,7 +177,7 @@ CONFIG = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def asam_checkers():
-    """The ids of all checkers of ASAM's bundle that is installed, or none."""
+    """Returns the ids of all checkers of the installed bundle of ASAM, or an empty list."""
     code = (
         "import pathlib, re, qc_opendrive\n"
         "for file in sorted(pathlib.Path(qc_opendrive.__file__).parent.rglob('*.py')):\n"
@@ -188,7 +188,7 @@ def asam_checkers():
 
 
 def asam(path, checkers, limit):
-    """CPU milliseconds of a whole process that checks one map, and whether it came to its end."""
+    """Returns the CPU milliseconds of a process that checks one map, and whether it ended within the limit."""
     with tempfile.TemporaryDirectory() as directory:
         config = pathlib.Path(directory) / "config.xml"
         result = pathlib.Path(directory) / "result.xqar"

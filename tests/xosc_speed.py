@@ -1,15 +1,14 @@
 #!/usr/bin/env python3
-"""Times qcbus on scenarios, and ASAM's own bundle on the same ones, in one run.
+"""Times qcbus and ASAM's own bundle on the same scenarios in one run.
 
     cargo build --release -p qcbus
     python3 tests/xosc_speed.py [--cases DIR] [--work DIR] [--runs N] [--no-asam]
 
-A small scenario of the corpus (`../shared/cases` unless told otherwise), and large ones that are made
-of it by repeating its stories under fresh names. Prints a table in Markdown: the CPU time of
-`qcbus check`, a whole process with all bundles; that of a warm broker with its bundles, per scenario
-that appears in a directory that it watches; that of ASAM's bundle (from PyPI, if this Python has it:
-`pip install asam-qc-openscenarioxml`), a process per scenario; and the ratios.
-Not part of CI: it measures.
+Uses a small scenario of the corpus (default `../shared/cases`) and makes large ones of it by repeating its
+stories under new names. Prints a table in Markdown with CPU times and their ratios: `qcbus check`, a
+whole process with all bundles; a warm broker with its bundles, per scenario in its watched directory;
+ASAM's bundle (from PyPI, if this Python has it: `pip install asam-qc-openscenarioxml`), a process per
+scenario. It is a benchmark and not part of CI.
 """
 
 import argparse
@@ -24,7 +23,7 @@ import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-# Valid by its schema: ASAM's bundle runs none of its semantic checkers on what is not.
+# Valid by its schema, because ASAM's bundle runs no semantic checker on an invalid scenario.
 SMALL = "real/esmini/resources/xosc/auto_light.xosc"
 MEGABYTE = 1_000_000
 TICK = os.sysconf("SC_CLK_TCK")
@@ -37,7 +36,7 @@ CONFIG = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def repeated(text, size):
-    """The scenario with its stories repeated, every one under names of its own, until it has that size."""
+    """Returns the scenario with its stories repeated under new names until it has this size."""
     start, end = text.index("<Story "), text.rindex("</Story>") + len("</Story>")
     story = text[start:end]
     parts, length, copy = [text[:start]], len(text) - len(story), 0
@@ -50,8 +49,8 @@ def repeated(text, size):
 
 
 def make_scenarios(cases, directory):
-    """The scenarios to measure: name and path, the small one first. Its neighbours are linked beside the
-    large ones, so that their map and catalogs are there."""
+    """Returns the paths of the scenarios to measure, the small one first. Its neighbours are linked beside the
+    large ones, so that their map and catalogs are found."""
     small = cases / SMALL
     home = directory / "xosc"
     home.mkdir(parents=True, exist_ok=True)
@@ -73,7 +72,7 @@ def make_scenarios(cases, directory):
 
 
 def cpu_of(command, directory, limit=None):
-    """CPU milliseconds of a process and its children, and whether it came to its end."""
+    """Returns the CPU milliseconds of a process and its children, and whether it ended within the limit."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     ended = True
     try:
@@ -91,7 +90,7 @@ def one_shot(program, scenario, runs):
 
 
 def family(pid):
-    """CPU seconds of a process and all its children that live."""
+    """Returns the CPU seconds of a process and all its living descendants."""
     total, pids = 0.0, [pid]
     for one in pids:
         fields = pathlib.Path(f"/proc/{one}/stat").read_text().rsplit(")", 1)[1].split()
@@ -109,12 +108,12 @@ def until(what, condition, seconds=120):
     end = time.monotonic() + seconds
     while not condition():
         if time.monotonic() > end:
-            sys.exit(f"waited in vain: {what}")
+            sys.exit(f"timeout: {what}")
         time.sleep(0.02)
 
 
 def warm(program, scenario, copies):
-    """CPU milliseconds per scenario of a broker that is warm: all its processes, for many copies."""
+    """Returns the CPU milliseconds per scenario of all processes of a warm broker, for many copies."""
     with tempfile.TemporaryDirectory() as directory:
         base = pathlib.Path(directory)
         inbox, out = base / "farm/xosc", base / "out"
@@ -129,7 +128,7 @@ def warm(program, scenario, copies):
         command = [program, "serve", inbox, "--out", out, "--instance-dir", base / "instance"]
         broker = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
-            until("the broker is there", lambda: (base / "instance").exists())
+            until("the start of the broker", lambda: (base / "instance").exists())
             (inbox / "first.xosc").write_bytes(text)
             until("the first verdict", lambda: results_in(out) >= 1)
             time.sleep(0.5)
@@ -144,7 +143,7 @@ def warm(program, scenario, copies):
 
 
 def asam_checkers():
-    """The ids of all checkers of ASAM's bundle that is installed, or none."""
+    """Returns the ids of all checkers of the installed bundle of ASAM, or an empty list."""
     code = (
         "import pathlib, re, qc_openscenario\n"
         "for file in sorted(pathlib.Path(qc_openscenario.__file__).parent.rglob('*.py')):\n"

@@ -6,12 +6,12 @@ xmlschema (OpenDRIVE 1.8) on real files and on seeded mutants.
     differential.py --tool TARGET/release/examples/schema_tool --xsd DIR [--files DIR]... [--mutants N]
                     [--seed N]... [--record FILE]
 
-DIR holds one folder of XSDs per table, named like the table: `xodr-1.7/`, `xosc-1.3/` (the script
-`tables_agree.py --keep DIR` makes it). Namespaces: the validator disregards them, so the oracles get
-the files without a default namespace, or with the schema's own.
+DIR has one folder of XSDs per table, named like the table: `xodr-1.7/`, `xosc-1.3/` (the script
+`tables_agree.py --keep DIR` makes it). The validator ignores namespaces, so the oracles get the files
+without a default namespace, or with that of the schema.
 
-Every seed makes `--mutants` of them; whole files are judged once, whatever the seeds. A disagreement
-counts as one in all figures but the last, which leaves out those where `proof.py` proves the other
+Every seed makes `--mutants` mutants. Whole files are judged once, independent of the seeds. All figures
+count every disagreement, except the last one. It leaves out those where `proof.py` proves the other
 validator wrong.
 """
 
@@ -41,7 +41,7 @@ Ours = collections.namedtuple("Ours", "verdict row end_row offset code words")
 
 
 class Tally:
-    """Counts over some rows."""
+    """Counts of some rows."""
 
     def __init__(self, name):
         self.name = name
@@ -49,7 +49,7 @@ class Tally:
         self.reasons = collections.Counter()
 
     def print(self):
-        """One line, and one per class of disagreement."""
+        """Prints one line, and one line per class of disagreement."""
         proven = sum(count for reason, count in self.reasons.items() if reason)
         print(
             f"{self.name}: {self.agreed} of {self.total} verdicts agree ({share(self.agreed, self.total)}), {self.invalid} invalid;"
@@ -71,7 +71,7 @@ def share(part, whole):
 
 
 def table_for(text):
-    """The table a file's header asks for."""
+    """Returns the table for the version in a file's header."""
     kind, header = ("xodr", r"<header\b[^>]*>") if "<OpenDRIVE" in text else ("xosc", r"<FileHeader\b[^>]*>")
     found = re.search(header, text)
     major = re.search(r'revMajor\s*=\s*["\'](\d+)', found.group(0)) if found else None
@@ -81,7 +81,7 @@ def table_for(text):
 
 
 def read(path):
-    """Text of a UTF-8 file without its declaration, or None."""
+    """Returns the text of a UTF-8 file without its declaration, or None."""
     try:
         text = path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
         text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text)
@@ -92,7 +92,7 @@ def read(path):
 
 
 def judge_ours(tool, table, texts):
-    """Our verdict and first finding per text."""
+    """Returns our verdict and first finding per text."""
     with tempfile.TemporaryDirectory() as folder:
         suffix = table.split("-")[0]
         names = []
@@ -111,7 +111,7 @@ def judge_ours(tool, table, texts):
 
 
 def base_documents(options, oracles):
-    """(path, text, table) of our own documents and of the real files."""
+    """Returns (path, text, table) of our own documents and of the real files."""
     bases = []
     own = sorted(DOCUMENTS.glob("*.x*"))
     for path in own + sorted(p for f in options.files for p in f.rglob("*") if p.suffix in (".xodr", ".xosc")):
@@ -126,7 +126,7 @@ def base_documents(options, oracles):
 
 
 def whole_files(bases, oracles):
-    """Every document, also against the other versions of its kind."""
+    """Returns every document, also for the other versions of its kind."""
     work = {name: [] for name in oracles}
     for path, text, name in bases:
         kind = name.split("-")[0]
@@ -137,7 +137,7 @@ def whole_files(bases, oracles):
 
 
 def mutants(bases, oracles, seed, wanted):
-    """So many mutants, half of them of our own documents."""
+    """Returns this number of mutants, half of them of our own documents."""
     rng = random.Random(seed)
     work = {name: [] for name in oracles}
     small = [base for base in bases if len(base[1]) < 60_000]
@@ -157,7 +157,7 @@ def mutants(bases, oracles, seed, wanted):
 
 
 def compare(title, work, oracles, options, record):
-    """Judges all rows by both."""
+    """Judges all rows with both validators."""
     tally = Tally(title)
     judge = lambda table, texts: judge_ours(options.tool, table, texts)
     for name, rows in work.items():

@@ -1,6 +1,6 @@
 """Seeded mutations of XML text as splices: (offset, characters removed, text inserted).
 
-A splice can be replayed by anybody on the same base document, without this program.
+A splice can be applied to the same base document without this program.
 """
 
 import random
@@ -20,7 +20,7 @@ VALUES = [
 
 
 class Element:
-    """One element: where it starts and ends, its tag, attributes, parent and children."""
+    """One element: its start and end, tag, attributes, parent and children."""
 
     def __init__(self, start, tag_end, name, attributes, empty, parent):
         self.start, self.tag_end, self.name, self.empty = start, tag_end, name, empty
@@ -30,7 +30,7 @@ class Element:
 
 
 def elements(text):
-    """All elements of a well-formed text in document order."""
+    """Returns all elements of a well-formed text in document order."""
     found, stack = [], []
     for token in TOKEN.finditer(text):
         if token.group(2) is None:
@@ -54,13 +54,13 @@ def elements(text):
 
 
 def splice(text, cut):
-    """The text after one splice."""
+    """Returns the text after one splice."""
     offset, removed, inserted = cut
     return text[:offset] + inserted + text[offset + removed:]
 
 
 def mutation(rng, text, found):
-    """One random mutation; None if the dice chose one that does not apply here."""
+    """Returns one random mutation, or None if the chosen kind does not apply to the chosen element."""
     element = rng.choice(found)
     name, start, end, value_start, value_end = (
         rng.choice(element.attributes) if element.attributes else ("", 0, 0, 0, 0)
@@ -114,6 +114,6 @@ def mutation(rng, text, found):
         at = rng.randrange(len(value) + 1)
         return value_start + at, 0, rng.choice([" ", "x", "-", ".", "1", "&#9;"])
     if kind == 15 and name:
-        # libxml2 takes "1e" for a number: kept, but rare, or it would be most of what is found.
+        # libxml2 accepts "1e" as a number. The case is rare here, because otherwise most disagreements would be this one.
         return value_end, 0, "e" if rng.random() < 0.005 else rng.choice(["e5", ".0", "0", "_", "+", "E-2"])
     return None

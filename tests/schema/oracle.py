@@ -1,4 +1,4 @@
-"""The other validators: lxml for OpenDRIVE up to 1.7 and OpenSCENARIO, Python's xmlschema for 1.8."""
+"""Reference validators: lxml for OpenDRIVE up to 1.7 and OpenSCENARIO, Python's xmlschema for OpenDRIVE 1.8."""
 
 import re
 
@@ -10,7 +10,7 @@ XS = "{http://www.w3.org/2001/XMLSchema}"
 
 
 class Oracle:
-    """The other validator for one table."""
+    """The reference validator for one table."""
 
     def __init__(self, name, folder):
         self.name, self.folder = name, folder
@@ -19,7 +19,7 @@ class Oracle:
         self.schema = xmlschema.XMLSchema11(str(main)) if self.slow else et.XMLSchema(et.parse(str(main)))
 
     def judge(self, text, parser=None):
-        """(verdict, line of the first error)"""
+        """Returns (verdict, line of the first error)."""
         text = re.sub(r"\sxmlns=(\"[^\"]*\"|'[^']*')", "", text)
         if self.name in VIRES:
             text = text.replace("<OpenDRIVE", '<OpenDRIVE xmlns="www.vires.com"', 1)
@@ -34,16 +34,16 @@ class Oracle:
         return ("valid" if valid else "invalid"), line
 
     def words(self):
-        """What lxml said first."""
+        """Returns the first error of lxml."""
         return "" if self.slow else str(self.schema.error_log[:1])
 
     def types_of(self, name):
-        """The types of all elements of a name; for xmlschema's schemas."""
+        """Returns the types of all elements of a name; only for schemas of xmlschema."""
         declared = [one for one in self.schema.iter_components(xmlschema.validators.XsdElement) if one.local_name == name]
         return [one.type for one in declared] + [other.type for one in declared for other in one.alternatives]
 
     def references(self):
-        """All keyrefs to strings: element of the scope, field, selector, and (selector, field) of its keys."""
+        """Returns all keyrefs to strings: element of the scope, field, selector, and (selector, field) of its keys."""
         documents = [et.parse(str(path)) for path in sorted(self.folder.glob("*.xsd"))]
         declared = [one for document in documents for one in document.iter(XS + "attribute") if one.get("name")]
         found = []

@@ -1,8 +1,8 @@
-"""Proves, where the other validator calls a document valid and ours does not, that the other is wrong.
+"""Proves that the other validator is wrong if it accepts a document and ours does not.
 
-A proof needs more than our word: it takes what is to be shown from the document and the XSD, and it
-puts the one fault right and sees that then both validators find the document valid. What no proof
-fits stays unexplained. `docs/evidence/schema.md` has the rules of the standard behind each class.
+A proof takes its facts from the document and the XSD. It fixes the one fault and checks that both
+validators then accept the document. A disagreement without a proof stays unexplained.
+`docs/evidence/schema.md` has the rules of the standard for each class.
 """
 
 import re
@@ -13,7 +13,7 @@ from mutate import elements
 
 
 class Case:
-    """A document that the two judge differently, and our first finding about it."""
+    """A document with different verdicts of the two validators, and our first finding."""
 
     def __init__(self, text, oracle, judge_ours, wanted, ours):
         self.text, self.oracle, self.judge_ours = text, oracle, judge_ours
@@ -21,28 +21,28 @@ class Case:
         self.offset = len(text.encode()[: ours.offset].decode())
 
     def both(self, text):
-        """The verdict that both give to another text, or None if they differ."""
+        """Returns the verdict of both on another text, or None if they differ."""
         ours, theirs = self.judge_ours(self.oracle.name, [text])[0].verdict, self.oracle.judge(text)[0]
         return ours if ours == theirs else None
 
     def value(self):
-        """The attribute value of the finding."""
+        """Returns the attribute value of the finding."""
         if self.text[self.offset - 1] not in "\"'":
             return None
         return self.text[self.offset : self.text.index(self.text[self.offset - 1], self.offset)]
 
     def with_value(self, value):
-        """The text with another value at the place of the finding."""
+        """Returns the text with another value at the place of the finding."""
         return self.text[: self.offset] + value + self.text[self.offset + len(self.value()) :]
 
     def element(self):
-        """The element of the finding."""
+        """Returns the element of the finding."""
         found = [one for one in elements(self.text) if one.start == self.offset]
         return found[0] if found else None
 
 
 def explanation(case):
-    """The class that the case provably belongs to, or None."""
+    """Returns the proven class of the case, or None."""
     if case.wanted == "ill-formed":
         return namespace_name(case)
     if (case.wanted, case.verdict) != ("valid", "invalid"):
@@ -56,7 +56,7 @@ def explanation(case):
 
 
 def nan_under_bound(case):
-    """The value is NaN, any number is fine but those beyond a bound."""
+    """Proves that the value is NaN and that numbers are valid within a bound and invalid beyond it."""
     if (case.value() or "").strip() != "NaN":
         return None
     inside = any(case.both(case.with_value(value)) == "valid" for value in ("0.5", "1.5"))
@@ -65,17 +65,17 @@ def nan_under_bound(case):
 
 
 def exponent_without_digits(case):
-    """The value is that of a number but for the digits of its exponent."""
+    """Proves that the value is a number without the digits of its exponent."""
     value = (case.value() or "").strip()
     if case.oracle.slow or not re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)[eE][+-]?", value):
         return None
-    mended = case.both(case.with_value(value + "0")) == "valid"
+    fixed = case.both(case.with_value(value + "0")) == "valid"
     number = case.both(case.with_value("x")) == "invalid"
-    return "an exponent without digits passes for a number" if mended and number else None
+    return "an exponent without digits passes for a number" if fixed and number else None
 
 
 def own_text(case, element):
-    """The text of an element around its children, and the document without it."""
+    """Returns the text of an element around its children, and the document without this text."""
     end = case.text.rindex("</", 0, element.end)
     parts, kept, at = [], [], element.tag_end
     for child in element.children:
@@ -87,7 +87,7 @@ def own_text(case, element):
 
 
 def text_between_children(case):
-    """Every type that an element of this name can have has children and is not mixed."""
+    """Proves that every type of an element of this name has children and is not mixed."""
     element = case.element()
     if element is None or element.empty or not case.oracle.slow:
         return None
@@ -100,7 +100,7 @@ def text_between_children(case):
 
 
 def space_in_empty(case):
-    """Every type that an element of this name can have is empty, and white space is in it."""
+    """Proves that every type of an element of this name is empty and that the element has white space."""
     element = case.element()
     if element is None or element.empty or element.children or not case.oracle.slow:
         return None
@@ -113,7 +113,7 @@ def space_in_empty(case):
 
 
 def dangling_reference(case):
-    """XPath finds a reference, by string, to a key that XPath does not find."""
+    """Proves with XPath that a reference to a key, compared as a string, has no key."""
     value = case.value()
     root = et.fromstring(case.text.encode())
     if root.nsmap.get(None) or value is None:
@@ -123,16 +123,16 @@ def dangling_reference(case):
             known = {key for selector, name in keys for key in within.xpath(f"({selector})/{name}")}
             given = set(within.xpath(f"({references})/{field}"))
             if value in given - known and known:
-                # All references to it: one alone may not be the only fault.
+                # All references to the key are fixed, because one may not be the only fault.
                 alike = rf"(\s{field[1:]}\s*=\s*[\"'])" + re.escape(value) + r"(?=[\"'])"
-                mended = re.sub(alike, lambda it: it.group(1) + sorted(known)[0], case.text)
-                return "a reference to no key" if case.both(mended) == "valid" else None
+                fixed = re.sub(alike, lambda it: it.group(1) + sorted(known)[0], case.text)
+                return "a reference to no key" if case.both(fixed) == "valid" else None
     return None
 
 
 def namespace_name(case):
-    """The only fault libxml2 sees is a namespace name that is no URI, and apart from that it agrees."""
-    parser = et.XMLParser()  # Another one would know the faults of other documents.
+    """Proves that libxml2 reports only a namespace name that is no URI, and otherwise agrees."""
+    parser = et.XMLParser()  # A shared parser would keep the faults of other documents.
     try:
         et.fromstring(case.text.encode(), parser)
         return None

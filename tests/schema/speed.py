@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""How many times faster validation is than the schema step of ASAM's bundle (Python's xmlschema on
-an OpenDRIVE 1.8 map), in one run on one machine, in CPU time.
+"""Compares the CPU time of validation with the schema step of ASAM's bundle (Python's xmlschema on an
+OpenDRIVE 1.8 map), in one run on one machine.
 
-As the bundle does it, xmlschema gets a tree that lxml has parsed, and lists all findings; compiling the
-schema and parsing the file do not count, here and there. The bundle wants `xmlschema<4`.
+As in the bundle, xmlschema gets a tree parsed by lxml and lists all findings. Compiling the schema and
+parsing the file do not count, for both. The bundle needs `xmlschema<4`.
 
     pip install 'lxml<6' 'xmlschema>=3.3.1,<4'
     speed.py --tool TARGET/release/examples/schema_tool --xsd FOLDER_OF_1.8_XSDS [--megabytes 1.3]
@@ -32,7 +32,7 @@ ROAD = """<road name="r" length="100.0" id="{0}" junction="-1"><planView>
 
 
 def road(number):
-    """One road of about 4 kB."""
+    """Returns one road of about 4 kB."""
     geometry = "".join(
         f'<geometry s="{k * 12.5}" x="{number + k * 1.23456789e+01}" y="{k * -3.14159}" hdg="1.57" length="12.5"><line/></geometry>\n'
         for k in range(8)

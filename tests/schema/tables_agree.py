@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Proves that the shipped tables are what the compiler makes of the published XSDs.
+"""Proves that the compiler makes the shipped tables from the published XSDs.
 
-Downloads the wheels that carry the XSDs, compiles them with `schema_tool` and compares the result
-with `bundles/schema/tables`, byte by byte. OpenDRIVE 1.8.1 is in no wheel: give a folder with its
-seven XSDs (ASAM's free download, or the repository asam-ev/qc-opendrive) by --opendrive-1-8-1; without
-it that one table is reported as not compared.
+Downloads the wheels that contain the XSDs, compiles them with `schema_tool` and compares the result
+with `bundles/schema/tables`, byte by byte. OpenDRIVE 1.8.1 is in no wheel. Give a folder with its
+seven XSDs (ASAM's free download, or the repository asam-ev/qc-opendrive) with --opendrive-1-8-1.
+Without it, this table is reported as not compared.
 
     tables_agree.py --tool TARGET/release/examples/schema_tool [--opendrive-1-8-1 DIR] [--keep DIR] [--write]
 """

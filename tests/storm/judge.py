@@ -1,4 +1,4 @@
-"""The bundle of one's own of a storm, in Python: as the zoo's `judges_strictly`, which it stands in for."""
+"""Python bundle of a storm. It replaces `judges_strictly` of the zoo and does the same."""
 
 import sys
 
@@ -17,14 +17,14 @@ def looks(found, document):
 
 @bundle.rule("example.org:xodr:1.0.0:zoo.strict", id="check_zoo_0")
 def strict(doc, found):
-    """The word is nowhere."""
+    """The word appears nowhere."""
     for document in (doc, *doc.linked):
         looks(found, document)
 
 
 @bundle.rule("example.org:xodr:1.0.0:zoo.nothing", id="check_zoo_1")
 def nothing(doc, found):
-    """Nothing is demanded."""
+    """A rule without a requirement."""
 
 
 bundle.main(arguments)

@@ -273,10 +273,7 @@ impl State {
             }
             Event::Check { path, on_demand } => self.on_demand(&path, on_demand, &mut actions),
             Event::Pooled { job, outcome } => self.pooled(job, outcome, &mut actions),
-            Event::ClientLeft { request_id } => {
-                self.waiters.retain(|it| it.request_id() != request_id);
-                self.abandon(request_id, &mut actions);
-            }
+            Event::ClientLeft { request_id } => self.client_left(request_id, &mut actions),
             Event::RemoveBundle { request_id, name } => {
                 self.removal(request_id, &name, &mut actions)
             }
@@ -291,6 +288,12 @@ impl State {
         self.store_finished(&mut actions);
         self.wind_down(&mut actions);
         actions
+    }
+
+    /// Forgets the requests of a client that has disconnected.
+    fn client_left(&mut self, request_id: RequestId, actions: &mut Actions) {
+        self.waiters.retain(|it| it.request_id() != request_id);
+        self.abandon(request_id, actions);
     }
 
     /// Handles a message of a peer. Returns `false` if it has no effect on other peers. This holds

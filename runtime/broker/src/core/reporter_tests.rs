@@ -16,15 +16,15 @@ use crate::InForce;
 const TEXT: &str = "text";
 
 /// A state machine with one judged file from the journal.
-struct Requests {
+struct Setup {
     state: State,
     path: Arc<Path>,
     sessions: u64,
 }
 
-impl Requests {
+impl Setup {
     /// `delivered` means that the reporter has the result according to the journal.
-    fn new(delivered: bool) -> Requests {
+    fn new(delivered: bool) -> Setup {
         let in_force = InForce::new(None, SearchPath::default()).unwrap();
         let mut state = State::new(Settings::default(), in_force.digest, in_force.demand());
         let path: Arc<Path> = Path::new("/x/a.xodr").into();
@@ -47,7 +47,7 @@ impl Requests {
         };
         let by = [(TEXT.to_owned(), Reported::Of(JobId(7)))];
         state.remember(&path, judged, if delivered { &by } else { &[] });
-        Requests {
+        Setup {
             state,
             path,
             sessions: 0,
@@ -167,9 +167,9 @@ fn is_over(actions: &[Action]) -> bool {
 
 #[test]
 fn present_reporter_gets_withdrawal_at_once() {
-    let mut requests = Requests::new(true);
-    let (session, _) = requests.join();
-    let actions = requests.vanish();
+    let mut setup = Setup::new(true);
+    let (session, _) = setup.join();
+    let actions = setup.vanish();
     assert!(is_told(&actions), "{actions:?}");
     let named =
         |it: &Action| matches!(it, Action::Withdraw { reporters, .. } if reporters == &[TEXT]);
@@ -177,9 +177,9 @@ fn present_reporter_gets_withdrawal_at_once() {
         actions.iter().any(named),
         "the journal records the withdrawal: {actions:?}"
     );
-    assert!(is_over(&requests.say(session, withdrawn())));
+    assert!(is_over(&setup.say(session, withdrawn())));
     assert!(
-        !is_over(&requests.say(session, withdrawn())),
+        !is_over(&setup.say(session, withdrawn())),
         "reported only once"
     );
 }
@@ -188,37 +188,37 @@ fn present_reporter_gets_withdrawal_at_once() {
 /// killed in between, the next one would treat the report as present.
 #[test]
 fn withdrawal_is_sent_only_after_journal_entry() {
-    let mut requests = Requests::new(true);
-    let (session, _) = requests.join();
-    let actions = requests.vanish_unrecorded();
+    let mut setup = Setup::new(true);
+    let (session, _) = setup.join();
+    let actions = setup.vanish_unrecorded();
     assert!(!is_told(&actions), "{actions:?}");
     // The file returns and is removed again.
-    let path = requests.path.clone();
+    let path = setup.path.clone();
     let stamp = Stamp::default();
-    let actions = requests.event(Event::Settled { path, stamp });
+    let actions = setup.event(Event::Settled { path, stamp });
     let [Action::Prepare { job, .. }] = actions[..] else {
         panic!("{actions:?}");
     };
-    requests.vanish_unrecorded();
+    setup.vanish_unrecorded();
     let result = Err(PrepareFailure::Vanished);
-    requests.event(Event::Prepared { job, result });
-    let path = requests.path.clone();
-    let once = requests.event(Event::Withdrawn { path: path.clone() });
+    setup.event(Event::Prepared { job, result });
+    let path = setup.path.clone();
+    let once = setup.event(Event::Withdrawn { path: path.clone() });
     assert!(
         !is_told(&once),
         "the second withdrawal is not in the journal yet: {once:?}"
     );
-    assert!(is_told(&requests.event(Event::Withdrawn { path })));
-    assert!(is_over(&requests.say(session, withdrawn())));
+    assert!(is_told(&setup.event(Event::Withdrawn { path })));
+    assert!(is_over(&setup.say(session, withdrawn())));
 }
 
 #[test]
 fn reporter_is_not_sent_known_result_again() {
     for has in [true, false] {
-        let mut requests = Requests::new(has);
-        let path = requests.path.clone();
-        requests.event(Event::Present { path });
-        let (_, actions) = requests.join();
+        let mut setup = Setup::new(has);
+        let path = setup.path.clone();
+        setup.event(Event::Present { path });
+        let (_, actions) = setup.join();
         let sent = |it: &Action| matches!(it, Action::Deliver { .. });
         assert_eq!(actions.iter().any(sent), !has, "{actions:?}");
     }
@@ -226,81 +226,81 @@ fn reporter_is_not_sent_known_result_again() {
 
 #[test]
 fn missing_reporter_gets_withdrawal_when_it_joins() {
-    let mut requests = Requests::new(true);
-    assert!(!is_told(&requests.vanish()));
-    let (_, actions) = requests.join();
+    let mut setup = Setup::new(true);
+    assert!(!is_told(&setup.vanish()));
+    let (_, actions) = setup.join();
     assert!(is_told(&actions), "{actions:?}");
 }
 
 #[test]
 fn killed_reporter_gets_the_withdrawal_again() {
-    let mut requests = Requests::new(true);
-    let (session, _) = requests.join();
-    assert!(is_told(&requests.vanish()));
-    requests.event(Event::Gone { session });
-    let (session, actions) = requests.join();
+    let mut setup = Setup::new(true);
+    let (session, _) = setup.join();
+    assert!(is_told(&setup.vanish()));
+    setup.event(Event::Gone { session });
+    let (session, actions) = setup.join();
     assert!(is_told(&actions), "{actions:?}");
-    assert!(is_over(&requests.say(session, withdrawn())));
-    let (_, actions) = requests.join();
+    assert!(is_over(&setup.say(session, withdrawn())));
+    let (_, actions) = setup.join();
     assert!(!is_told(&actions), "{actions:?}");
 }
 
 #[test]
 fn pending_result_is_dropped_when_its_file_vanishes() {
-    let mut requests = Requests::new(false);
-    let (session, actions) = requests.join();
+    let mut setup = Setup::new(false);
+    let (session, actions) = setup.join();
     let sent = |it: &Action| matches!(it, Action::Deliver { .. });
     assert!(actions.iter().any(sent), "{actions:?}");
-    assert!(requests.state.awaits_result(session, JobId(7)));
-    assert!(is_told(&requests.vanish()));
-    assert!(!requests.state.awaits_result(session, JobId(7)));
+    assert!(setup.state.awaits_result(session, JobId(7)));
+    assert!(is_told(&setup.vanish()));
+    assert!(!setup.state.awaits_result(session, JobId(7)));
 }
 
 #[test]
 fn unacknowledged_result_of_former_broker_is_withdrawn() {
-    let mut requests = Requests::new(false);
-    let launch = requests.wants(1);
-    requests.vanish();
-    let (_, actions) = requests.join_as(Some(launch.0));
+    let mut setup = Setup::new(false);
+    let launch = setup.wants(1);
+    setup.vanish();
+    let (_, actions) = setup.join_as(Some(launch.0));
     assert!(is_told(&actions), "{actions:?}");
 }
 
 #[test]
 fn child_role_is_refused_without_launch_id() {
-    let mut requests = Requests::new(false);
-    let launch = requests.wants(1);
+    let mut setup = Setup::new(false);
+    let launch = setup.wants(1);
     let is_refused = |actions: &[Action]| {
         let mut actions = actions.iter();
         actions.any(|it| matches!(it, Action::Refuse { .. }))
     };
     assert!(
-        is_refused(&requests.join().1),
+        is_refused(&setup.join().1),
         "refused while the child is starting"
     );
-    let (session, actions) = requests.join_as(Some(launch.0));
+    let (session, actions) = setup.join_as(Some(launch.0));
     assert!(!is_refused(&actions), "{actions:?}");
-    assert!(is_refused(&requests.join().1), "it runs");
-    requests.event(Event::Gone { session });
+    assert!(is_refused(&setup.join().1), "it runs");
+    setup.event(Event::Gone { session });
     assert!(
-        is_refused(&requests.join().1),
+        is_refused(&setup.join().1),
         "refused after the child has died"
     );
 }
 
 #[test]
 fn journalled_withdrawal_is_sent_after_restart() {
-    let mut requests = Requests::new(false);
+    let mut setup = Setup::new(false);
     let gone: Arc<Path> = Path::new("/x/gone.xodr").into();
-    requests.state.remember_void(&gone, TEXT);
-    let (_, actions) = requests.join();
+    setup.state.remember_void(&gone, TEXT);
+    let (_, actions) = setup.join();
     let told = |it: &Action| matches!(it, Action::Void { path, .. } if *path == gone);
     assert!(actions.iter().any(told), "{actions:?}");
 }
 
 #[test]
 fn newer_result_waits_for_previous_acknowledgement() {
-    let mut requests = Requests::new(false);
-    let (session, actions) = requests.join();
+    let mut setup = Setup::new(false);
+    let (session, actions) = setup.join();
     let sent = |actions: &[Action]| {
         let of = |it: &Action| match it {
             Action::Deliver { delivery, .. } => Some(delivery.job),
@@ -309,11 +309,11 @@ fn newer_result_waits_for_previous_acknowledgement() {
         actions.iter().filter_map(of).collect::<Vec<_>>()
     };
     assert_eq!(sent(&actions), [JobId(7)]);
-    let (id, _) = requests.state.files.iter().next().unwrap();
-    let entry = requests.state.files.get_mut(id).unwrap();
+    let (id, _) = setup.state.files.iter().next().unwrap();
+    let entry = setup.state.files.get_mut(id).unwrap();
     Arc::make_mut(entry.judged.as_mut().unwrap()).job = JobId(8);
     let mut actions = Actions::default();
-    requests.state.deliver_to_all(id, &mut actions);
+    setup.state.deliver_to_all(id, &mut actions);
     assert_eq!(
         sent(&actions),
         [],
@@ -323,35 +323,34 @@ fn newer_result_waits_for_previous_acknowledgement() {
         job,
         report: PeerReport::Written,
     };
-    assert_eq!(sent(&requests.say(session, done(JobId(7)))), [JobId(8)]);
-    assert_eq!(sent(&requests.say(session, done(JobId(8)))), []);
-    assert!(requests.state.all_delivered());
+    assert_eq!(sent(&setup.say(session, done(JobId(7)))), [JobId(8)]);
+    assert_eq!(sent(&setup.say(session, done(JobId(8)))), []);
+    assert!(setup.state.all_delivered());
 }
 
 #[test]
 fn upgraded_reporter_finishes_pending_results() {
     // The reporter leaves as requested or is killed meanwhile. The end of the process may be known
     // before the end of its session.
-    let leaves: fn(&mut Requests, SessionId, Launch) -> Vec<Action> =
-        |requests, session, _| requests.say(session, FromPeer::Leaving);
-    let is_killed: fn(&mut Requests, SessionId, Launch) -> Vec<Action> =
-        |requests, session, launch| {
-            let end = ChildEnd::Failed("it was killed by signal 9".to_owned());
-            let mut actions = requests.event(Event::Exited { launch, end });
-            actions.extend(requests.event(Event::Gone { session }));
-            actions
-        };
+    let leaves: fn(&mut Setup, SessionId, Launch) -> Vec<Action> =
+        |setup, session, _| setup.say(session, FromPeer::Leaving);
+    let is_killed: fn(&mut Setup, SessionId, Launch) -> Vec<Action> = |setup, session, launch| {
+        let end = ChildEnd::Failed("it was killed by signal 9".to_owned());
+        let mut actions = setup.event(Event::Exited { launch, end });
+        actions.extend(setup.event(Event::Gone { session }));
+        actions
+    };
     for ends in [leaves, is_killed] {
         an_upgraded_reporter_finishes(ends);
     }
 }
 
-fn an_upgraded_reporter_finishes(ends: fn(&mut Requests, SessionId, Launch) -> Vec<Action>) {
-    let mut requests = Requests::new(false);
-    let first = requests.wants(1);
-    let (old, _) = requests.join_as(Some(first.0));
-    let second = requests.wants(2);
-    let (new, actions) = requests.join_as(Some(second.0));
+fn an_upgraded_reporter_finishes(ends: fn(&mut Setup, SessionId, Launch) -> Vec<Action>) {
+    let mut setup = Setup::new(false);
+    let first = setup.wants(1);
+    let (old, _) = setup.join_as(Some(first.0));
+    let second = setup.wants(2);
+    let (new, actions) = setup.join_as(Some(second.0));
     let drained = |it: &Action| matches!(it, Action::Send { session, message: ToPeer::Drain } if *session == old);
     assert!(
         actions.iter().any(drained),
@@ -364,29 +363,29 @@ fn an_upgraded_reporter_finishes(ends: fn(&mut Requests, SessionId, Launch) -> V
         !actions.iter().any(given),
         "the old process may still write the same report"
     );
-    let actions = requests.event(exited(Launch(first.0 + 1)));
+    let actions = setup.event(exited(Launch(first.0 + 1)));
     assert!(
         !actions.iter().any(given),
         "another process has ended: {actions:?}"
     );
-    let actions = ends(&mut requests, old, first);
+    let actions = ends(&mut setup, old, first);
     assert!(actions.iter().any(given), "{actions:?}");
 }
 
 /// Adds further judged files with these numbers of findings. The reporter does not have their
 /// results.
-fn more(requests: &mut Requests, findings: &[u64]) {
+fn more(setup: &mut Setup, findings: &[u64]) {
     for (number, count) in (8..).zip(findings) {
         let path: Arc<Path> = Path::new(&format!("/x/{number}.xodr")).into();
-        let known = requests.state.files.iter().next();
+        let known = setup.state.files.iter().next();
         let known = known.and_then(|(_, entry)| entry.judged.clone());
         let judged = Judged {
             job: JobId(number),
             counts: [0, 0, *count],
             ..(*known.unwrap()).clone()
         };
-        requests.state.remember(&path, judged, &[]);
-        requests.event(Event::Present { path });
+        setup.state.remember(&path, judged, &[]);
+        setup.event(Event::Present { path });
     }
 }
 
@@ -408,91 +407,91 @@ fn written(job: u64) -> FromPeer {
 
 #[test]
 fn results_with_many_findings_are_sent_in_turn() {
-    let mut requests = Requests::new(true);
-    more(&mut requests, &[1_500, 500, 1, 3_000, 1]);
-    let (session, actions) = requests.join();
+    let mut setup = Setup::new(true);
+    more(&mut setup, &[1_500, 500, 1, 3_000, 1]);
+    let (session, actions) = setup.join();
     assert_eq!(
         sent(&actions),
         [8, 9],
         "at most 2,000 findings are in transit"
     );
-    assert_eq!(sent(&requests.say(session, written(8))), [10]);
-    assert!(sent(&requests.say(session, written(9))).is_empty());
-    assert_eq!(sent(&requests.say(session, written(10))), [11], "alone");
-    assert_eq!(sent(&requests.say(session, written(11))), [12]);
+    assert_eq!(sent(&setup.say(session, written(8))), [10]);
+    assert!(sent(&setup.say(session, written(9))).is_empty());
+    assert_eq!(sent(&setup.say(session, written(10))), [11], "alone");
+    assert_eq!(sent(&setup.say(session, written(11))), [12]);
 }
 
 /// Checks the limit for large results, which are read back and kept in memory. There may be many
 /// reporters: a broker with eight of them took 600 MiB while a bundle reported far too much.
 #[test]
 fn few_reporters_hold_large_result_at_once() {
-    let mut requests = Requests::new(true);
-    more(&mut requests, &[3_000]);
+    let mut setup = Setup::new(true);
+    more(&mut setup, &[3_000]);
     let mut sessions = Vec::new();
     let mut given = Vec::new();
     for name in ["one", "two", "three", "four"] {
-        requests.sessions += 1;
-        let session = SessionId(requests.sessions);
-        let mut hello = hello(requests.sessions, None);
+        setup.sessions += 1;
+        let session = SessionId(setup.sessions);
+        let mut hello = hello(setup.sessions, None);
         hello.name = name.to_owned();
-        let actions = requests.event(Event::Hello { session, hello });
+        let actions = setup.event(Event::Hello { session, hello });
         sessions.push(session);
         assert_eq!(
             sent(&actions),
             [7],
             "the small result is sent to every reporter"
         );
-        let next = requests.say(session, written(7));
+        let next = setup.say(session, written(7));
         given.push(sent(&next) == [8]);
     }
     assert_eq!(given, [true, true, false, false]);
-    let next = requests.say(sessions[0], written(8));
+    let next = setup.say(sessions[0], written(8));
     assert_eq!(
         sent(&next),
         [8],
         "sent to the third reporter when the first is done"
     );
-    assert!(sent(&requests.event(Event::Tick)).is_empty());
-    let next = requests.say(sessions[2], written(8));
+    assert!(sent(&setup.event(Event::Tick)).is_empty());
+    let next = setup.say(sessions[2], written(8));
     assert_eq!(sent(&next), [8], "then sent to the fourth reporter");
 }
 
 #[test]
 fn reporter_has_at_most_its_announced_pending_results() {
-    let mut requests = Requests::new(true);
-    more(&mut requests, &[1; 6]);
-    requests.vanish();
-    let (session, actions) = requests.join();
+    let mut setup = Setup::new(true);
+    more(&mut setup, &[1; 6]);
+    setup.vanish();
+    let (session, actions) = setup.join();
     assert!(is_told(&actions));
     assert_eq!(
         sent(&actions),
         [8, 9, 10],
         "the results are sent in addition to the withdrawal"
     );
-    assert_eq!(sent(&requests.say(session, withdrawn())), [11]);
+    assert_eq!(sent(&setup.say(session, withdrawn())), [11]);
 }
 
 #[test]
 fn pending_result_is_not_sent_twice() {
-    let mut requests = Requests::new(false);
-    let path = requests.path.clone();
-    requests.event(Event::Present { path });
-    let (_, actions) = requests.join();
+    let mut setup = Setup::new(false);
+    let path = setup.path.clone();
+    setup.event(Event::Present { path });
+    let (_, actions) = setup.join();
     assert_eq!(sent(&actions), [7]);
     let mut again = Vec::new();
-    requests.state.reporters[0].queue.push_back(0);
-    requests.state.deliver(0, &mut again);
+    setup.state.reporters[0].queue.push_back(0);
+    setup.state.deliver(0, &mut again);
     assert!(sent(&again).is_empty());
 }
 
 #[test]
 fn reporter_that_does_not_leave_on_drain_is_killed() {
-    let mut requests = Requests::new(true);
-    let launch = requests.wants(1);
-    requests.join_as(Some(launch.0));
-    requests.event(Event::Drain);
-    requests.event(Event::Tick);
-    let late = requests.state.handle(Duration::from_secs(5), Event::Tick);
+    let mut setup = Setup::new(true);
+    let launch = setup.wants(1);
+    setup.join_as(Some(launch.0));
+    setup.event(Event::Drain);
+    setup.event(Event::Tick);
+    let late = setup.state.handle(Duration::from_secs(5), Event::Tick);
     let killed = |it: &Action| matches!(it, Action::Kill { launch: of } if *of == launch);
     assert!(late.iter().any(killed), "{late:?}");
     assert!(late.iter().any(|it| matches!(it, Action::Stop)));
@@ -510,17 +509,17 @@ fn not(mut report: FromPeer, why: &str) -> FromPeer {
 
 #[test]
 fn reporter_status_counts_written_and_failed_reports() {
-    let mut requests = Requests::new(true);
-    more(&mut requests, &[1, 1, 1]);
-    requests.vanish();
-    let (session, _) = requests.join();
-    requests.say(session, written(8));
-    let actions = requests.say(session, not(written(9), "no room"));
+    let mut setup = Setup::new(true);
+    more(&mut setup, &[1, 1, 1]);
+    setup.vanish();
+    let (session, _) = setup.join();
+    setup.say(session, written(8));
+    let actions = setup.say(session, not(written(9), "no room"));
     let said = |it: &Action| matches!(it, Action::Notice(Notice::NotReported { name, .. }) if name == TEXT);
     assert!(actions.iter().any(said), "{actions:?}");
-    requests.say(session, not(withdrawn(), "no rights"));
-    requests.say(session, written(10));
-    let status = requests.state.status();
+    setup.say(session, not(withdrawn(), "no rights"));
+    setup.say(session, written(10));
+    let status = setup.state.status();
     let peer = status.peers.iter().find(|it| it.name == TEXT).unwrap();
     assert_eq!(peer.done, 3);
     assert_eq!(peer.note, "2 not reported: no rights; retried in 1 s");
@@ -528,24 +527,24 @@ fn reporter_status_counts_written_and_failed_reports() {
 
 #[test]
 fn written_report_does_not_affect_other_reporters() {
-    let mut requests = Requests::new(false);
-    let path = requests.path.clone();
-    requests.event(Event::Present { path });
-    let (session, _) = requests.join();
-    let entry = requests.state.files.get_mut(0).unwrap();
+    let mut setup = Setup::new(false);
+    let path = setup.path.clone();
+    setup.event(Event::Present { path });
+    let (session, _) = setup.join();
+    let entry = setup.state.files.get_mut(0).unwrap();
     entry.delivered.push((5, Reported::Of(JobId(7))));
-    requests.say(session, written(7));
-    let entry = requests.state.files.get(0).unwrap();
+    setup.say(session, written(7));
+    let entry = setup.state.files.get(0).unwrap();
     assert!(entry.has(5, JobId(7)) && entry.has(0, JobId(7)));
 }
 
 #[test]
 fn unreadable_result_is_reported_and_makes_room_for_next() {
-    let mut requests = Requests::new(true);
-    more(&mut requests, &[3_000, 1]);
-    let (session, actions) = requests.join();
+    let mut setup = Setup::new(true);
+    more(&mut setup, &[3_000, 1]);
+    let (session, actions) = setup.join();
     assert_eq!(sent(&actions), [8]);
-    let actions = requests.event(Event::Undeliverable {
+    let actions = setup.event(Event::Undeliverable {
         session,
         job: JobId(8),
         why: "the disk is in trouble".to_owned(),
@@ -566,27 +565,27 @@ fn named(actions: &[Action]) -> Vec<String> {
 
 #[test]
 fn reporter_without_report_gets_no_withdrawal() {
-    let mut requests = Requests::new(false);
-    requests.state.reporter_index(TEXT);
-    assert!(named(&requests.vanish()).is_empty());
-    let (_, actions) = requests.join();
+    let mut setup = Setup::new(false);
+    setup.state.reporter_index(TEXT);
+    assert!(named(&setup.vanish()).is_empty());
+    let (_, actions) = setup.join();
     assert!(!is_told(&actions), "{actions:?}");
 }
 
 #[test]
 fn file_that_vanishes_twice_keeps_its_withdrawal() {
     for there in [false, true] {
-        let mut requests = Requests::new(true);
-        requests.judges_nothing();
+        let mut setup = Setup::new(true);
+        setup.judges_nothing();
         if there {
-            requests.join();
+            setup.join();
         }
-        assert_eq!(named(&requests.vanish()), [TEXT]);
-        let path = requests.path.clone();
+        assert_eq!(named(&setup.vanish()), [TEXT]);
+        let path = setup.path.clone();
         let stamp = Stamp::default();
-        requests.event(Event::Settled { path, stamp });
+        setup.event(Event::Settled { path, stamp });
         assert_eq!(
-            named(&requests.vanish()),
+            named(&setup.vanish()),
             [TEXT],
             "the reporter has not withdrawn its report yet"
         );
@@ -595,29 +594,29 @@ fn file_that_vanishes_twice_keeps_its_withdrawal() {
 
 #[test]
 fn leaving_reporter_gets_remaining_results_on_return() {
-    let mut requests = Requests::new(false);
-    let path = requests.path.clone();
-    requests.event(Event::Present { path });
-    let (session, actions) = requests.join();
+    let mut setup = Setup::new(false);
+    let path = setup.path.clone();
+    setup.event(Event::Present { path });
+    let (session, actions) = setup.join();
     assert_eq!(sent(&actions), [7]);
-    let actions = requests.say(session, FromPeer::Leaving);
+    let actions = setup.say(session, FromPeer::Leaving);
     let closed = |it: &Action| matches!(it, Action::Disconnect { session: of } if *of == session);
     assert!(actions.iter().any(closed), "{actions:?}");
-    assert!(requests.state.sessions.is_empty());
-    assert_eq!(sent(&requests.join().1), [7]);
+    assert!(setup.state.sessions.is_empty());
+    assert_eq!(sent(&setup.join().1), [7]);
 }
 
 /// Checks whether a reporter that was told to withdraw a report is killed at its limit and just
 /// after it. `owes` is whether it was told, `beats` whether it sends heartbeats.
 fn waited(owes: bool, beats: bool, limit: fn(&Settings) -> Duration) -> Vec<bool> {
-    let mut requests = Requests::new(true);
-    let launch = requests.wants(1);
-    let (session, _) = requests.join_as(Some(launch.0));
+    let mut setup = Setup::new(true);
+    let launch = setup.wants(1);
+    let (session, _) = setup.join_as(Some(launch.0));
     if owes {
-        requests.vanish();
+        setup.vanish();
     }
     let start = Duration::from_secs(1);
-    let end = start + limit(&requests.state.settings);
+    let end = start + limit(&setup.state.settings);
     let mut now = start;
     while beats && now + Duration::from_secs(1) < end {
         now += Duration::from_secs(1);
@@ -625,12 +624,10 @@ fn waited(owes: bool, beats: bool, limit: fn(&Settings) -> Duration) -> Vec<bool
             job: None,
             checker: None,
         };
-        requests
-            .state
-            .handle(now, Event::Message { session, message });
+        setup.state.handle(now, Event::Message { session, message });
     }
     let killed = |it: &Action| matches!(it, Action::Kill { launch: of } if *of == launch);
-    let ended = |now| requests.state.handle(now, Event::Tick).iter().any(killed);
+    let ended = |now| setup.state.handle(now, Event::Tick).iter().any(killed);
     [end, end + Duration::from_millis(1)].map(ended).into()
 }
 
@@ -643,39 +640,39 @@ fn unacknowledged_reporter_times_out() {
 
 #[test]
 fn run_ends_only_after_every_report_is_written() {
-    let mut requests = Requests::new(false);
-    requests.judges_nothing();
-    let path = requests.path.clone();
-    requests.event(Event::Present { path });
-    let (session, _) = requests.join();
-    assert!(!requests.state.all_delivered(), "a result is pending");
-    requests.say(session, written(7));
-    assert!(requests.state.all_delivered());
-    requests.vanish();
+    let mut setup = Setup::new(false);
+    setup.judges_nothing();
+    let path = setup.path.clone();
+    setup.event(Event::Present { path });
+    let (session, _) = setup.join();
+    assert!(!setup.state.all_delivered(), "a result is pending");
+    setup.say(session, written(7));
+    assert!(setup.state.all_delivered());
+    setup.vanish();
     assert!(
-        !requests.state.all_delivered(),
+        !setup.state.all_delivered(),
         "a report must still be withdrawn"
     );
-    requests.say(session, withdrawn());
-    assert!(requests.state.all_delivered());
-    requests.state.reporters[0].queue.push_back(0);
-    assert!(!requests.state.all_delivered(), "a result is waiting");
-    requests.say(session, FromPeer::Leaving);
-    assert!(requests.state.all_delivered(), "no reporter is connected");
+    setup.say(session, withdrawn());
+    assert!(setup.state.all_delivered());
+    setup.state.reporters[0].queue.push_back(0);
+    assert!(!setup.state.all_delivered(), "a result is waiting");
+    setup.say(session, FromPeer::Leaving);
+    assert!(setup.state.all_delivered(), "no reporter is connected");
 }
 
 #[test]
 fn reporter_of_ended_process_is_missing_at_once() {
-    let mut requests = Requests::new(true);
-    let launch = requests.wants(1);
-    requests.join_as(Some(launch.0));
-    requests.event(exited(Launch(launch.0 + 1)));
+    let mut setup = Setup::new(true);
+    let launch = setup.wants(1);
+    setup.join_as(Some(launch.0));
+    setup.event(exited(Launch(launch.0 + 1)));
     assert!(
-        requests.state.reporters[0].session.is_some(),
+        setup.state.reporters[0].session.is_some(),
         "another process has ended"
     );
-    let actions = requests.event(exited(launch));
-    assert!(requests.state.reporters[0].session.is_none());
+    let actions = setup.event(exited(launch));
+    assert!(setup.state.reporters[0].session.is_none());
     let said =
         |it: &Action| matches!(it, Action::Notice(Notice::Ended { name, .. }) if name == TEXT);
     assert!(actions.iter().any(said), "{actions:?}");
@@ -683,51 +680,48 @@ fn reporter_of_ended_process_is_missing_at_once() {
 
 #[test]
 fn failed_report_is_retried_after_pause_then_the_rest() {
-    let mut requests = Requests::new(true);
-    more(&mut requests, &[1; 20]);
-    let (session, _) = requests.join();
+    let mut setup = Setup::new(true);
+    more(&mut setup, &[1; 20]);
+    let (session, _) = setup.join();
     let mut given: Vec<u64> = (8..12).collect();
     while let Some(job) = given.pop() {
-        given.extend(sent(&requests.say(session, not(written(job), "no room"))));
+        given.extend(sent(&setup.say(session, not(written(job), "no room"))));
     }
-    let remark = |requests: &Requests| requests.state.status().peers[0].note.clone();
-    assert_eq!(
-        remark(&requests),
-        "20 not reported: no room; retried in 1 s"
-    );
-    let after = Duration::from_secs(1) + requests.state.settings.retry_after;
-    let early = requests
+    let remark = |setup: &Setup| setup.state.status().peers[0].note.clone();
+    assert_eq!(remark(&setup), "20 not reported: no room; retried in 1 s");
+    let after = Duration::from_secs(1) + setup.state.settings.retry_after;
+    let early = setup
         .state
         .handle(after - Duration::from_millis(1), Event::Tick);
     assert!(sent(&early).is_empty(), "{early:?}");
-    let mut given = sent(&requests.state.handle(after, Event::Tick));
+    let mut given = sent(&setup.state.handle(after, Event::Tick));
     assert_eq!(given.len(), 4, "as many as the reporter accepts at once");
     let mut all = 0;
     while let Some(job) = given.pop() {
         all += 1;
-        given.extend(sent(&requests.say(session, written(job))));
+        given.extend(sent(&setup.say(session, written(job))));
     }
-    assert_eq!((all, remark(&requests)), (20, String::new()));
-    assert!(requests.state.status().notices.is_empty());
+    assert_eq!((all, remark(&setup)), (20, String::new()));
+    assert!(setup.state.status().notices.is_empty());
 }
 
 #[test]
 fn unreadable_result_is_delivered_later() {
-    let mut requests = Requests::new(false);
-    let path = requests.path.clone();
-    requests.event(Event::Present { path });
-    let (session, _) = requests.join();
+    let mut setup = Setup::new(false);
+    let path = setup.path.clone();
+    setup.event(Event::Present { path });
+    let (session, _) = setup.join();
     let (job, why) = (JobId(7), "the disk is in trouble".to_owned());
-    requests.event(Event::Undeliverable { session, job, why });
-    let after = Duration::from_secs(1) + requests.state.settings.retry_after;
-    assert_eq!(sent(&requests.state.handle(after, Event::Tick)), [7]);
+    setup.event(Event::Undeliverable { session, job, why });
+    let after = Duration::from_secs(1) + setup.state.settings.retry_after;
+    assert_eq!(sent(&setup.state.handle(after, Event::Tick)), [7]);
 }
 
 /// Lets a client wait for the verdict and the reports. Returns the resulting actions.
-fn waits(requests: &mut Requests, timeout: Option<Duration>) -> Vec<Action> {
-    let path = requests.path.clone();
+fn waits(setup: &mut Setup, timeout: Option<Duration>) -> Vec<Action> {
+    let path = setup.path.clone();
     let reports = true;
-    requests.event(Event::Wait {
+    setup.event(Event::Wait {
         request_id: RequestId(1),
         path,
         stamp: Some(Stamp::default()),
@@ -745,17 +739,17 @@ fn answer(actions: &[Action]) -> Option<&Response> {
 
 #[test]
 fn client_is_answered_when_all_reports_are_written() {
-    let mut requests = Requests::new(false);
-    requests.makes_it_stand();
-    let launch = requests.wants(1);
-    let actions = waits(&mut requests, None);
+    let mut setup = Setup::new(false);
+    setup.makes_it_stand();
+    let launch = setup.wants(1);
+    let actions = waits(&mut setup, None);
     assert_eq!(answer(&actions), None, "the reporter has not joined yet");
-    let (session, _) = requests.join_as(Some(launch.0));
-    let failed = requests.say(session, not(written(7), "no room"));
+    let (session, _) = setup.join_as(Some(launch.0));
+    let failed = setup.say(session, not(written(7), "no room"));
     assert_eq!(answer(&failed), None, "the report is retried");
-    let after = Duration::from_secs(1) + requests.state.settings.retry_after;
-    assert_eq!(sent(&requests.state.handle(after, Event::Tick)), [7]);
-    let done = requests.say(session, written(7));
+    let after = Duration::from_secs(1) + setup.state.settings.retry_after;
+    assert_eq!(sent(&setup.state.handle(after, Event::Tick)), [7]);
+    let done = setup.say(session, written(7));
     assert!(
         matches!(answer(&done), Some(Response::Verdict(_))),
         "{done:?}"
@@ -764,15 +758,15 @@ fn client_is_answered_when_all_reports_are_written() {
 
 #[test]
 fn client_timeout_names_missing_report_and_reason() {
-    let mut requests = Requests::new(false);
-    requests.makes_it_stand();
-    let launch = requests.wants(1);
-    let (session, _) = requests.join_as(Some(launch.0));
+    let mut setup = Setup::new(false);
+    setup.makes_it_stand();
+    let launch = setup.wants(1);
+    let (session, _) = setup.join_as(Some(launch.0));
     let timeout = Duration::from_millis(500);
-    waits(&mut requests, Some(timeout));
-    requests.say(session, not(written(7), "no room"));
+    waits(&mut setup, Some(timeout));
+    setup.say(session, not(written(7), "no room"));
     let over = Duration::from_secs(1) + timeout;
-    let actions = requests.state.handle(over, Event::Tick);
+    let actions = setup.state.handle(over, Event::Tick);
     let Some(Response::Unreported { reporters, .. }) = answer(&actions) else {
         panic!("{actions:?}");
     };
@@ -782,9 +776,9 @@ fn client_timeout_names_missing_report_and_reason() {
 
 #[test]
 fn client_does_not_wait_for_reports_without_reporter() {
-    let mut requests = Requests::new(false);
-    requests.makes_it_stand();
-    let actions = waits(&mut requests, None);
+    let mut setup = Setup::new(false);
+    setup.makes_it_stand();
+    let actions = waits(&mut setup, None);
     assert!(
         matches!(answer(&actions), Some(Response::Verdict(_))),
         "{actions:?}"
@@ -793,12 +787,12 @@ fn client_does_not_wait_for_reports_without_reporter() {
 
 #[test]
 fn client_is_answered_when_owing_reporter_is_removed() {
-    let mut requests = Requests::new(false);
-    requests.makes_it_stand();
-    requests.wants(1);
-    assert_eq!(answer(&waits(&mut requests, None)), None);
-    requests.event(Event::Children { specs: Vec::new() });
-    let actions = requests.event(Event::Tick);
+    let mut setup = Setup::new(false);
+    setup.makes_it_stand();
+    setup.wants(1);
+    assert_eq!(answer(&waits(&mut setup, None)), None);
+    setup.event(Event::Children { specs: Vec::new() });
+    let actions = setup.event(Event::Tick);
     assert!(
         matches!(answer(&actions), Some(Response::Verdict(_))),
         "{actions:?}"

@@ -269,14 +269,14 @@ impl World {
             .map(|(file, it)| (*file, it.job))
             .collect();
         assert_eq!(
-            self.requests.reports, newest,
+            self.reporter_state.reports, newest,
             "the reporter has every newest result"
         );
         assert_eq!(
-            self.requests.delivered, newest,
+            self.reporter_state.delivered, newest,
             "the journal records every delivery"
         );
-        assert_eq!(self.requests.voids, BTreeSet::new());
+        assert_eq!(self.reporter_state.voids, BTreeSet::new());
         let judged = self.judged.keys();
         let needed: BTreeSet<u8> = judged
             .flat_map(|file| dependencies_of(*file).iter().copied())

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+use qcbus_messages::control::Response;
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{JobId, ToPeer};
 
@@ -54,12 +55,7 @@ impl Broker {
             Action::Answer {
                 request_id,
                 response,
-            } => {
-                if let Some(answer) = self.request_ids.remove(&request_id) {
-                    // The error is ignored, because a client that has disconnected needs no answer.
-                    let _ = answer.send(response);
-                }
-            }
+            } => self.answer(request_id, response),
             Action::Depend { files } => {
                 if let Some(watcher) = &self.watcher {
                     watcher.depend(files);
@@ -81,6 +77,14 @@ impl Broker {
             Action::Notice(notice) => (self.tell)(Told::Notice(notice)),
         }
         true
+    }
+
+    /// Answers a request. The error is ignored, because a client that has disconnected needs no
+    /// answer.
+    fn answer(&mut self, request_id: RequestId, response: Response) {
+        if let Some(answer) = self.request_ids.remove(&request_id) {
+            let _ = answer.send(response);
+        }
     }
 
     /// Hands an action about one file on the disk or in the journal to its writer. The writer keeps

@@ -8,7 +8,7 @@ use qcbus_bus::{Documents, HostOptions, Instance};
 
 use super::Simulation;
 use super::peers::{FIRST, REPORTER, SECOND, children};
-use super::threads::{Crew, Here, State, Steps, Task, enter};
+use super::threads::{Crew, Here, SimulatedThread, State, Steps, enter};
 use super::world::World;
 use crate::core::Settings;
 use crate::engine::{line_of, simulate};
@@ -260,11 +260,11 @@ impl Play {
     }
 
     /// Returns the threads that can go on.
-    fn runnable(&self) -> Vec<Arc<Task>> {
+    fn runnable(&self) -> Vec<Arc<SimulatedThread>> {
         let count = self.simulation.steps.count();
         let world = self.simulation.world();
         let now = world.now;
-        let can = |task: &&Arc<Task>| match &*task.state.lock().unwrap() {
+        let can = |task: &&Arc<SimulatedThread>| match &*task.state.lock().unwrap() {
             State::Ready => true,
             State::Asleep(signal, until) => {
                 signal.load(std::sync::atomic::Ordering::Relaxed)
@@ -390,7 +390,7 @@ impl Play {
     /// Returns the time of the next deadline.
     fn next_due(&self) -> Option<Duration> {
         let world = self.simulation.world();
-        let due = |task: &Arc<Task>| match &*task.state.lock().unwrap() {
+        let due = |task: &Arc<SimulatedThread>| match &*task.state.lock().unwrap() {
             State::Asleep(_, until) => *until,
             State::AtRest(_, until) => Some(*until),
             _ => None,

@@ -14,7 +14,7 @@ use super::Simulation;
 pub struct Here {
     pub simulation: Arc<Simulation>,
     /// `None` for the thread that resumes the others.
-    pub task: Option<Arc<Task>>,
+    pub task: Option<Arc<SimulatedThread>>,
 }
 
 thread_local! {
@@ -47,7 +47,7 @@ pub enum State {
 }
 
 /// A simulated thread.
-pub struct Task {
+pub struct SimulatedThread {
     pub name: String,
     pub state: Mutex<State>,
     /// Whether the thread may run.
@@ -62,7 +62,7 @@ pub struct Task {
 /// Panic payload that ends a killed thread.
 struct Killed;
 
-impl Task {
+impl SimulatedThread {
     fn hand_over(&self, mine: bool) {
         *self.has_control.lock().unwrap() = mine;
         self.changed.notify_all();
@@ -108,7 +108,11 @@ impl Task {
         }
     }
 
-    fn run(self: &Arc<Task>, simulation: Arc<Simulation>, body: Box<dyn FnOnce() + Send>) {
+    fn run(
+        self: &Arc<SimulatedThread>,
+        simulation: Arc<Simulation>,
+        body: Box<dyn FnOnce() + Send>,
+    ) {
         self.await_control(true);
         enter(Some(Here {
             simulation,
@@ -145,8 +149,8 @@ impl Crew {
         simulation: &Arc<Simulation>,
         name: String,
         body: Box<dyn FnOnce() + Send>,
-    ) -> Arc<Task> {
-        let task = Arc::new(Task {
+    ) -> Arc<SimulatedThread> {
+        let task = Arc::new(SimulatedThread {
             name,
             state: Mutex::new(State::Ready),
             has_control: Mutex::new(false),

@@ -14,7 +14,7 @@ use tokio::sync::oneshot;
 use super::disk::{Disk, How, JUDGED, Mark};
 use super::oracle::Scanner;
 use super::peers::{Letter, Peers};
-use super::threads::Task;
+use super::threads::SimulatedThread;
 use crate::control::Asked;
 use crate::intake::Intake;
 use crate::store::Store;
@@ -59,7 +59,7 @@ pub struct World {
     pub summary: Summary,
     pub waits: Vec<Wait>,
     /// Simulated threads. The loop of the broker comes first.
-    pub tasks: Vec<Arc<Task>>,
+    pub tasks: Vec<Arc<SimulatedThread>>,
     pub scanner: Scanner,
     /// First violation of an invariant.
     pub fault: Option<String>,

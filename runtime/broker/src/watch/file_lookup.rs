@@ -238,8 +238,22 @@ mod tests {
         assert_eq!(null, FileLookup::NoFile(NoFile::Special));
         assert_eq!(look_at(&root.join("maps"), &roots), FileLookup::Directory);
         assert_eq!(look_at(&root.join("none"), &roots), FileLookup::Nothing);
-        // A file behind a link to a directory has another path, or lies outside of the roots.
+        // A path below a link loop may exist.
+        let below = look_at(&root.join("self/c.xodr"), &roots);
+        assert!(matches!(below, FileLookup::Hidden(_)), "{below:?}");
+    }
+
+    #[test]
+    fn file_behind_a_linked_directory_is_not_found_there() {
+        let (inside, outside) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let root = inside.path().canonicalize().unwrap();
+        let outside = outside.path().canonicalize().unwrap();
+        let roots = [root.clone()];
+        std::fs::write(outside.join("a.xodr"), "<OpenDRIVE/>").unwrap();
+        std::fs::create_dir(root.join("maps")).unwrap();
         std::fs::write(root.join("maps/c.xodr"), "").unwrap();
+        symlink(root.join("maps"), root.join("inner")).unwrap();
+        symlink(&outside, root.join("outer")).unwrap();
         assert!(matches!(
             look_at(&root.join("maps/c.xodr"), &roots),
             FileLookup::File(_)
@@ -259,8 +273,5 @@ mod tests {
             assert!(has_link(&root, &root.join(link)));
         }
         assert!(!has_link(&root, &root.join("maps")));
-        // A path below a link loop may exist.
-        let below = look_at(&root.join("self/c.xodr"), &roots);
-        assert!(matches!(below, FileLookup::Hidden(_)), "{below:?}");
     }
 }

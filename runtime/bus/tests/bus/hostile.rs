@@ -203,10 +203,7 @@ fn receive_budget_is_a_megabyte_and_rotates_between_peers() {
                 frames += sent;
             }
             // A megabyte is 64 frames. The broker reads a peer to the end of its quota.
-            assert!(
-                frames <= 64 + 8,
-                "{frames} frames in one turn"
-            );
+            assert!(frames <= 64 + 8, "{frames} frames in one turn");
         }
         let least = read.iter().min().unwrap();
         let most = read.iter().max().unwrap();

@@ -209,7 +209,7 @@ impl World {
         for file in unpublished {
             self.state.remember_unpublished(&path_of(file));
         }
-        self.requests_restart();
+        self.reporter_restarts();
         self.children_are(self.manifest);
         let there = self.there.clone().into_iter();
         let there: Vec<_> = there.filter(|(path, _)| file_of(path) < 8).collect();

@@ -55,11 +55,7 @@ impl World {
                 request_id,
                 response,
             } => self.is_answered(request_id, &response),
-            Action::Withdraw { path, .. } => {
-                self.journal.remove(&file_of(&path));
-                self.lost.remove(&file_of(&path));
-                self.judged.remove(&file_of(&path));
-            }
+            Action::Withdraw { path, .. } => self.is_withdrawn(file_of(&path)),
             Action::Depend { files } => {
                 let files = files.iter().map(|(path, _)| file_of(path));
                 self.watched.extend(files);
@@ -72,6 +68,12 @@ impl World {
             Action::Stop => self.stopped += 1,
             _ => {}
         }
+    }
+
+    fn is_withdrawn(&mut self, file: u8) {
+        self.journal.remove(&file);
+        self.lost.remove(&file);
+        self.judged.remove(&file);
     }
 
     fn is_sent(&mut self, session: SessionId, message: ToPeer) {

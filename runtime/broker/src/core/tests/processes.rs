@@ -141,7 +141,7 @@ impl World {
     }
 
     pub fn children_are(&mut self, version: Option<u8>) {
-        let reporter = self.requests.open.then(reporter);
+        let reporter = self.reporter_state.open.then(reporter);
         let children = version.map(child).into_iter();
         let children = children.chain(self.shadow.map(shadow));
         let specs = children.chain(reporter).collect();

@@ -19,7 +19,7 @@ enum Letter {
 
 /// State of the reporter, its processes and the journal's knowledge of it.
 #[derive(Default)]
-pub struct Requests {
+pub struct ReporterState {
     /// Whether this world has a reporter.
     pub open: bool,
     processes: BTreeMap<SessionId, VecDeque<Letter>>,
@@ -50,13 +50,13 @@ impl World {
     /// Creates a world with a reporter.
     pub fn with_a_reporter() -> World {
         let mut world = World::new();
-        world.requests.open = true;
+        world.reporter_state.open = true;
         world.manifest(None);
         world
     }
 
     /// Passes an action on to the reporter and the journal.
-    pub fn requests_hear(&mut self, action: &Action) {
+    pub fn reporter_hears(&mut self, action: &Action) {
         match action {
             Action::Deliver {
                 session, delivery, ..
@@ -64,15 +64,15 @@ impl World {
                 let file = file_of(&delivery.path);
                 let about = |it: &Letter| matches!(it, Letter::Result(it, _) if *it == file);
                 assert!(
-                    !self.requests.processes.values().flatten().any(about),
+                    !self.reporter_state.processes.values().flatten().any(about),
                     "two results of one file must not be sent at the same time"
                 );
-                let process = self.requests.processes.get_mut(session);
+                let process = self.reporter_state.processes.get_mut(session);
                 let process = process.expect("no result may go to a closed session");
                 process.push_back(Letter::Result(file, delivery.job));
             }
             Action::Void { session, path, .. } => {
-                let process = self.requests.processes.get_mut(session);
+                let process = self.reporter_state.processes.get_mut(session);
                 let process = process.expect("nothing may go to a closed session");
                 // A result that is still to be read back is no longer sent.
                 let file = file_of(path);
@@ -81,23 +81,23 @@ impl World {
             }
             Action::Delivered { path, job, .. } => {
                 assert!(
-                    self.requests.written.contains(job),
+                    self.reporter_state.written.contains(job),
                     "only written results are recorded as delivered"
                 );
-                self.requests.delivered.insert(file_of(path), *job);
+                self.reporter_state.delivered.insert(file_of(path), *job);
             }
             Action::Voided { path, .. } => {
-                assert!(!self.requests.reports.contains_key(&file_of(path)));
-                self.requests.voids.remove(&file_of(path));
+                assert!(!self.reporter_state.reports.contains_key(&file_of(path)));
+                self.reporter_state.voids.remove(&file_of(path));
             }
             Action::Withdraw { path, reporters } => {
-                self.requests.delivered.remove(&file_of(path));
+                self.reporter_state.delivered.remove(&file_of(path));
                 if !reporters.is_empty() {
-                    self.requests.voids.insert(file_of(path));
+                    self.reporter_state.voids.insert(file_of(path));
                 }
             }
             Action::Disconnect { session } | Action::Refuse { session, .. } => {
-                self.requests.processes.remove(session);
+                self.reporter_state.processes.remove(session);
             }
             _ => {}
         }
@@ -107,7 +107,9 @@ impl World {
     pub fn reporter_joins(&mut self, launch: Launch) {
         self.sessions += 1;
         let session = SessionId(self.sessions);
-        self.requests.processes.insert(session, VecDeque::new());
+        self.reporter_state
+            .processes
+            .insert(session, VecDeque::new());
         let hello = Hello {
             protocol: PROTOCOL_VERSION,
             role: Role::Reporter,
@@ -124,7 +126,7 @@ impl World {
 
     /// Lets the reporter handle its next request. If `heard` is false, it dies before it answers.
     pub fn report(&mut self, heard: bool) {
-        let Some((session, letters)) = self.requests.processes.iter_mut().next() else {
+        let Some((session, letters)) = self.reporter_state.processes.iter_mut().next() else {
             return;
         };
         let (session, letter) = (*session, letters.pop_front());
@@ -137,12 +139,12 @@ impl World {
                     let why = "replaced".to_owned();
                     return self.event(Event::Undeliverable { session, job, why });
                 }
-                self.requests.reports.insert(file, job);
-                self.requests.written.insert(job);
+                self.reporter_state.reports.insert(file, job);
+                self.reporter_state.written.insert(job);
                 FromPeer::ResultDone { job, report }
             }
             Some(Letter::Gone(file)) => {
-                self.requests.reports.remove(&file);
+                self.reporter_state.reports.remove(&file);
                 let input = path_of(file).display().to_string();
                 FromPeer::WithdrawalDone { input, report }
             }
@@ -155,28 +157,32 @@ impl World {
     }
 
     pub fn reporter_dies(&mut self) {
-        if let Some((session, _)) = self.requests.processes.pop_first() {
+        if let Some((session, _)) = self.reporter_state.processes.pop_first() {
             self.event(Event::Gone { session });
         }
     }
 
     /// Checks whether the reporter is there and has nothing left to do.
     pub fn reporter_rests(&self) -> bool {
-        let idle = self.requests.processes.values().any(VecDeque::is_empty);
-        !self.requests.open || (idle && self.state.all_delivered())
+        let idle = self
+            .reporter_state
+            .processes
+            .values()
+            .any(VecDeque::is_empty);
+        !self.reporter_state.open || (idle && self.state.all_delivered())
     }
 
     /// Simulates that the broker is killed, together with all deliveries under way.
-    pub fn requests_restart(&mut self) {
-        self.requests.processes.clear();
-        for file in &self.requests.voids {
+    pub fn reporter_restarts(&mut self) {
+        self.reporter_state.processes.clear();
+        for file in &self.reporter_state.voids {
             self.state.remember_void(&path_of(*file), REPORTER);
         }
     }
 
     /// Returns the reporter's deliveries of a file according to the journal.
     pub fn delivered(&self, file: u8) -> Vec<(String, Reported)> {
-        let job = self.requests.delivered.get(&file);
+        let job = self.reporter_state.delivered.get(&file);
         job.map(|job| (REPORTER.to_owned(), Reported::Of(*job)))
             .into_iter()
             .collect()

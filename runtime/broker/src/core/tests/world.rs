@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::super::*;
 use super::behind_the_gate::Published;
 use super::clients::Clients;
-use super::reporting::Requests;
+use super::reporting::ReporterState;
 use super::things::*;
 use qcbus_messages::{JobId, Verdict};
 
@@ -61,7 +61,7 @@ pub struct World {
     /// Files watched because verdicts depend on them.
     pub watched: BTreeSet<u8>,
     pub gate: Published,
-    pub requests: Requests,
+    pub reporter_state: ReporterState,
     pub clients: Clients,
     /// Reasons why bundles failed on each file, as stored.
     pub failures: BTreeMap<u8, Vec<String>>,
@@ -138,7 +138,7 @@ impl World {
             told: Vec::new(),
             watched: BTreeSet::new(),
             gate: Published::new(),
-            requests: Requests::default(),
+            reporter_state: ReporterState::default(),
             clients: Clients::default(),
             failures: BTreeMap::new(),
             rejected: BTreeSet::new(),
@@ -162,7 +162,7 @@ impl World {
                 opened.push(path.clone());
             }
             self.is_for_clients_alone(&action);
-            self.requests_hear(&action);
+            self.reporter_hears(&action);
             self.gate_follows(&action);
             self.act(action);
         }
