@@ -122,7 +122,7 @@ function whereOf(place) {
   return `${place.file}${row}`;
 }
 
-/** Returns a place as the list shows it. The head already names the checked file. @param {FindingPlace|undefined} place */
+/** Returns a place for the list, without the checked file. @param {FindingPlace|undefined} place */
 function shortWhereOf(place) {
   if (!place) return 'no place';
   return place.own ? whereOf({ ...place, file: '' }) || 'this file' : whereOf(place);

@@ -235,7 +235,7 @@ function anchorOf(plan, target) {
   return box[0] <= box[2] ? { x: (box[0] + box[2]) / 2, y: (box[1] + box[3]) / 2 } : null;
 }
 
-/** Returns the width of a lane, interpolated linearly between its points. @param {Float64Array} pairs @param {number} s */
+/** Returns the linearly interpolated width of a lane. @param {Float64Array} pairs @param {number} s */
 function valueAt(pairs, s) {
   const count = pairs.length / 2;
   if (count === 0) return NaN;

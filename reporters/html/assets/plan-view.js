@@ -2,8 +2,8 @@
 
 /**
  * @typedef {object} MapEvents
- * @property {(finding: number) => void} finding called after a click on a marker
- * @property {(members: number[], x: number, y: number) => void} several called after a click on several markers at one place
+ * @property {(finding: number) => void} finding called for a clicked marker
+ * @property {(members: number[], x: number, y: number) => void} several called for several markers at one place
  * @property {(road: number, x: number) => void} road
  * @property {() => void} nothing
  */

@@ -241,7 +241,7 @@ async function readBlock(id) {
   const block = document.getElementById(id);
   if (!block) return null;
   if (typeof DecompressionStream === 'undefined') {
-    throw new BlockError('This browser is too old for this report: it cannot unpack gzip. Use a browser of 2023 or later.');
+    throw new BlockError('This browser is too old for this report: it has no gzip. Use one of 2023 or later.');
   }
   try {
     const packed = fromBase64((block.textContent ?? '').trim());
@@ -355,7 +355,7 @@ class Theme {
   }
 }
 
-/** Checks whether a key belongs to the focused element, for example a text field or a select. @param {KeyboardEvent} event */
+/** Checks whether a key belongs to the focused element, such as a text field. @param {KeyboardEvent} event */
 function isTyping(event) {
   const target = event.target;
   if (target instanceof HTMLInputElement) return target.type === 'search' || target.type === 'text';

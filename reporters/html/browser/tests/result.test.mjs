@@ -104,7 +104,7 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
     near((await view(page)).x, x);
   });
 
-  onPage('several at one place open a chooser', async (page) => {
+  onPage('a click on several findings at one place opens a chooser', async (page) => {
     await page.evaluate(() => window.qcbus.select(8));
     await atRest(page);
     await page.keyboard.press('Escape');
@@ -206,7 +206,7 @@ describe('the page of a result', { skip: findChromium() ? false : 'no Chromium' 
     assert.equal(await rows.count(), 3);
     await page.locator('.clear, .filters .link').click();
     assert.equal(await rows.count(), 10);
-    await page.getByText('only without place').click();
+    await page.getByText('only without a place on the map').click();
     assert.equal(await rows.count(), 1);
     assert.match(await rows.first().textContent(), /not on map/);
   });
