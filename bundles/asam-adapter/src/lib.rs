@@ -8,7 +8,7 @@
 //! result file. The bus process judges the result in its sandbox.
 //!
 //! A module does not list its checkers. They are learned from a run over small valid files
-//! ([`learn`]).
+//! (`learn`).
 
 mod bundle;
 mod channel;

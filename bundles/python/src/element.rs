@@ -268,9 +268,7 @@ impl Element {
     fn __getattr__(&self, name: &str) -> PyResult<Py<PyAny>> {
         let why = match name {
             "tail" => "character data between elements is not kept",
-            "nsmap" | "prefix" => {
-                "elements have only local names; namespaces are not available"
-            }
+            "nsmap" | "prefix" => "elements have only local names; namespaces are not available",
             "set" | "append" | "remove" | "insert" | "clear" => {
                 "a document is read in place and cannot be changed"
             }

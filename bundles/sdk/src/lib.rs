@@ -2,7 +2,7 @@
 //!
 //! A bundle is a list of [`Rule`]s. A rule is data and one function that examines a [`Model`] of a
 //! document and reports findings to a [`Sink`]. The same bundle runs on the bus, on a single file,
-//! and as a module of ASAM's framework; see [`run`]. `docs/writing-a-rule.md` shows the way from
+//! and as a module of ASAM's framework; see [`run()`]. `docs/writing-a-rule.md` shows the way from
 //! nothing to a tested rule.
 
 pub mod basic;

@@ -23,14 +23,14 @@ const SCHEMA: &str = "check_asam_xodr_xml_valid_schema";
 
 const NO_LINK: &str =
     "ASAM's checker crashes on roads without `<link>`; nothing is wrong with them";
-const UNLINKED: &str = "lanes of one type that go on in the next lane section, in the same place, without a link in \
-     either direction; ASAM's checker asks for the link back only where there is one";
+const UNLINKED: &str = "lanes of one type continue in the next lane section, in the same place, without a link in \
+     either direction; ASAM's checker requires the link back only where there is one";
 const NOT_NUMBERS: &str =
-    "the junction's id is no number, so ASAM's checker takes connecting roads for ordinary ones";
-const CONNECTING: &str = "the roads belong to a junction, which the rule excludes; ASAM's checker means \
-     to leave them out, but compares `junction` with 1";
-const NO_WIDTH: &str = "the lane has no width where it is linked, so it has no edges that could miss any; \
-     its link is reported by `new_lane_appear` and `zero_width_at_…`";
+    "the junction's id is not a number, so ASAM's checker treats connecting roads as ordinary ones";
+const CONNECTING: &str = "the roads belong to a junction, which the rule excludes; ASAM's checker should \
+     skip them, but compares `junction` with 1";
+const NO_WIDTH: &str = "the lane has no width where it is linked, so it has no edges that could have a gap; \
+     `new_lane_appear` and `zero_width_at_…` report its link";
 
 /// Differences from the recorded results, with the reasons why this bundle is right.
 const DEVIATIONS: &[Deviations] = &[
@@ -84,7 +84,7 @@ const DEVIATIONS: &[Deviations] = &[
     Deviations {
         checker: GAPS,
         inputs: &["road_geometry_elem_asc_order/invalid.xodr"],
-        reason: "the geometries are listed in the wrong order, which is reported; taken by their s, each \
+        reason: "the geometries are listed in the wrong order, which is reported; ordered by their s, each \
              starts where the one before it ends",
     },
     Deviations {
@@ -96,17 +96,18 @@ const DEVIATIONS: &[Deviations] = &[
     Deviations {
         checker: GAPS,
         inputs: &["performance_avoid_redundant_info_lane_width_invalid.xodr"],
-        reason: "the third is a biking lane that is not advisory; annex D.1 does not count it as drivable",
+        reason: "the third recorded finding is at a biking lane that is not advisory; annex D.1 does not count \
+             it as drivable",
     },
     Deviations {
         checker: GAPS,
         inputs: &["junctions_connection_one_connection_element_invalid.xodr"],
-        reason: "the linked lanes are 58 mm and 20 mm apart; ASAM's checker passes over them",
+        reason: "the linked lanes are 58 mm and 20 mm apart; ASAM's checker does not report them",
     },
     Deviations {
         checker: GAPS,
         inputs: &["Ex_Entry_Exit.xodr"],
-        reason: "the lanes are 20 mm apart at a direct junction, which ASAM's checker does not look at",
+        reason: "the lanes are 20 mm apart at a direct junction, which ASAM's checker does not check",
     },
     Deviations {
         checker: GAPS,
@@ -119,7 +120,7 @@ const DEVIATIONS: &[Deviations] = &[
     Deviations {
         checker: REDUNDANT,
         inputs: &["valid_schema/positive18.xodr"],
-        reason: "one more: two lines in one direction whose headings are written a full turn apart",
+        reason: "one more finding: two lines in one direction whose headings differ by a full turn",
     },
     Deviations {
         checker: REDUNDANT,
@@ -163,7 +164,7 @@ const ON_REAL_MAPS: &[Deviations] = &[
             "resources/xodr/multi_intersections.xodr",
             "straight_2x100m_opposite.xodr",
         ],
-        reason: "each missing link once; ASAM's checker reports it twice, once from either road",
+        reason: "each missing link is reported once; ASAM's checker reports it twice, once from either road",
     },
     Deviations {
         checker: "check_asam_xodr_road_lane_link_new_lane_appear",
@@ -174,8 +175,8 @@ const ON_REAL_MAPS: &[Deviations] = &[
     Deviations {
         checker: "check_asam_xodr_road_lane_link_new_lane_appear",
         inputs: &["parking_demo.xodr"],
-        reason: "one of the two lanes has no width all along, so it does not appear; that it is linked is \
-             reported by `zero_width_at_…`",
+        reason: "one of the two lanes has no width along its whole length, so it does not appear; \
+             `zero_width_at_…` reports that it is linked",
     },
     Deviations {
         checker: REDUNDANT,
@@ -183,17 +184,17 @@ const ON_REAL_MAPS: &[Deviations] = &[
             "linux-files/UC_Motorway-Exit-Entry.xodr",
             "windows-files/UC_Motorway-Exit-Entry.xodr",
         ],
-        reason: "one more: two lines in one direction whose headings are written a full turn apart",
+        reason: "one more finding: two lines in one direction whose headings differ by a full turn",
     },
 ];
 
 const PARITY: Parity = Parity {
     bundle: &qcbus_xodr::BUNDLE,
     introduction: "# Parity with ASAM's OpenDRIVE bundle\n\n\
-         Generated by `QCBUS_BLESS=1 cargo test -p qcbus-xodr --test corpus` from recorded results of\n\
-         ASAM's bundle (qc-opendrive 1.0.0), checked by the same test wherever those are at hand. A\n\
-         deviation is a result in which ours differs on purpose; in each of them ours is right, for the\n\
-         reason given. Where ASAM's checkers were silenced by a finding about the schema, ours may run.\n",
+         Generated by `QCBUS_BLESS=1 cargo test -p qcbus-xodr --test corpus` from recorded results of ASAM's\n\
+         bundle (qc-opendrive 1.0.0). The same test checks the page if these results are available. A\n\
+         deviation is a result in which qcbus differs on purpose. In each of them qcbus is right, for the\n\
+         given reason. Where a finding about the schema silenced ASAM's checkers, those of qcbus may run.\n",
     theirs_skip_nothing_to_see: false,
     on_cases: DEVIATIONS,
     about_real_files: "\n## Maps of other projects\n\n\

@@ -23,7 +23,7 @@ fn set(name: &str, value: &str) -> Param {
 }
 
 #[test]
-fn test_case_of_every_ending_matches_snapshot() {
+fn case_of_every_ending_matches_snapshot() {
     let ended = result("maps/harbour.xodr", endings());
     let text = report(&[ended]);
     insta::assert_snapshot!(text);

@@ -483,7 +483,7 @@ impl Host {
             match codec::decode::<Hello>(&sample) {
                 Ok(hello) if hello.incarnation == key.incarnation => self.meet(key, hello, now),
                 Ok(_) => {
-                    tracing::warn!("an introduction contains another incarnation than its header")
+                    tracing::warn!("an introduction contains another incarnation than its header");
                 }
                 Err(error) => tracing::warn!(%error, "an introduction cannot be read"),
             }

@@ -178,7 +178,7 @@ fn findings_are_located_at_the_reference() {
     let issue = remarks[0].issue.as_ref().unwrap();
     assert_eq!(
         issue.description,
-        "the map `gone.xodr` is not available; the path resolves to `/farm/s/gone.xodr`, because relative paths start at the directory of the file"
+        "the map `gone.xodr` does not exist; the path resolves to `/farm/s/gone.xodr`, because relative paths start at the directory of the file"
     );
     let places = &issue.locations[0].places;
     let here = matches!(

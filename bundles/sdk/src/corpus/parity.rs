@@ -95,7 +95,7 @@ impl Parity {
         let mut page = self.introduction.to_owned();
         page.push_str(
             "\n## ASAM's own test files\n\nA result agrees when status, number and levels of the issues are the \
-             same and the XPaths select\nthe same elements; our results may name further places.\n",
+             same and the XPaths select the\nsame elements; our results may name further places.\n",
         );
         collection(&mut page, on_cases, self.on_cases);
         page.push_str(self.about_real_files);

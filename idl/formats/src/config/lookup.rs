@@ -90,7 +90,7 @@ pub(super) fn canonical_bundle(application: &str) -> Option<(&'static str, &'sta
 }
 
 /// Checks whether an `application` in a configuration means the reporter of this name, either
-/// directly or after [`reporter_named`].
+/// directly or after `reporter_named`.
 pub fn same_reporter(application: &str, name: &str) -> bool {
     application == name || reporter_named(application) == name
 }

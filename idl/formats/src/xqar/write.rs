@@ -35,7 +35,7 @@ pub fn write(results: &Results, dialect: Dialect) -> String {
     write_into(String::new(), results, dialect)
 }
 
-/// Writes like [`write`], and reuses the memory of a text that is no longer needed.
+/// Writes like [`write()`], and reuses the memory of a text that is no longer needed.
 pub fn write_into(mut memory: String, results: &Results, dialect: Dialect) -> String {
     memory.clear();
     memory.reserve(room(results));

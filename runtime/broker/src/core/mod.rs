@@ -275,7 +275,7 @@ impl State {
             Event::Pooled { job, outcome } => self.pooled(job, outcome, &mut actions),
             Event::ClientLeft { request_id } => self.client_left(request_id, &mut actions),
             Event::RemoveBundle { request_id, name } => {
-                self.removal(request_id, &name, &mut actions)
+                self.removal(request_id, &name, &mut actions);
             }
             Event::Drain => self.drain(),
             Event::Tick => self.tick(&mut actions),

@@ -10,7 +10,7 @@ use qcbus_messages::{JobId, ToPeer};
 
 use super::{Announcement, Broker, Ready, Told};
 use crate::core::{
-    Action, Delivery, Event, FinishedJob, Judged, Notice, PrepareFailure, SessionId,
+    Action, Delivery, Event, FinishedJob, Judged, Notice, PrepareFailure, RequestId, SessionId,
 };
 use crate::environment::{now, spawn_blocking};
 use crate::intake::Within;

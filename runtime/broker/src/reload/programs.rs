@@ -77,7 +77,7 @@ fn is_script(file: &Path) -> bool {
 /// the path at which the program was found, so no lookup happens between the check and the start.
 ///
 /// # Errors
-/// As [`look_at`], and when the program does not exist.
+/// As `look_at`, and when the program does not exist.
 pub fn ready(words: &[String]) -> Result<Vec<String>, String> {
     hosted::ready(words)?;
     let ([shell, flag, _, name], Some(command)) = (words, command_of(words)) else {

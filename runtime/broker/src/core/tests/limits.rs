@@ -334,7 +334,7 @@ fn catalogue_beyond_limits_is_refused() {
             it.checkers = vec![it.checkers[0].clone(); 4097];
         }),
         ("duplicate", |it| {
-            it.checkers[1].id = it.checkers[0].id.clone()
+            it.checkers[1].id = it.checkers[0].id.clone();
         }),
     ];
     for (word, change) in changes {
