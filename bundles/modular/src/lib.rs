@@ -9,6 +9,7 @@
 mod assembly;
 mod examples;
 mod families;
+mod prelude;
 mod rules;
 
 use qcbus_document::FileKind;

@@ -6,6 +6,7 @@
 mod examples;
 mod families;
 mod model;
+mod prelude;
 mod rules;
 mod sections;
 

@@ -7,6 +7,7 @@
 mod examples;
 mod families;
 mod model;
+mod prelude;
 mod rules;
 
 use qcbus_document::FileKind;

@@ -2,14 +2,15 @@
 
 use std::collections::HashMap;
 
-use qcbus_document::{Attribute, Document, FileKind, Node};
+use crate::assembly::Assembly;
+use crate::prelude::*;
 use qcbus_messages::DocumentRole;
 use qcbus_messages::path_text::name_of;
 use qcbus_openscenario::{Inputs, LinkedCatalog, LinkedMap, Scenario};
 use qcbus_schema::Version;
-use qcbus_sdk::modular::{Copy, Followed, OFFERS, Spot, Use, Value, offered};
-
-use crate::assembly::Assembly;
+use qcbus_sdk::modular::Copy;
+use qcbus_sdk::modular::Value;
+use qcbus_sdk::modular::offered;
 
 /// A group of another file in the expanded scenario, with the reference that takes it.
 #[derive(Clone, Copy)]

@@ -2,10 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use qcbus_document::{Document, Fault, FaultCode};
-
 use crate::assembly::Assembly;
-use qcbus_sdk::modular::archive_of;
+use crate::prelude::*;
+use qcbus_document::Fault;
 
 /// Faults that prevent reading an archive or using it as a modular scenario.
 pub const ARCHIVE: &[FaultCode] = &[

@@ -2,11 +2,8 @@
 
 use std::collections::{HashMap, HashSet};
 
-use qcbus_document::Document;
-use qcbus_sdk::modular::Spot;
-use qcbus_sdk::{Place, Sink};
-
 use crate::assembly::place;
+use crate::prelude::*;
 
 /// Maximum number of further places that a finding lists. The rest is only counted.
 const MOST: usize = 5;

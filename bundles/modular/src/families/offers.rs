@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use qcbus_document::{Attribute, Node};
-use qcbus_sdk::modular::{OFFERS, Use, offered};
+use crate::prelude::*;
+use qcbus_sdk::modular::offered;
 
 /// Maximum number of attributes of one element and name for a key. No group offers more.
 const MOST_ALIKE: usize = 256;

@@ -2,10 +2,9 @@
 
 use std::collections::HashMap;
 
-use qcbus_document::FileKind;
-use qcbus_schema::Typing;
-
 use crate::assembly::Assembly;
+use crate::prelude::*;
+use qcbus_schema::Typing;
 
 /// The types of documents in the version of the root. Each is computed on first use.
 #[derive(Default)]

@@ -1,11 +1,9 @@
 use std::collections::HashSet;
 
-use qcbus_document::Node;
-use qcbus_sdk::modular::{Followed, Problem, Spot, What};
-use qcbus_sdk::{Place, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular};
 use crate::families::finds::Finds;
+use crate::prelude::*;
+use qcbus_sdk::modular::Problem;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_actor_entity_ref",

@@ -1,9 +1,7 @@
-use qcbus_messages::path_text::name_of;
-use qcbus_sdk::modular::{What, archive_of};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::assembly::{Assembly, Modular, say};
 use crate::families::file_faults::{LIMITS, of_archives};
+use crate::prelude::*;
+use qcbus_messages::path_text::name_of;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_archive_limits",

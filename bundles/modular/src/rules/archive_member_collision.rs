@@ -1,11 +1,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
-use qcbus_document::Document;
-use qcbus_messages::path_text::name_of;
-use qcbus_sdk::modular::archive_of;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::assembly::{Archive, Assembly, Member, Modular};
+use crate::prelude::*;
+use qcbus_messages::path_text::name_of;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_archive_member_collision",

@@ -1,10 +1,9 @@
-use qcbus_document::{Document, FaultCode};
-use qcbus_messages::path_text::name_of;
-use qcbus_sdk::modular::{What, archive_of, has_only_backslashes, stays_inside};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular, say};
 use crate::families::file_faults::{NAMES, of_archives};
+use crate::prelude::*;
+use qcbus_messages::path_text::name_of;
+use qcbus_sdk::modular::has_only_backslashes;
+use qcbus_sdk::modular::stays_inside;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_archive_path_safety",

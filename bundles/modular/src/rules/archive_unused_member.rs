@@ -1,13 +1,11 @@
 use std::collections::BTreeSet;
 
-use qcbus_document::FaultCode;
+use crate::assembly::{Assembly, Modular};
+use crate::families::file_faults::NAMES;
+use crate::prelude::*;
 use qcbus_messages::Absence;
 use qcbus_messages::path_text::name_of;
 use qcbus_sdk::modular::stays_inside;
-use qcbus_sdk::{Level, Rule, Sink};
-
-use crate::assembly::{Assembly, Modular};
-use crate::families::file_faults::NAMES;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_archive_unused_member",

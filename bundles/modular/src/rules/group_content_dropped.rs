@@ -1,10 +1,7 @@
 use std::collections::HashSet;
 
-use qcbus_document::{Attribute, Node};
-use qcbus_sdk::modular::{Followed, OFFERS};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular};
+use crate::prelude::*;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_group_content_dropped",

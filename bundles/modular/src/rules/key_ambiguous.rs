@@ -1,12 +1,10 @@
 use std::collections::HashMap;
 use std::sync::atomic::Ordering;
 
-use qcbus_document::Attribute;
-use qcbus_sdk::modular::{Key, Spot, Use, What};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular, place, say, say_all};
 use crate::families::offers::{offered_in, path};
+use crate::prelude::*;
+use qcbus_sdk::modular::Key;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_key_ambiguous",

@@ -1,11 +1,9 @@
 use std::collections::HashSet;
 
-use qcbus_document::Attribute;
-use qcbus_sdk::modular::{Key, Spot, Use};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular, place};
 use crate::families::offers::{Offers, path};
+use crate::prelude::*;
+use qcbus_sdk::modular::Key;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_key_crashes_reference_tool",

@@ -1,7 +1,5 @@
-use qcbus_sdk::modular::What;
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular, say_all};
+use crate::prelude::*;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_key_duplicate",

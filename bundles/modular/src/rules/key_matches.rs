@@ -1,11 +1,9 @@
-use qcbus_document::{Attribute, Node};
-use qcbus_formats::distance::did_you_mean;
-use qcbus_sdk::modular::{OFFERS, Problem, Use, What};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::assembly::{Assembly, Modular, place};
 use crate::families::copies::{is_offered, short_name};
 use crate::families::offers::{Offers, may_be_meant, named_by, offers_any, path, unoffered};
+use crate::prelude::*;
+use qcbus_formats::distance::did_you_mean;
+use qcbus_sdk::modular::Problem;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_key_matches",

@@ -1,14 +1,12 @@
 use std::collections::HashMap;
 use std::sync::atomic::Ordering;
 
-use qcbus_document::{Attribute, Node};
-use qcbus_formats::distance::did_you_mean;
-use qcbus_sdk::modular::{Key, OFFERS, Spot, Use};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular, place};
 use crate::families::finds::Finds;
 use crate::families::offers::{Offers, may_be_meant, path};
+use crate::prelude::*;
+use qcbus_formats::distance::did_you_mean;
+use qcbus_sdk::modular::Key;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_key_path_exact",

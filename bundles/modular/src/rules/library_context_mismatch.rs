@@ -1,13 +1,10 @@
 use std::collections::HashSet;
 
-use qcbus_document::{Attribute, Document, Node};
-use qcbus_schema::Version;
-use qcbus_sdk::modular::{Followed, Spot};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular, place};
 use crate::families::copies::{Taken, short_name};
 use crate::families::finds::Finds;
+use crate::prelude::*;
+use qcbus_schema::Version;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_library_context_mismatch",

@@ -1,9 +1,7 @@
-use qcbus_document::Attribute;
-use qcbus_sdk::modular::{Followed, Use, offered};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular, place};
 use crate::families::copies::{key_of, taken_at};
+use crate::prelude::*;
+use qcbus_sdk::modular::offered;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_library_default_kept",

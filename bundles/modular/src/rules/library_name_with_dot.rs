@@ -1,11 +1,9 @@
 use std::collections::HashSet;
 
-use qcbus_sdk::modular::Spot;
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular, place};
 use crate::families::copies::taken_at;
 use crate::families::finds::Finds;
+use crate::prelude::*;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_library_name_with_dot",

@@ -1,11 +1,8 @@
-use qcbus_document::Node;
-use qcbus_sdk::modular::{Followed, OFFERS, Spot, Use};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular};
 use crate::families::copies::{short_name, taken_at};
 use crate::families::finds::Finds;
 use crate::families::offers::{offers_any, unoffered};
+use crate::prelude::*;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_library_parameter_attributes_missing",

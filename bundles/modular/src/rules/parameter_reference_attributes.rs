@@ -1,7 +1,5 @@
-use qcbus_document::{Attribute, Node};
-use qcbus_sdk::{Place, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular};
+use crate::prelude::*;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_parameter_reference_attributes",

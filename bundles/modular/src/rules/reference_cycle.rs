@@ -1,8 +1,6 @@
-use qcbus_sdk::modular::What;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::assembly::{Assembly, Modular, place};
 use crate::families::finds::Finds;
+use crate::prelude::*;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_reference_cycle",

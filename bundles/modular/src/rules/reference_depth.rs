@@ -1,10 +1,7 @@
 use std::collections::BTreeMap;
 
-use qcbus_document::Node;
-use qcbus_sdk::modular::{Followed, What};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular, say};
+use crate::prelude::*;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_reference_depth",

@@ -1,11 +1,8 @@
-use qcbus_document::Node;
-use qcbus_messages::{Absence, DocumentRole, MissingDocument};
-use qcbus_sdk::modular::What;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::assembly::{Assembly, Modular, place, say};
 use crate::families::file_faults::has_own_rule;
 use crate::families::finds::Finds;
+use crate::prelude::*;
+use qcbus_messages::{Absence, DocumentRole, MissingDocument};
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_reference_file_found",

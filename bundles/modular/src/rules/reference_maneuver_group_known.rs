@@ -1,12 +1,10 @@
 use std::collections::{HashMap, HashSet};
 
-use qcbus_document::{Document, Node};
-use qcbus_sdk::modular::{Followed, Form, Spot, What};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::assembly::{Assembly, Modular, place, say};
 use crate::families::copies::short_name;
 use crate::families::finds::Finds;
+use crate::prelude::*;
+use qcbus_sdk::modular::Form;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_reference_maneuver_group_known",

@@ -1,9 +1,7 @@
 use std::collections::BTreeMap;
 
-use qcbus_document::{Document, Node};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular};
+use crate::prelude::*;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_reference_order_dependence",

@@ -1,11 +1,10 @@
 use std::collections::{HashMap, HashSet};
 
-use qcbus_document::{Document, Node};
-use qcbus_sdk::modular::{Followed, Form, Spot, is_archive};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::assembly::{Assembly, Modular};
 use crate::families::finds::Finds;
+use crate::prelude::*;
+use qcbus_sdk::modular::Form;
+use qcbus_sdk::modular::is_archive;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_reference_unexpanded",

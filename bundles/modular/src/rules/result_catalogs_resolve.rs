@@ -1,14 +1,11 @@
 use std::collections::BTreeSet;
 
-use qcbus_document::{Attribute, Node};
-use qcbus_formats::distance::some_of;
-use qcbus_messages::DocumentRole;
-use qcbus_openscenario::closest;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::assembly::{Assembly, Modular};
 use crate::families::copies::{Taken, WrittenIn, short_name};
 use crate::families::finds::Finds;
+use crate::prelude::*;
+use qcbus_formats::distance::some_of;
+use qcbus_messages::DocumentRole;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_result_catalogs_resolve",

@@ -1,13 +1,12 @@
 use std::borrow::Cow;
 
-use qcbus_document::Attribute;
-use qcbus_formats::distance::some_of;
-use qcbus_openscenario::{Declared, Scenario, closest};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::assembly::{Assembly, Modular};
 use crate::families::copies::{Taken, WrittenAt, WrittenIn, is_offered, parameter_of, short_name};
 use crate::families::finds::Finds;
+use crate::prelude::*;
+use qcbus_formats::distance::some_of;
+use qcbus_openscenario::Declared;
+use qcbus_openscenario::Scenario;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_result_entities_declared",

@@ -1,11 +1,8 @@
 use std::collections::HashMap;
 
-use qcbus_document::Node;
-use qcbus_sdk::modular::Spot;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::assembly::{Assembly, Modular, place};
 use crate::families::copies::Taken;
+use crate::prelude::*;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_result_names_unique",

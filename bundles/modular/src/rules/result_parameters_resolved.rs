@@ -1,13 +1,11 @@
 use std::collections::HashMap;
 
-use qcbus_document::{Attribute, Node};
-use qcbus_openscenario::{Scenario, closest, expr};
-use qcbus_sdk::modular::Spot;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::assembly::{Assembly, Modular};
 use crate::families::copies::{Taken, WrittenAt, WrittenIn, parameter_of, short_name};
 use crate::families::finds::Finds;
+use crate::prelude::*;
+use qcbus_openscenario::Scenario;
+use qcbus_openscenario::expr;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_result_parameters_resolved",

@@ -1,14 +1,11 @@
 use std::collections::{HashMap, HashSet};
 
-use qcbus_document::{Attribute, Document, FileKind, Node};
-use qcbus_messages::DocumentRole;
-use qcbus_schema::{Checked, Code, Options, Outcome, Severity, Version, Violation};
-use qcbus_sdk::modular::Spot;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::assembly::{Assembly, Modular};
 use crate::families::copies::{Taken, short_name};
 use crate::families::finds::Finds;
+use crate::prelude::*;
+use qcbus_messages::DocumentRole;
+use qcbus_schema::{Checked, Code, Options, Outcome, Severity, Version, Violation};
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_result_valid_schema",

@@ -1,13 +1,11 @@
 use std::f64::consts::TAU;
 
-use qcbus_document::Attribute;
-use qcbus_openscenario::parse_double;
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular};
 use crate::families::copies::WrittenIn;
 use crate::families::finds::Finds;
 use crate::families::typings::Typings;
+use crate::prelude::*;
+use qcbus_openscenario::parse_double;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_value_range",

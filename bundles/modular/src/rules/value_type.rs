@@ -1,11 +1,10 @@
-use qcbus_openscenario::{DataType, closest};
-use qcbus_schema::ValueType;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::assembly::{Assembly, Modular};
 use crate::families::copies::WrittenIn;
 use crate::families::finds::Finds;
 use crate::families::typings::Typings;
+use crate::prelude::*;
+use qcbus_openscenario::DataType;
+use qcbus_schema::ValueType;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_value_type",

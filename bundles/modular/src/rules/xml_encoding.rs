@@ -1,9 +1,7 @@
-use qcbus_document::{Document, FaultCode};
-use qcbus_messages::path_text::name_of;
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular};
 use crate::families::file_faults::of;
+use crate::prelude::*;
+use qcbus_messages::path_text::name_of;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_xml_encoding",

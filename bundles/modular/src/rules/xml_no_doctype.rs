@@ -1,9 +1,7 @@
-use qcbus_document::Document;
-use qcbus_messages::path_text::name_of;
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::assembly::{Assembly, Modular};
 use crate::families::file_faults::{DOCTYPES, of};
+use crate::prelude::*;
+use qcbus_messages::path_text::name_of;
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_xml_no_doctype",

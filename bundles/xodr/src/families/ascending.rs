@@ -1,10 +1,7 @@
 //! Checks that records are in ascending order of their starts.
 
-use qcbus_document::Node;
-use qcbus_opendrive::MapPart;
-use qcbus_sdk::{Level, Param, Place, Sink};
-
 use super::shown::{beside, number};
+use crate::prelude::*;
 
 /// Maximum difference between two starts that count as equal.
 pub(crate) const TOLERANCE: Param = Param::number(

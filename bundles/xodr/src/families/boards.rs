@@ -1,9 +1,7 @@
 //! Signals that carry boards (OpenDRIVE 1.9, 14.7).
 
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-
 use crate::families::object_parts::below;
+use crate::prelude::*;
 
 /// A signal with its boards.
 #[derive(Clone, Copy)]

@@ -1,7 +1,7 @@
 //! Checks for elements that the center lane must not have.
 
-use qcbus_opendrive::{LaneGroup, MapPart};
-use qcbus_sdk::Sink;
+use crate::prelude::*;
+use qcbus_opendrive::LaneGroup;
 
 /// Reports children with this name of center lanes. `why` completes the text "the center lane has
 /// an element `width`, but ".

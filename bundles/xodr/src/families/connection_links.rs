@@ -1,8 +1,7 @@
 //! Comparison of connections with the lane links of their connecting roads.
 
+use crate::prelude::*;
 use foldhash::{HashMap, HashSet};
-use qcbus_document::Node;
-use qcbus_opendrive::{Connection, ContactPoint, JunctionType, Road, RoadEnd, RoadMap};
 
 /// All connections of common junctions between the same two road ends. They complete each other,
 /// because some tools write one connection for each lane.

@@ -2,10 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use qcbus_opendrive::{Connection, ContactPoint, Junction, Road, RoadMap};
-use qcbus_sdk::{Place, Sink};
-
 use super::on_road::{MAX_PLACES, OnRoad};
+use crate::prelude::*;
 
 /// Returns groups of connections of a junction with the same `key`, in the order of the keys. Only
 /// groups with several connections are included.

@@ -1,10 +1,7 @@
 //! Checks of the ids of outline corners.
 
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Place, Sink, Version};
-
 use crate::families::object_parts::{Stands, named, objects, outlines};
+use crate::prelude::*;
 
 /// First version in which outlines contain markings.
 const MARKINGS_IN_OUTLINES: Version = Version::new(1, 9);

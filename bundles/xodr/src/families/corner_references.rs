@@ -1,10 +1,8 @@
 //! Markings of objects and the outline points to which they refer.
 
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-
 use crate::families::ids::plain;
 use crate::families::object_parts::{corners, objects, outlines};
+use crate::prelude::*;
 
 /// A `<marking>` with the object and the outline that contain it.
 #[derive(Clone, Copy)]

@@ -1,10 +1,7 @@
 //! CRG records of roads and junctions (OpenDRIVE 1.9, 10.6, 12.12).
 
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Place, Sink};
-
 use crate::families::object_parts::{below, number};
+use crate::prelude::*;
 
 /// Returns the CRG records of roads and junctions. Those of objects have other attributes.
 pub(crate) fn records<'a>(map: &RoadMap<'a>) -> impl Iterator<Item = Node<'a>> + use<'a> {

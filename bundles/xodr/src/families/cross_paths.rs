@@ -1,11 +1,9 @@
 //! Roads that cross others as cross paths (OpenDRIVE 1.9, 12.5 and 12.7.1).
 
-use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{
-    ContactPoint, CrossPath, CrossPathLaneLink, Junction, Road, RoadMap, Side, Station,
-};
-
 use super::virtual_junctions::seen_from;
+use crate::prelude::*;
+use qcbus_opendrive::CrossPath;
+use qcbus_opendrive::CrossPathLaneLink;
 
 /// A cross path with its crossing road.
 pub(crate) struct Crossing<'m, 'a> {

@@ -1,10 +1,7 @@
 //! Checks the length of parametric curves against their geometry (OpenDRIVE 1.9, 9.6).
 
-use qcbus_opendrive::geometry::{ParamPoly3, ParamRange};
-use qcbus_opendrive::{Geometry, MapPart, Road};
-use qcbus_sdk::{Param, Place, Sink};
-
 use super::on_road::OnRoad;
+use crate::prelude::*;
 
 /// Maximum difference between the two lengths.
 pub(crate) const LENGTH_TOLERANCE: Param = Param::number(

@@ -3,13 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use qcbus_document::Node;
-use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{
-    ContactPoint, Edge, JunctionType, LaneEnd, LaneJoint, LaneRef, Road, RoadMap, Side, Station,
-};
-
 use super::strips::{Patch, area, common, strip};
+use crate::prelude::*;
 
 /// Default of `overlapZone`, in metres.
 pub(crate) const DEFAULT_ZONE: f64 = 100.0;

@@ -1,8 +1,7 @@
 //! Classification of lanes as drivable.
 
-use qcbus_opendrive::LaneRef;
-
 use super::routes::is_route;
+use crate::prelude::*;
 
 /// Checks whether vehicles drive on a lane according to annex D.1, deprecated types included. These
 /// are the lanes of routes and the lanes on which vehicles drive occasionally.

@@ -1,8 +1,8 @@
 //! Borders of lanes as polynomials over s, for finding extremes without sampling (OpenDRIVE 1.9,
 //! 11.5, 11.7).
 
-use qcbus_opendrive::geometry::{Cubic, Minimum};
-use qcbus_opendrive::{Profile, SectionRef, Side};
+use crate::prelude::*;
+use qcbus_opendrive::geometry::Minimum;
 
 /// A stretch on which a value is one cubic polynomial in the distance from `from`.
 #[derive(Debug, Clone, Copy)]

@@ -1,6 +1,7 @@
 //! Gantries that carry signals (OpenDRIVE 1.9, 14.7.4).
 
-use qcbus_opendrive::{RoadMap, Signal};
+use crate::prelude::*;
+use qcbus_opendrive::Signal;
 
 /// Returns the id of the gantry to which a signal refers as its mount.
 pub(crate) fn gantry_of<'a>(map: &RoadMap<'a>, signal: &Signal<'a>) -> Option<&'a str> {

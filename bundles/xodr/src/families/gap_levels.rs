@@ -6,7 +6,7 @@
 //! A lane that continues metres beside its end cannot be driven on. This is an error in every
 //! version.
 
-use qcbus_sdk::{Finding, Level, Param, Sink};
+use crate::prelude::*;
 
 /// Limits for gaps in the plan view.
 pub(crate) const GAP_ERROR_FROM: Param = Param::number(

@@ -1,9 +1,8 @@
 //! Checks the form of a `geoReference`. The standard requires a PROJ string. Other forms, such as
 //! well-known text and EPSG codes, are harmless where PROJ itself reads the map.
 
-use qcbus_sdk::Level;
-
 use super::proj_string::{self, Flaw};
+use crate::prelude::*;
 
 /// Names at the start of well-known text. The last ones give degrees, not a plane.
 const WKT: &[&str] = &[

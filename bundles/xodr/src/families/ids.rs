@@ -1,7 +1,6 @@
 //! Elements with an id and the references to them.
 
-use qcbus_document::{Document, Node};
-use qcbus_opendrive::is_user_data;
+use crate::prelude::*;
 
 /// A kind of element that has an id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

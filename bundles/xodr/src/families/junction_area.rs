@@ -1,10 +1,8 @@
 //! Boundary of a junction as a closed ring of points, and reference line of a junction (OpenDRIVE
 //! 1.9, 12.9 to 12.11).
 
-use qcbus_opendrive::geometry::{Placed, Point};
-use qcbus_opendrive::{
-    BoundarySegment, Edge, Junction, Road, RoadMap, SegmentStation, Side, Station,
-};
+use crate::prelude::*;
+use qcbus_opendrive::SegmentStation;
 
 /// Distance between samples along a border, in metres.
 const SPACING: f64 = 1.0;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use qcbus_opendrive::{Junction, JunctionType, RoadEnd, RoadMap};
+use crate::prelude::*;
 
 /// The pairs of road ends that a junction connects, in either order.
 pub(crate) struct Meeting {

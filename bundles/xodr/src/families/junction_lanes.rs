@@ -1,12 +1,8 @@
 //! Use of the surrounding lanes by junctions.
 
-use foldhash::HashSet;
-use qcbus_opendrive::{
-    Connection, ContactPoint, Junction, JunctionType, LaneEnd, LaneRef, Road, RoadEnd, RoadMap,
-    Traffic,
-};
-
 use super::routes::{is_route, lanes_at};
+use crate::prelude::*;
+use foldhash::HashSet;
 
 /// Lanes around junctions that are used by a connection.
 pub(crate) struct Used<'a> {

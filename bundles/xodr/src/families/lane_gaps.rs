@@ -6,11 +6,10 @@
 //! identified by t, even for a lane that changes its side of the center. A link between lanes
 //! without common width is wrong and forms no group.
 
+use super::driving::is_drivable;
+use crate::prelude::*;
 use foldhash::{HashMap, HashSet};
 use qcbus_opendrive::geometry::Point3;
-use qcbus_opendrive::{ContactPoint, Edge, LaneEnd, LaneJoint, LaneRef, RoadMap};
-
-use super::driving::is_drivable;
 
 /// Two linked drivable lanes whose edges do not meet.
 pub(crate) struct LaneGap<'m, 'a> {

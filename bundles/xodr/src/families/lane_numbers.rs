@@ -1,6 +1,6 @@
 //! Numbering of the lanes of a section.
 
-use qcbus_opendrive::{LaneRef, SectionRef, Side};
+use crate::prelude::*;
 
 /// Returns the lanes of a side whose number has the sign of the side, from the center outwards.
 /// Separate rules check lanes with another number or without one.

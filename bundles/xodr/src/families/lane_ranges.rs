@@ -1,10 +1,8 @@
 //! Lane validity: the lanes to which an object, a signal or a structure applies.
 
-use qcbus_document::Node;
-use qcbus_opendrive::{LayerKind, Road, RoadMap, SectionRef, Side, TrafficRule, Validity};
-use qcbus_sdk::{Level, Place, Sink};
-
 use crate::families::object_parts::{Stands, below, named, number, owner};
+use crate::prelude::*;
+use qcbus_opendrive::Validity;
 
 /// Reports validities below these elements that begin with the higher lane.
 pub(crate) fn lower_comes_first(map: &RoadMap<'_>, parents: &[&'static str], found: &mut Sink<'_>) {

@@ -1,11 +1,8 @@
 //! Lane numbers as references: links of lanes to lanes, lane links of junctions.
 
-use qcbus_document::Node;
-use qcbus_opendrive::{
-    Connection, ContactPoint, Junction, JunctionLaneLink, JunctionType, LaneJoint, LaneLink,
-    LaneRef, LayerKind, MapPart, Road, RoadMap, SectionRef, Side, Station,
-};
-use qcbus_sdk::Sink;
+use crate::prelude::*;
+use qcbus_opendrive::JunctionLaneLink;
+use qcbus_opendrive::LaneLink;
 
 /// Reports numbers in lane links that refer to no lane. It reports nothing if the target is unknown
 /// because a road does not exist or is not linked. Other rules report that.

@@ -1,7 +1,7 @@
 //! Checks that the two sides of a road link agree.
 
+use crate::prelude::*;
 use foldhash::HashSet;
-use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadLink, RoadMap};
 
 /// Checks whether a road belongs to a virtual junction. Such junctions do not split roads, so the
 /// surrounding roads need no link to them.

@@ -3,8 +3,7 @@
 //! The reference lines of two roads that meet may lie apart: a connecting road may begin beside the
 //! reference line of the incoming road. If the mouths do not touch, the roads do not meet.
 
-use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{ContactPoint, Road, RoadEnd, RoadMap, Side, Station};
+use crate::prelude::*;
 
 /// The line across an end of a road in the plan view, from the rightmost to the leftmost lane edge.
 #[derive(Debug, Clone, Copy)]

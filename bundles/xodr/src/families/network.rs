@@ -1,9 +1,8 @@
 //! Connected parts of the road network.
 
-use foldhash::HashMap;
-use qcbus_opendrive::{ContactPoint, Road, RoadMap};
-
 use super::routes::is_route;
+use crate::prelude::*;
+use foldhash::HashMap;
 
 /// The roads of a map, joined wherever the file relates them in any way.
 pub(crate) struct Parts {

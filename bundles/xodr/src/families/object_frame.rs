@@ -1,11 +1,11 @@
 //! Objects in local coordinates: u, v and z from the origin (OpenDRIVE 1.9, 13.1 to 13.3).
 
-use qcbus_document::Node;
-use qcbus_opendrive::{Corner, CornerKind, Object, ObjectPoint, Outline, Polyline, Road};
-use qcbus_sdk::{Level, Param, Sink};
-
 use super::object_parts::is_before;
 use super::on_road::OnRoad;
+use crate::prelude::*;
+use qcbus_opendrive::Corner;
+use qcbus_opendrive::ObjectPoint;
+use qcbus_opendrive::Polyline;
 
 pub(crate) const TOLERANCE: Param = Param::number(
     "tolerance",

@@ -1,8 +1,6 @@
 //! Objects of roads and junctions, and their parts (OpenDRIVE 1.9, chapter 13).
 
-use qcbus_document::Node;
-use qcbus_opendrive::{RoadMap, is_user_data};
-use qcbus_sdk::{Finding, Sink};
+use crate::prelude::*;
 
 /// Elements that are points of an outline.
 pub(crate) const CORNERS: [&str; 3] = ["cornerRoad", "cornerLocal", "curveLocal"];

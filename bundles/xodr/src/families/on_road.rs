@@ -1,7 +1,6 @@
 //! Position of a finding on its road, and names of roads and lanes in texts.
 
-use qcbus_opendrive::{ContactPoint, LaneRef, LayerKind, Road, Station};
-use qcbus_sdk::Finding;
+use crate::prelude::*;
 
 /// Maximum number of further places of one kind in a finding. More are not helpful, and a hostile
 /// file could make them expensive.

@@ -1,10 +1,9 @@
 //! Outlines that consist of curves (OpenDRIVE 1.9, 13.2.3).
 
-use qcbus_opendrive::geometry::{Curve, ParamPoly3, ParamRange, Placed, Point};
-use qcbus_opendrive::{CurveLocal, Object, Outline, Road, RoadMap};
-use qcbus_sdk::{Param, Place, Sink};
-
 use super::on_road::OnRoad;
+use crate::prelude::*;
+use qcbus_opendrive::CurveLocal;
+use qcbus_opendrive::geometry::Curve;
 
 pub(crate) const LENGTH_TOLERANCE: Param = Param::number(
     "length_tolerance",

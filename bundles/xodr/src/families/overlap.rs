@@ -5,11 +5,10 @@
 
 use std::collections::hash_map::Entry;
 
-use foldhash::HashMap;
-use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{LaneLayer, LaneRef, Road, RoadMap, SectionRef, Side, Station};
-
 use super::driving::is_drivable;
+use crate::prelude::*;
+use foldhash::HashMap;
+use qcbus_opendrive::LaneLayer;
 
 /// Length of a piece in metres. It is larger on maps with more than [`MOST_PIECES`] pieces.
 const STEP: f64 = 5.0;

@@ -3,7 +3,9 @@
 
 use std::cell::OnceCell;
 
-use qcbus_document::{Attribute, Document, FileKind, Node};
+use crate::prelude::*;
+use qcbus_document::Attribute;
+use qcbus_document::FileKind;
 use qcbus_schema::{Typing, version_of};
 
 /// Types of a document according to the schema of the version in its header.

@@ -1,6 +1,6 @@
 //! Functions for plane polygons.
 
-use qcbus_opendrive::geometry::Point;
+use crate::prelude::*;
 
 /// Returns the distance of a point from the line between two others, in metres.
 pub(crate) fn distance_to_line(point: Point, one: Point, other: Point) -> f64 {

@@ -2,14 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use qcbus_document::Node;
-use qcbus_opendrive::{Profile, Road, Side, Station};
-use qcbus_sdk::Sink;
-
 use super::gap_levels::Misfit;
 use super::on_road::OnRoad;
 use super::shown::number;
 use super::touching::STEP;
+use crate::prelude::*;
 
 /// Returns the starts of all records except the first, with their elements.
 fn breaks<'p, 'a>(profile: &'p Profile<'a>) -> impl Iterator<Item = (f64, Node<'a>)> + use<'p, 'a> {

@@ -1,12 +1,11 @@
 //! Checks of a PROJ string. PROJ itself does not report many faults: it ignores unknown names and
 //! uses defaults for missing values.
 
-use qcbus_schema::closest;
-use qcbus_sdk::Level;
-
 use super::georeference::code;
 use super::proj_names::{ANGLES, CHOICES, CONES, MERIDIANS, NO_PROJECTIONS, NUMBERS, keys, names};
 use super::proj_values::{degrees, number};
+use crate::prelude::*;
+use qcbus_schema::closest;
 
 /// One fault with its level and text.
 pub(crate) struct Flaw {

@@ -1,6 +1,6 @@
 //! Lanes for rail-bound vehicles (OpenDRIVE 1.9, 15.2).
 
-use qcbus_opendrive::{LaneRef, RoadMap};
+use crate::prelude::*;
 
 /// Returns the lanes of type `tram` and `rail`, with their type.
 pub(crate) fn rail_lanes<'m, 'a>(

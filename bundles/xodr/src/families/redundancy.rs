@@ -1,7 +1,8 @@
 //! Records that repeat a value that already applies (OpenDRIVE 1.9, annex D.2).
 
-use qcbus_opendrive::geometry::{Cubic, heading_difference};
-use qcbus_opendrive::{Geometry, PlanView, Profile, Record, ShapeKind};
+use crate::prelude::*;
+use qcbus_opendrive::PlanView;
+use qcbus_opendrive::Record;
 
 /// A record and the record before it with the same value.
 pub(crate) struct Repeated<'p, 'a> {

@@ -1,11 +1,8 @@
 //! Contacts between the geometries of a reference line (OpenDRIVE 1.9, 9.2).
 
-use qcbus_opendrive::geometry::{Cubic, ParamPoly3};
-use qcbus_opendrive::{Geometry, Road, ShapeKind};
-use qcbus_sdk::{Finding, Sink};
-
 use super::gap_levels::Misfit;
 use super::on_road::OnRoad;
+use crate::prelude::*;
 
 /// Returns each geometry with the next one, in ascending order of s.
 pub(crate) fn joints<'m, 'a>(

@@ -2,11 +2,9 @@
 
 use std::cell::OnceCell;
 
-use foldhash::HashSet;
-use qcbus_document::Node;
-use qcbus_opendrive::{LaneRef, Road, RoadMap, Side};
-
 use super::object_parts::number;
+use crate::prelude::*;
+use foldhash::HashSet;
 
 /// Returns the objects and then the signals of a road, without references.
 pub(crate) fn things<'a>(road: &Road<'a>) -> impl Iterator<Item = Node<'a>> + use<'a> {

@@ -1,7 +1,6 @@
 //! Lanes for routes, and their entries to and exits from roads and junctions.
 
-use qcbus_opendrive::{ContactPoint, LaneRef, Road, Side};
-use qcbus_sdk::Param;
+use crate::prelude::*;
 
 /// Minimum width of a lane for a route.
 pub(crate) const NARROW: Param = Param::number(

@@ -1,8 +1,6 @@
 //! Elements that a simulator does not support. These rules run only on request.
 
-use qcbus_document::Node;
-use qcbus_opendrive::{RoadMap, is_user_data};
-use qcbus_sdk::Sink;
+use crate::prelude::*;
 
 /// Elements that a simulator ignores or reads differently from the standard.
 pub(crate) struct Gap {

@@ -1,10 +1,8 @@
 //! Strips of ground along roads, cut into quadrangles, and the common area of two quadrangles.
 
-use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{Road, Side, Station};
-
 use super::driving::is_drivable;
 use super::overlap::{cut, turn};
+use crate::prelude::*;
 
 /// Maximum number of quadrangles of one strip.
 const MOST: f64 = 1024.0;

@@ -1,9 +1,8 @@
 //! Ground boxes of objects with a surface (OpenDRIVE 1.9, 13.1, 13.4, 13.13).
 
-use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{Object, Repeat, Road, RoadMap};
-
 use super::object_parts::number;
+use crate::prelude::*;
+use qcbus_opendrive::Repeat;
 
 /// Maximum numbers of copies of one object, and of boxes of all objects together.
 const MOST_COPIES: f64 = 1000.0;

@@ -2,7 +2,8 @@
 
 use std::collections::HashMap;
 
-use qcbus_opendrive::{Road, RoadMap, Switch};
+use crate::prelude::*;
+use qcbus_opendrive::Switch;
 
 /// Returns all switches by id with their road. For a shared id it returns the first one.
 pub(crate) fn by_id<'m, 'a>(map: &'m RoadMap<'a>) -> HashMap<&'a str, (&'m Road<'a>, Switch<'a>)> {

@@ -2,15 +2,12 @@
 
 use std::f64::consts::PI;
 
-use qcbus_opendrive::geometry::heading_difference;
-use qcbus_opendrive::{
-    BorderPoint, JunctionType, LaneJoint, LaneRef, MapPart, RoadMap, TouchingLanes,
-};
-use qcbus_sdk::{Finding, Param, Sink};
-
 use super::driving::is_drivable;
 use super::gap_levels::Misfit;
 use super::on_road::{OnRoad as _, lane_name};
+use crate::prelude::*;
+use qcbus_opendrive::BorderPoint;
+use qcbus_opendrive::TouchingLanes;
 
 pub(crate) const GAP: Param = Param::number(
     "gap",

@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use foldhash::HashSet;
-use qcbus_opendrive::{ContactPoint, JunctionType, Road, RoadContact, RoadEnd, RoadMap};
-
 use super::mouths;
+use crate::prelude::*;
+use foldhash::HashSet;
 
 /// Distance of mouths in metres below which two roads lie at the same place.
 const THERE: f64 = 1.0;

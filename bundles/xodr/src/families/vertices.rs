@@ -1,6 +1,6 @@
 //! Vertices of skeletons (OpenDRIVE 1.9, 13.3).
 
-use qcbus_document::Node;
+use crate::prelude::*;
 
 /// The vertices of a polyline by kind.
 pub(crate) struct Vertices<'a> {

@@ -1,7 +1,7 @@
 //! Branches off the main road of a virtual junction (OpenDRIVE 1.9, 12.7).
 
-use qcbus_opendrive::geometry::{Point, Pose};
-use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadLink, RoadMap};
+use crate::prelude::*;
+use qcbus_opendrive::geometry::Pose;
 
 /// An end of a connecting road that is linked to the main road of its virtual junction.
 pub(crate) struct Branch<'m, 'a> {

@@ -1,7 +1,7 @@
 //! Links of roads in virtual junctions.
 
+use crate::prelude::*;
 use foldhash::HashSet;
-use qcbus_opendrive::{JunctionType, Road, RoadLink, RoadMap};
 
 /// Checks whether a link leads from a road of a virtual junction to its main road.
 pub(crate) fn leads_to_main_road(map: &RoadMap<'_>, road: &Road<'_>, link: RoadLink<'_>) -> bool {

@@ -1,7 +1,7 @@
 //! The closed vocabularies of OpenDRIVE, with the words of all versions together. The schemas of
 //! 1.1 to 1.3 list none, and the schema of 1.6 leaves out some.
 
-use qcbus_sdk::Level;
+use crate::prelude::*;
 
 /// The valid words of an attribute.
 pub(crate) struct Vocabulary {

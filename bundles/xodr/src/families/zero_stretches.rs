@@ -1,6 +1,6 @@
 //! Stretches on which a lane has no width (OpenDRIVE 1.9, 11.4).
 
-use qcbus_opendrive::LaneRef;
+use crate::prelude::*;
 
 /// Width in metres up to which a lane counts as having none.
 pub(crate) const NO_WIDTH: f64 = 0.001;

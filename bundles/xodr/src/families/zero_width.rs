@@ -1,11 +1,8 @@
 //! Lanes without width at a link (OpenDRIVE 1.9, 11.6).
 
-use foldhash::HashMap;
-use qcbus_document::Node;
-use qcbus_opendrive::{ContactPoint, LaneEnd, LaneRef, RoadMap};
-use qcbus_sdk::{Param, Sink};
-
 use super::on_road::{MAX_PLACES, OnRoad, lane_name};
+use crate::prelude::*;
+use foldhash::HashMap;
 
 /// Width up to which a lane counts as having none.
 pub(crate) const ZERO_WIDTH: Param = Param::number(

@@ -1,10 +1,7 @@
-use qcbus_document::{Document, Node};
-use qcbus_opendrive::is_user_data;
-use qcbus_sdk::{Place, Rule, Sink};
-
 use crate::families::ids::{KINDS, Scope};
 use crate::families::object_parts::{listed, named};
 use crate::families::own_schema::OwnSchema;
+use crate::prelude::*;
 
 pub static RULE: Rule<Document> = Rule {
     id: "check_qcbus_xodr_attributes_are_given",

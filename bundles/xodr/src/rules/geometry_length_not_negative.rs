@@ -1,8 +1,5 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Place, Rule, Sink};
-
 use crate::families::shown::number;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_geometry_length_not_negative",

@@ -1,7 +1,6 @@
-use qcbus_document::{Document, Node, ValueError};
-use qcbus_sdk::{Level, Place, Rule, Sink, Version};
-
 use crate::families::shown::{beside, number};
+use crate::prelude::*;
+use qcbus_document::ValueError;
 
 pub static RULE: Rule<Document> = Rule {
     id: "check_qcbus_xodr_header_attributes",

@@ -1,9 +1,4 @@
-use qcbus_document::Node;
-use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{Geometry, RoadMap, ShapeKind};
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_header_bounds_contain_roads",

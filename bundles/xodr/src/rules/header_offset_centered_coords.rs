@@ -1,8 +1,4 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_opendrive::geometry::Point;
-use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
-
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_header_offset_centered_coords",

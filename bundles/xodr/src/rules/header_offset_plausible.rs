@@ -1,9 +1,6 @@
 use std::f64::consts::TAU;
 
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_header_offset_plausible",

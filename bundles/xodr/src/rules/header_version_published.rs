@@ -1,5 +1,4 @@
-use qcbus_document::Document;
-use qcbus_sdk::{Level, Place, Rule, Sink};
+use crate::prelude::*;
 
 pub static RULE: Rule<Document> = Rule {
     id: "check_qcbus_xodr_header_version_published",

@@ -1,8 +1,6 @@
-use foldhash::HashMap;
-use qcbus_document::{Document, Node};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::ids::{KINDS, Kind, Scope};
+use crate::prelude::*;
+use foldhash::HashMap;
 
 pub static RULE: Rule<Document> = Rule {
     id: "check_asam_xodr_ids_id_unique_in_class",

@@ -1,9 +1,6 @@
 use std::collections::HashMap;
 
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Place, Rule, Sink, Version};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_ids_id_unique_in_lane_section",

@@ -1,12 +1,8 @@
-use foldhash::{HashMap, HashSet};
-use qcbus_document::{Document, Node};
-use qcbus_opendrive::{RoadMap, is_user_data};
-use qcbus_sdk::{Place, Rule, Sink};
-
 use crate::families::ids::{Class, KINDS, Kind, plain};
 use crate::families::lane_references;
 use crate::families::object_parts::outlines;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use foldhash::{HashMap, HashSet};
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_ids_only_ref_defined_ids",

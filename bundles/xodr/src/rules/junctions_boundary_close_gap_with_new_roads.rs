@@ -1,10 +1,7 @@
 use std::collections::BTreeSet;
 
-use qcbus_opendrive::{BoundarySegment, ContactPoint, Junction, Road, RoadMap};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_boundary_close_gap_with_new_roads",

@@ -1,8 +1,5 @@
-use qcbus_opendrive::{Junction, RoadMap};
-use qcbus_sdk::{Param, Rule, Sink};
-
 use crate::families::junction_area::{Stretch, boundary};
-use crate::model::Roads;
+use crate::prelude::*;
 
 const GAP: Param = Param::number(
     "gap",

@@ -1,8 +1,5 @@
-use qcbus_opendrive::{Junction, RoadMap};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::junction_area::{Stretch, boundary, doubled_area, ring};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_boundary_segments_counter_clockwise_order",

@@ -1,9 +1,6 @@
 use std::collections::{HashMap, HashSet};
 
-use qcbus_opendrive::{BoundarySegment, ContactPoint, Junction, RoadMap};
-use qcbus_sdk::{Rule, Sink};
-
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_boundary_segments_for_each_conn_road",

@@ -1,7 +1,4 @@
-use qcbus_opendrive::{JunctionType, RoadMap};
-use qcbus_sdk::{Rule, Sink};
-
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_common_direct_junction_attributes",

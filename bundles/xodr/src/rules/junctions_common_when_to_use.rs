@@ -1,8 +1,5 @@
-use qcbus_opendrive::{JunctionType, RoadMap};
-use qcbus_sdk::{Level, Rule, Sink, Version};
-
 use crate::families::junction_ends::{Meeting, name};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_common_when_to_use",

@@ -1,14 +1,9 @@
 use std::cell::LazyCell;
 
-use foldhash::HashSet;
-use qcbus_opendrive::{
-    ContactPoint, JunctionType, LaneEnd, LaneRef, Road, RoadEnd, RoadMap, Traffic,
-};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::routes::{NARROW, is_route, is_wide, lanes_at, routes_at};
-use crate::model::Roads;
+use crate::prelude::*;
+use foldhash::HashSet;
 
 const NEAR: Param = Param::number(
     "near",

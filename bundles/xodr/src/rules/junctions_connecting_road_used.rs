@@ -1,10 +1,7 @@
-use foldhash::HashSet;
-use qcbus_opendrive::{ContactPoint, JunctionType, Road, RoadMap};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
 use crate::families::routes::is_route;
-use crate::model::Roads;
+use crate::prelude::*;
+use foldhash::HashSet;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_connecting_road_used",

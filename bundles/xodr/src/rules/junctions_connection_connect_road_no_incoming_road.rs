@@ -1,10 +1,7 @@
 use std::collections::BTreeSet;
 
-use qcbus_opendrive::{JunctionType, RoadMap};
-use qcbus_sdk::{Backport, Place, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_connection_connect_road_no_incoming_road",

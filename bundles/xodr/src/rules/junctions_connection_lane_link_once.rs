@@ -1,9 +1,5 @@
+use crate::prelude::*;
 use foldhash::HashMap;
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Rule, Sink};
-
-use crate::model::Roads;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_connection_lane_link_once",

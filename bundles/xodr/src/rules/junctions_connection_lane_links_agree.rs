@@ -1,11 +1,7 @@
-use qcbus_document::Node;
-use qcbus_opendrive::{ContactPoint, LaneRef, LayerKind, Road, RoadEnd, RoadMap, Traffic};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::connection_links::{Bundle, Entries, bundles};
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::routes::{NARROW, is_route, is_wide, lanes_at, routes_at};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_connection_lane_links_agree",

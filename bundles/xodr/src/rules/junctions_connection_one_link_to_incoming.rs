@@ -1,9 +1,6 @@
-use qcbus_opendrive::{LaneJoint, RoadMap, Traffic};
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::connections::{repeated, report_repeated};
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_connection_one_link_to_incoming",

@@ -1,8 +1,5 @@
-use qcbus_opendrive::{Connection, Junction, JunctionType, RoadMap};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::object_parts::listed;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_connection_required_attributes",

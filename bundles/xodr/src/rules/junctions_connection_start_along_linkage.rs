@@ -1,8 +1,5 @@
-use qcbus_opendrive::{ContactPoint, RoadMap};
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::connections;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_connection_start_along_linkage",

@@ -1,9 +1,6 @@
 use std::collections::HashSet;
 
-use qcbus_opendrive::{Junction, JunctionType, RoadMap};
-use qcbus_sdk::{Backport, Place, Rule, Sink};
-
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_cross_path_correct_junction_id",

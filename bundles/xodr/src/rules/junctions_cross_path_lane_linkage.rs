@@ -1,9 +1,6 @@
-use qcbus_opendrive::{Road, RoadMap, Side, Station};
-use qcbus_sdk::{Param, Place, Rule, Sink};
-
 use crate::families::cross_paths::{Crossing, Landing, crossings};
 use crate::families::on_road::OnRoad;
-use crate::model::Roads;
+use crate::prelude::*;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

@@ -1,7 +1,5 @@
-use qcbus_opendrive::{ContactPoint, CrossPath, LaneRef, LayerKind, Road, RoadEnd, RoadMap, Side};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
-use crate::model::Roads;
+use crate::prelude::*;
+use qcbus_opendrive::CrossPath;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_cross_path_only_connect_correct_type",

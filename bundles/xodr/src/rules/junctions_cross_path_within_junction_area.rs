@@ -1,11 +1,7 @@
-use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{ContactPoint, JunctionType, RoadMap};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::cross_paths::{Crossing, Landing, crossings};
 use crate::families::junction_area::{boundary, ring};
 use crate::families::polygons::{contains, distance_to_boundary};
-use crate::model::Roads;
+use crate::prelude::*;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

@@ -1,9 +1,6 @@
 use std::collections::HashSet;
 
-use qcbus_opendrive::{JunctionType, RoadMap};
-use qcbus_sdk::{Place, Rule, Sink};
-
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_crossing_only_one_high_prio",

@@ -1,12 +1,9 @@
 use std::collections::BTreeSet;
 
-use qcbus_document::Node;
-use qcbus_opendrive::{JunctionType, Road, RoadMap, RoadSection, Station};
-use qcbus_sdk::{Param, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
 use crate::families::strips::{Patch, area, common, strip, traffic_edges};
-use crate::model::Roads;
+use crate::prelude::*;
+use qcbus_opendrive::RoadSection;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

@@ -1,9 +1,6 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Param, Rule, Sink};
-
 use crate::families::direct_overlap::{SharedSpace, shared_spaces};
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::Roads;
+use crate::prelude::*;
 
 const STEP: Param = Param::number("step", 0.05, "m", "maximum accepted difference in height");
 

@@ -1,9 +1,6 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Param, Place, Rule, Sink};
-
 use crate::families::direct_overlap::{DEFAULT_ZONE, SharedSpace, shared_spaces, zone};
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::Roads;
+use crate::prelude::*;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

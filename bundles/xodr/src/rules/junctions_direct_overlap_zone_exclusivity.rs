@@ -1,8 +1,4 @@
-use qcbus_document::Node;
-use qcbus_opendrive::{Connection, JunctionType, RoadMap};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_direct_overlap_zone_exclusivity",

@@ -1,8 +1,5 @@
-use qcbus_opendrive::{JunctionType, RoadEnd, RoadMap};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::junction_ends::{Meeting, name};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_direct_road_connectivity",

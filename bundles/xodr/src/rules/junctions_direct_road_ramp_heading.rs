@@ -1,12 +1,8 @@
 use std::f64::consts::PI;
 
-use qcbus_opendrive::geometry::heading_difference;
-use qcbus_opendrive::{JunctionType, RoadContact, RoadMap};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::on_road::OnRoad;
 use crate::families::touching::KINK;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_direct_road_ramp_heading",

@@ -1,11 +1,7 @@
 use std::collections::BTreeMap;
 
-use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{JunctionType, LaneEnd, LaneJoint, RoadEnd, RoadMap};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::virtual_junctions::seen_from;
-use crate::model::Roads;
+use crate::prelude::*;
 
 /// Minimum distance of the middles of two lanes that count as side by side, in metres.
 const MARGIN: f64 = 0.1;

@@ -1,10 +1,7 @@
-use qcbus_opendrive::geometry::{Placed, Point};
-use qcbus_opendrive::{BoundarySegment, ElevationGrid, Junction, Road, RoadMap};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::junction_area::{beside, boundary, reference_line};
 use crate::families::on_road::OnRoad;
-use crate::model::Roads;
+use crate::prelude::*;
+use qcbus_opendrive::ElevationGrid;
 
 const STEP: Param = Param::number(
     "step",

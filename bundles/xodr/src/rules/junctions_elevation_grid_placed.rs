@@ -1,7 +1,4 @@
-use qcbus_opendrive::{JunctionType, RoadMap};
-use qcbus_sdk::{Level, Rule, Sink};
-
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_elevation_grid_placed",

@@ -1,9 +1,6 @@
-use qcbus_opendrive::geometry::{Placed, Point};
-use qcbus_opendrive::{ElevationGrid, Junction, RoadMap};
-use qcbus_sdk::{Param, Rule, Sink};
-
 use crate::families::junction_area::{beside, boundary, reference_line, ring};
-use crate::model::Roads;
+use crate::prelude::*;
+use qcbus_opendrive::ElevationGrid;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

@@ -1,10 +1,6 @@
-use qcbus_opendrive::geometry::{Placed, Point};
-use qcbus_opendrive::{Junction, RoadMap};
-use qcbus_sdk::{Param, Rule, Sink};
-
 use crate::families::junction_area::{boundary, reference_line, ring};
 use crate::families::polygons::{distance_to_line, sides};
-use crate::model::Roads;
+use crate::prelude::*;
 
 const GAP: Param = Param::number(
     "gap",

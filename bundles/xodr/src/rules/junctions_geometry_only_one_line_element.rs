@@ -1,8 +1,4 @@
-use qcbus_document::Node;
-use qcbus_opendrive::{Junction, RoadMap, ShapeKind};
-use qcbus_sdk::{Rule, Sink};
-
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_geometry_only_one_line_element",

@@ -1,9 +1,5 @@
-use qcbus_opendrive::geometry::{Placed, Point};
-use qcbus_opendrive::{Junction, RoadMap};
-use qcbus_sdk::{Param, Rule, Sink};
-
 use crate::families::junction_area::{beside, boundary, reference_line, ring};
-use crate::model::Roads;
+use crate::prelude::*;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

@@ -1,12 +1,7 @@
-use foldhash::HashSet;
-use qcbus_opendrive::{
-    ContactPoint, Junction, JunctionType, Road, RoadContact, RoadEnd, RoadLink, RoadMap,
-};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::on_road::{MAX_PLACES, OnRoad};
 use crate::families::unlinked_arms::UnlinkedArms;
-use crate::model::Roads;
+use crate::prelude::*;
+use foldhash::HashSet;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_incoming_road_linked",

@@ -1,14 +1,10 @@
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
-use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{Junction, Road, RoadMap, Station};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::junction_area::{boundary, ring};
 use crate::families::polygons::{contains, distance_to_boundary, sides};
 use crate::families::strips::{Patch, area, common, middle, strip, traffic_edges};
-use crate::model::Roads;
+use crate::prelude::*;
 
 const AREA: Param = Param::number(
     "area",

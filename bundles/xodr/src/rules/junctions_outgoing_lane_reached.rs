@@ -1,11 +1,8 @@
-use qcbus_opendrive::{ContactPoint, Junction, LaneRef, Road, RoadEnd, RoadMap, Traffic};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::junction_lanes::{Used, arms};
 use crate::families::link_sides::Known;
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::routes::{NARROW, routes_at};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_outgoing_lane_reached",

@@ -1,8 +1,6 @@
+use crate::prelude::*;
 use foldhash::HashMap;
-use qcbus_opendrive::{Junction, Priority, RoadMap};
-use qcbus_sdk::{Level, Rule, Sink};
-
-use crate::model::Roads;
+use qcbus_opendrive::Priority;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_junctions_priority_acyclic",

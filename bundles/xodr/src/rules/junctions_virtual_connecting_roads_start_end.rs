@@ -1,9 +1,6 @@
-use qcbus_opendrive::{ContactPoint, Junction, Road, RoadMap};
-use qcbus_sdk::{Backport, Param, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
 use crate::families::virtual_junctions::{Branch, branches, connecting_roads, seen_from};
-use crate::model::Roads;
+use crate::prelude::*;
 
 const TOLERANCE: Param = Param::number(
     "s_tolerance",

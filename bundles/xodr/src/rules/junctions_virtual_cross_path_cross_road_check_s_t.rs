@@ -1,9 +1,6 @@
-use qcbus_opendrive::{JunctionType, RoadMap, Side};
-use qcbus_sdk::{Param, Rule, Sink};
-
 use crate::families::cross_paths::{Crossing, Landing, crossings};
 use crate::families::virtual_junctions::seen_from;
-use crate::model::Roads;
+use crate::prelude::*;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

@@ -1,13 +1,9 @@
 use std::f64::consts::PI;
 
-use qcbus_opendrive::RoadMap;
-use qcbus_opendrive::geometry::heading_difference;
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
 use crate::families::touching::KINK;
 use crate::families::virtual_junctions::all_branches;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_virtual_heading_equal_mainroad",

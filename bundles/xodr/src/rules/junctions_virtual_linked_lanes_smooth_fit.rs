@@ -1,9 +1,5 @@
 use std::f64::consts::PI;
 
-use qcbus_opendrive::geometry::heading_difference;
-use qcbus_opendrive::{BorderPoint, Edge, LaneLink, LaneRef, RoadMap, Side};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::driving::is_drivable;
 use crate::families::gap_levels::{
     GAP_BROKEN_FROM, GAP_ERROR_FROM, KINK_ERROR_FROM, Misfit, STEP_BROKEN_FROM, STEP_ERROR_FROM,
@@ -11,7 +7,9 @@ use crate::families::gap_levels::{
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::touching::{GAP, KINK, STEP};
 use crate::families::virtual_junctions::{Branch, all_branches};
-use crate::model::Roads;
+use crate::prelude::*;
+use qcbus_opendrive::BorderPoint;
+use qcbus_opendrive::LaneLink;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_virtual_linked_lanes_smooth_fit",

@@ -1,7 +1,4 @@
-use qcbus_opendrive::{JunctionType, Road, RoadMap};
-use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
-
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_junctions_virtual_only_one_start_end",

@@ -1,7 +1,4 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_lane_section_single_side",

@@ -1,7 +1,3 @@
-use qcbus_document::Node;
-use qcbus_opendrive::{LaneEnd, RoadEnd, RoadMap, Station};
-use qcbus_sdk::{Backport, Param, Rule, Sink, Version};
-
 use crate::families::gap_levels::{GAP_BROKEN_FROM, GAP_ERROR_FROM, Misfit};
 use crate::families::lane_gaps::{LaneGap, lane_gaps};
 use crate::families::mouths;
@@ -10,7 +6,7 @@ use crate::families::refline::report_gaps;
 use crate::families::routes::is_route;
 use crate::families::touching::{Where, place_of};
 use crate::families::zero_width::ZERO_WIDTH;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const GAP: Param = Param::number(
     "gap",

@@ -1,9 +1,6 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::gap_levels::KINK_ERROR_FROM;
 use crate::families::touching::{GAP, KINK, Where, pairs, report_kink};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_lane_smoothness_contact_point_no_horizontal_kinks",

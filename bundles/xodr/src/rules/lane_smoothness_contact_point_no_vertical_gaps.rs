@@ -1,9 +1,6 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Param, Rule, Sink};
-
 use crate::families::gap_levels::{KINK_ERROR_FROM, Misfit, STEP_BROKEN_FROM, STEP_ERROR_FROM};
 use crate::families::touching::{Pair, STEP, Where, pairs, report_step};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const ROLL: Param = Param::number(
     "roll",

@@ -1,10 +1,7 @@
-use qcbus_opendrive::{Road, RoadMap, Station};
-use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
 use crate::families::shown::number;
 use crate::families::touching::{GAP, STEP, Where, pairs};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const PITCH: Param = Param::number(
     "pitch",

@@ -1,9 +1,6 @@
-use qcbus_opendrive::{Edge, LaneRef, RoadMap, SectionRef, Side, Station};
-use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
-
 use crate::families::driving::is_drivable;
 use crate::families::on_road::lane_name;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const STEP: Param = Param::number(
     "step",

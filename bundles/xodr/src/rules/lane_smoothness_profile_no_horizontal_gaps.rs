@@ -1,15 +1,12 @@
 use std::collections::BTreeMap;
 
-use qcbus_document::Node;
-use qcbus_opendrive::{LaneRef, LaneSpan, Profile, RoadMap, SectionRef, Side, Station};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::driving::is_drivable;
 use crate::families::gap_levels::GAP_BROKEN_FROM;
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::routes::is_route;
 use crate::families::shown::number;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::LaneSpan;
 
 const GAP: Param = Param::number(
     "gap",

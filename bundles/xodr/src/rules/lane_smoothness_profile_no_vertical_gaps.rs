@@ -1,10 +1,7 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::gap_levels::{STEP_BROKEN_FROM, STEP_ERROR_FROM};
 use crate::families::profile_steps::{elevation, lateral};
 use crate::families::touching::STEP;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_lane_smoothness_profile_no_vertical_gaps",

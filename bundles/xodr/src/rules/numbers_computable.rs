@@ -1,10 +1,7 @@
-use foldhash::HashSet;
-use qcbus_document::{Attribute, Node};
-use qcbus_opendrive::{RoadMap, is_user_data};
-use qcbus_sdk::{Level, Param, Rule, Sink, Version};
-
 use crate::families::written_numbers::{Measure, Written, is_suspicious, shown};
-use crate::model::Roads;
+use crate::prelude::*;
+use foldhash::HashSet;
+use qcbus_document::Attribute;
 
 const MOST: Param = Param::number(
     "most",

@@ -1,10 +1,7 @@
-use qcbus_opendrive::{LaneRef, Profile, Road, RoadMap};
-use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
 use crate::families::redundancy::{Repeated, in_lines, in_profile};
 use crate::families::shown;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

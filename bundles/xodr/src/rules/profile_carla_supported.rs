@@ -1,9 +1,5 @@
-use qcbus_document::Node;
-use qcbus_opendrive::{RoadMap, ShapeKind};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::simulators::{self, Gap, lane_border};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_profile_carla_supported",

@@ -1,9 +1,5 @@
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::simulators::{self, Gap, any, lane_border};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_profile_esmini_supported",

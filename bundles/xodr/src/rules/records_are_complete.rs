@@ -1,8 +1,4 @@
-use qcbus_document::Node;
-use qcbus_opendrive::{Profile, Road, RoadMap};
-use qcbus_sdk::{Level, Rule, Sink};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_records_are_complete",

@@ -1,9 +1,6 @@
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Rule, Sink};
-
-use crate::model::Roads;
 use std::collections::HashMap;
+
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_crg_junction",

@@ -1,11 +1,8 @@
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
+use std::collections::BTreeMap;
 
 use crate::families::crg::{parent, purpose, records};
 use crate::families::object_parts::{named, number};
-use crate::model::Roads;
-use std::collections::BTreeMap;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_crg_only_on_per_s",

@@ -1,8 +1,5 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Rule, Sink, Version};
-
 use crate::families::crg::{self, records};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_crg_s_t_offset_no_global",

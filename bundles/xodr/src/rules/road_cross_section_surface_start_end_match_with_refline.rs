@@ -1,7 +1,4 @@
-use qcbus_opendrive::{Profile, Road, RoadMap};
-use qcbus_sdk::{Param, Place, Rule, Sink};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_cross_section_surface_start_end_match_with_refline",

@@ -1,9 +1,7 @@
 use std::collections::HashMap;
 
-use qcbus_opendrive::{RoadMap, Side, Strip};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::Strip;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_cross_section_surface_use_strip",

@@ -1,7 +1,5 @@
-use qcbus_opendrive::{Road, RoadMap, Strip};
-use qcbus_sdk::{Param, Rule, Sink};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::Strip;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_cross_section_surface_use_width",

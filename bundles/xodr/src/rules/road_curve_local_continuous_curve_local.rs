@@ -1,10 +1,8 @@
-use qcbus_opendrive::geometry::Curve;
-use qcbus_opendrive::{CurveLocal, Object, Road, RoadMap};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
 use crate::families::outline_curves::{chord, curved_outlines, end, start};
-use crate::model::Roads;
+use crate::prelude::*;
+use qcbus_opendrive::CurveLocal;
+use qcbus_opendrive::geometry::Curve;
 
 const GAP: Param = Param::number(
     "gap",

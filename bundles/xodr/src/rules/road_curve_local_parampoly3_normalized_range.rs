@@ -1,9 +1,5 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_opendrive::geometry::ParamRange;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::outline_curves::{LENGTH_TOLERANCE, range_fits};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_curve_local_parampoly3_normalized_range",

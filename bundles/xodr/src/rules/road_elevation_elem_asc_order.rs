@@ -1,8 +1,5 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::ascending::{TOLERANCE, VOID, along_road, children};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_elevation_elem_asc_order",

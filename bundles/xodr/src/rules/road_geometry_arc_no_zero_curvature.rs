@@ -1,7 +1,4 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_geometry_arc_no_zero_curvature",

@@ -1,13 +1,10 @@
-use qcbus_opendrive::geometry::Point3;
-use qcbus_opendrive::{ContactPoint, Road, RoadEnd, RoadMap};
-use qcbus_sdk::{Backport, Param, Rule, Sink};
-
 use crate::families::gap_levels::{
     GAP_BROKEN_FROM, GAP_ERROR_FROM, Misfit, STEP_BROKEN_FROM, STEP_ERROR_FROM,
 };
 use crate::families::mouths::Mouth;
 use crate::families::on_road::OnRoad;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::geometry::Point3;
 
 const GAP: Param = Param::number(
     "gap",

@@ -1,9 +1,6 @@
-use qcbus_opendrive::{Road, RoadMap};
-use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
 use crate::families::shown;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

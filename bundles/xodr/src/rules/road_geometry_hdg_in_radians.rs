@@ -1,11 +1,7 @@
 use std::f64::consts::TAU;
 
-use qcbus_opendrive::geometry::{Point, heading_difference};
-use qcbus_opendrive::{ContactPoint, Geometry, Road, RoadMap};
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
 use crate::families::on_road::MAX_PLACES;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const TURNS: Param = Param::number(
     "turns",

@@ -1,12 +1,9 @@
 use std::f64::consts::TAU;
 
-use qcbus_opendrive::geometry::{Curve, Placed};
-use qcbus_opendrive::{Geometry, LaneRef, Road, RoadMap, Side};
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::routes::is_route;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::geometry::Curve;
 
 const BACKWARDS: Param = Param::number(
     "backwards",

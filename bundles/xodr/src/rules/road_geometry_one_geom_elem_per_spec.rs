@@ -1,7 +1,4 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Rule, Sink};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_geometry_one_geom_elem_per_spec",

@@ -1,8 +1,5 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Level, Rule, Sink};
-
 use crate::families::curve_length::{self, LENGTH_TOLERANCE};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_geometry_parampoly3_length_match",

@@ -1,9 +1,5 @@
-use qcbus_opendrive::geometry::ParamPoly3;
-use qcbus_opendrive::{Geometry, Road, RoadMap};
-use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

@@ -1,9 +1,6 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Param, Rule, Sink};
-
 use crate::families::gap_levels::{GAP_BROKEN_FROM, GAP_ERROR_FROM};
 use crate::families::refline::report_gaps;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const GAP: Param = Param::number(
     "gap",

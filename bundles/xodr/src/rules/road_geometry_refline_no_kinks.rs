@@ -1,11 +1,7 @@
-use qcbus_opendrive::geometry::heading_difference;
-use qcbus_opendrive::{Geometry, Road, RoadMap};
-use qcbus_sdk::{Level, Param, Rule, Sink, Version};
-
 use crate::families::gap_levels::KINK_ERROR_FROM;
 use crate::families::on_road::OnRoad;
 use crate::families::refline::{joints, shape_name, standstill};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const KINK: Param = Param::number(
     "kink",

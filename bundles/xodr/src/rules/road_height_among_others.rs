@@ -1,8 +1,5 @@
-use qcbus_opendrive::{ContactPoint, Road, RoadMap};
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
 use crate::families::shown::number;
-use crate::model::Roads;
+use crate::prelude::*;
 
 const APART: Param = Param::number(
     "apart",

@@ -1,9 +1,5 @@
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Rule, Sink, Version};
-
 use crate::families::ascending;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_access_elem_asc_order",

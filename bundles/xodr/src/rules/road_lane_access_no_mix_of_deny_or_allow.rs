@@ -1,8 +1,6 @@
-use qcbus_opendrive::{LaneRecord, LaneRef, RoadMap};
-use qcbus_sdk::{Backport, Param, Place, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::LaneRecord;
 
 const SAME_PLACE: Param = Param::number(
     "same_place",

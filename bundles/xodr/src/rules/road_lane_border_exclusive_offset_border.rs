@@ -1,8 +1,5 @@
-use qcbus_opendrive::geometry::Cubic;
-use qcbus_opendrive::{Record, RoadMap, SectionRef};
-use qcbus_sdk::{Level, Rule, Sink};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::Record;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_border_exclusive_offset_border",

@@ -1,8 +1,5 @@
-use qcbus_opendrive::{RoadMap, Side};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::lane_numbers::word;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_border_exclusive_width_border",

@@ -1,9 +1,6 @@
-use qcbus_opendrive::geometry::Minimum;
-use qcbus_opendrive::{LaneRef, RoadMap, Side, Stretch};
-use qcbus_sdk::{Backport, Param, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::geometry::Minimum;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

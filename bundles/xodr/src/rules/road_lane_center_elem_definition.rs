@@ -1,8 +1,4 @@
-use qcbus_document::Node;
-use qcbus_opendrive::{LayerKind, Road, RoadMap, SectionRef};
-use qcbus_sdk::{Level, Rule, Sink, Version};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_center_elem_definition",

@@ -1,8 +1,5 @@
-use qcbus_opendrive::{RoadMap, Side};
-use qcbus_sdk::{Place, Rule, Sink};
-
 use crate::families::lane_numbers::{number, outward};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_lane_order_no_gaps",

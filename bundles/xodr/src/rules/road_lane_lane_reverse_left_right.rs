@@ -1,8 +1,5 @@
-use qcbus_opendrive::{LaneRef, RoadMap, Side};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 /// Types of lanes on which traffic runs in one direction.
 const DIRECTED: &[&str] = &[

@@ -1,11 +1,8 @@
 use std::collections::BTreeSet;
 
-use qcbus_opendrive::{Junction, LaneRef, Profile, RoadMap};
-use qcbus_sdk::{Backport, Level, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
 use crate::families::zero_stretches::zero_stretches;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_lane_section_drivable",

@@ -1,9 +1,6 @@
-use qcbus_opendrive::{RoadMap, SectionRef, Side};
-use qcbus_sdk::{Param, Place, Rule, Sink};
-
 use crate::families::lane_numbers::word;
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

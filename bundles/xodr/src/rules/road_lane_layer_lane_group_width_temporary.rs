@@ -1,10 +1,6 @@
-use qcbus_opendrive::geometry::Cubic;
-use qcbus_opendrive::{LayerKind, RoadMap, SectionRef, Side};
-use qcbus_sdk::{Param, Rule, Sink};
-
 use crate::families::edges::{Piece, border, combine, sum};
 use crate::families::on_road::OnRoad;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

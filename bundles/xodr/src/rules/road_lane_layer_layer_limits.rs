@@ -1,7 +1,4 @@
-use qcbus_opendrive::{LayerKind, RoadMap};
-use qcbus_sdk::{Rule, Sink};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_layer_layer_limits",

@@ -1,8 +1,5 @@
-use qcbus_opendrive::{LaneJoint, LaneRef, RoadMap, SectionRef, Side};
-use qcbus_sdk::{Backport, Level, Place, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_level_true_one_side",

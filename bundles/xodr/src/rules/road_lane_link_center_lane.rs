@@ -1,8 +1,5 @@
-use qcbus_opendrive::{ContactPoint, RoadMap};
-use qcbus_sdk::{Place, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_lane_link_center_lane",

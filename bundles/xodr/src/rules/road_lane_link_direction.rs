@@ -1,10 +1,7 @@
-use foldhash::HashSet;
-use qcbus_opendrive::{LaneJoint, LaneRef, RoadMap, Traffic, TrafficRule};
-use qcbus_sdk::{Param, Place, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::routes::is_route;
-use crate::model::Roads;
+use crate::prelude::*;
+use foldhash::HashSet;
 
 const FAR: Param = Param::number(
     "far",

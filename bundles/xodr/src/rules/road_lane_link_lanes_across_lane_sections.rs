@@ -1,11 +1,7 @@
-use qcbus_opendrive::{
-    ContactPoint, LaneJoint, LaneRef, LaneSpan, MapPart, RoadMap, SectionRef, Side, Station,
-};
-use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
-
 use crate::families::driving::is_drivable;
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::LaneSpan;
 
 const OVERLAP: Param = Param::number(
     "overlap",

@@ -1,12 +1,8 @@
 use std::collections::BTreeSet;
 
-use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{ContactPoint, LaneRef, Road, RoadMap, Side};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::driving::is_drivable;
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::Roads;
+use crate::prelude::*;
 
 const NEAR: Param = Param::number(
     "near",

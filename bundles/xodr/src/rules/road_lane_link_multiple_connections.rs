@@ -1,9 +1,6 @@
-use qcbus_opendrive::{ContactPoint, LaneRef, RoadMap};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::zero_stretches::NO_WIDTH;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_link_multiple_connections",

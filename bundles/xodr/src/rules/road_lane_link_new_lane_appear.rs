@@ -1,9 +1,6 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::zero_width::{ZERO_WIDTH, is_zero_at, opens};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_link_new_lane_appear",

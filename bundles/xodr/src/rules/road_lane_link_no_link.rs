@@ -1,10 +1,5 @@
-use qcbus_opendrive::{
-    ContactPoint, Junction, JunctionType, LaneLayer, LayerKind, Road, RoadEnd, RoadMap, SectionRef,
-    Side,
-};
-use qcbus_sdk::{Rule, Sink};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::LaneLayer;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_link_no_link",

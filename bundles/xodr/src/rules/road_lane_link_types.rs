@@ -1,10 +1,7 @@
-use foldhash::HashSet;
-use qcbus_opendrive::{LaneJoint, LaneRef, RoadMap};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::routes::{NARROW, is_route};
-use crate::model::Roads;
+use crate::prelude::*;
+use foldhash::HashSet;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_lane_link_types",

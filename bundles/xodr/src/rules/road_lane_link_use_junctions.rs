@@ -1,10 +1,7 @@
 use std::collections::BTreeMap;
 
-use qcbus_opendrive::{LaneEnd, LaneJoint, LaneRef, RoadMap};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_link_use_junctions",

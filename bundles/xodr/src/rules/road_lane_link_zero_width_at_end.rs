@@ -1,8 +1,5 @@
-use qcbus_opendrive::{ContactPoint, RoadMap};
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::zero_width::{self, ZERO_WIDTH};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_link_zero_width_at_end",

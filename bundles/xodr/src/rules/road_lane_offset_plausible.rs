@@ -1,9 +1,7 @@
-use qcbus_opendrive::{LaneLayer, Road, RoadMap, Stretch};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
 use crate::families::written_numbers::brief;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::LaneLayer;
 
 const MOST: Param = Param::number(
     "most",

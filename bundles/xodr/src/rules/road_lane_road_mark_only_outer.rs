@@ -1,8 +1,6 @@
-use qcbus_opendrive::{LaneRecord, LaneRef, RoadMap};
-use qcbus_sdk::{Backport, Level, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::LaneRecord;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_road_mark_only_outer",

@@ -1,11 +1,8 @@
 use std::collections::BTreeMap;
 
-use qcbus_opendrive::{LaneRef, RoadMap, SectionRef, Side};
-use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::zero_stretches::zero_stretches;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const LENGTH: Param = Param::number(
     "length",

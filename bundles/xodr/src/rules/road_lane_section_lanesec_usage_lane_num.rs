@@ -1,9 +1,6 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::zero_stretches::zero_stretches;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_section_lanesec_usage_lane_num",

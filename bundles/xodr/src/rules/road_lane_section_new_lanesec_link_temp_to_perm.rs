@@ -1,7 +1,4 @@
-use qcbus_opendrive::{ContactPoint, LayerKind, RoadMap, SectionRef, Side};
-use qcbus_sdk::{Param, Rule, Sink};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_section_new_lanesec_link_temp_to_perm",

@@ -1,8 +1,5 @@
-use qcbus_opendrive::{RoadMap, SectionRef, Side};
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
 use crate::families::shown::number;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_section_valid_length",

@@ -1,9 +1,5 @@
-use qcbus_document::Node;
-use qcbus_opendrive::{LaneRef, RoadMap};
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const MARK_WIDTH: Param =
     Param::number("mark_width", 1.0, "m", "largest plausible width of a line");

@@ -1,9 +1,6 @@
-use qcbus_opendrive::{LaneRef, RoadMap, Stretch};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::shown::beside;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

@@ -1,10 +1,7 @@
-use qcbus_opendrive::{LaneRef, RoadMap, Stretch};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::routes::is_route;
 use crate::families::written_numbers::brief;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const LEAST: Param = Param::number(
     "least",

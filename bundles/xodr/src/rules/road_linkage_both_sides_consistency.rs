@@ -1,11 +1,8 @@
 use std::collections::BTreeSet;
 
-use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadEnd, RoadLink, RoadMap};
-use qcbus_sdk::{Backport, Place, Rule, Sink};
-
 use crate::families::link_sides::{Known, agrees, in_virtual_junction};
 use crate::families::unlinked_arms::UnlinkedArms;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_linkage_both_sides_consistency",

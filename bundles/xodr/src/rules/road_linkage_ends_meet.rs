@@ -1,16 +1,13 @@
 use std::cell::OnceCell;
 
-use foldhash::{HashMap, HashSet};
-use qcbus_opendrive::{ContactPoint, JunctionType, Road, RoadContact, RoadEnd, RoadMap};
-use qcbus_sdk::{Param, Rule, Sink, Version};
-
 use crate::families::gap_levels::GAP_BROKEN_FROM;
 use crate::families::mouths;
 use crate::families::on_road::OnRoad;
 use crate::families::shown::beside;
 use crate::families::unlinked_arms::UnlinkedArms;
 use crate::families::virtual_links::leads_to_main_road;
-use crate::model::Roads;
+use crate::prelude::*;
+use foldhash::{HashMap, HashSet};
 
 const FAR: Param = Param::number(
     "far",

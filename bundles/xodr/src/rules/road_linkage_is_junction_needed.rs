@@ -1,12 +1,8 @@
 use std::collections::BTreeMap;
 
-use foldhash::HashSet;
-use qcbus_document::Node;
-use qcbus_opendrive::{ContactPoint, RoadEnd, RoadMap};
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::on_road::{MAX_PLACES, OnRoad};
-use crate::model::Roads;
+use crate::prelude::*;
+use foldhash::HashSet;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_linkage_is_junction_needed",

@@ -1,7 +1,4 @@
-use qcbus_opendrive::{ContactPoint, Junction, JunctionType, RoadLink, RoadMap};
-use qcbus_sdk::{Backport, Level, Rule, Sink, Version};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_linkage_junc_link_attribute_usage",

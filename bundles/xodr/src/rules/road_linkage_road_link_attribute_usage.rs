@@ -1,10 +1,7 @@
 use std::cell::OnceCell;
 
-use qcbus_opendrive::{ContactPoint, Road, RoadLink, RoadMap};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::virtual_links;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_linkage_road_link_attribute_usage",

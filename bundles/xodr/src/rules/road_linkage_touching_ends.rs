@@ -1,11 +1,8 @@
-use foldhash::HashMap;
-use qcbus_opendrive::geometry::heading_difference;
-use qcbus_opendrive::{ContactPoint, Frame, Road, RoadEnd, RoadMap};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
 use crate::families::routes::{NARROW, routes_at};
-use crate::model::Roads;
+use crate::prelude::*;
+use foldhash::HashMap;
+use qcbus_opendrive::Frame;
 
 const NEAR: Param = Param::number(
     "near",

@@ -1,8 +1,5 @@
-use qcbus_opendrive::{ContactPoint, JunctionType, Road, RoadLink, RoadMap};
-use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
-
 use crate::families::virtual_links;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_linkage_virtjunc_link_attribute_usage",

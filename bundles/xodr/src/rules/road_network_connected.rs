@@ -1,9 +1,6 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::network::{Parts, Piece};
 use crate::families::on_road::OnRoad;
-use crate::model::Roads;
+use crate::prelude::*;
 
 const SHARE: Param = Param::number(
     "share",

@@ -1,8 +1,5 @@
-use qcbus_opendrive::{LaneRef, RoadMap};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::routes::is_route;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_network_drivable",

@@ -1,11 +1,8 @@
 use std::collections::BTreeSet;
 
-use foldhash::HashSet;
-use qcbus_opendrive::{ContactPoint, Junction, JunctionType, Road, RoadEnd, RoadMap};
-use qcbus_sdk::{Param, Rule, Sink};
-
 use crate::families::overlap::{Limits, Overlap, Slice, overlaps, slices};
-use crate::model::Roads;
+use crate::prelude::*;
+use foldhash::HashSet;
 
 const AREA: Param = Param::number(
     "area",

@@ -1,10 +1,7 @@
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Level, Place, Rule, Sink};
+use std::collections::HashMap;
 
 use crate::families::object_parts::{Stands, below, owner};
-use crate::model::Roads;
-use std::collections::HashMap;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_borders_different_outlineids",

@@ -1,9 +1,5 @@
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Level, Place, Rule, Sink};
-
 use crate::families::object_parts::{self, Stands, listed, named, number, objects};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_circular_vs_angular",

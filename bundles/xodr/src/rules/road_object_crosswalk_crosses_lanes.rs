@@ -1,10 +1,7 @@
-use qcbus_opendrive::{CornerKind, Object, Road, RoadMap};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::object_parts::named;
 use crate::families::on_road::OnRoad;
 use crate::families::roadside::{beside, edges_at};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_object_crosswalk_crosses_lanes",

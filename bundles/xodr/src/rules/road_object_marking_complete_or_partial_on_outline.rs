@@ -1,10 +1,6 @@
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Place, Rule, Sink};
-
 use crate::families::corner_references::markings;
 use crate::families::object_parts::{Stands, corners, named, outlines};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_marking_complete_or_partial_on_outline",

@@ -1,9 +1,6 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Place, Rule, Sink};
-
 use crate::families::corner_references::markings;
 use crate::families::object_parts::{Stands, has_outline, is_blank, named};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_marking_no_outline_side_attr",

@@ -1,9 +1,6 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::corner_references::markings;
 use crate::families::object_parts::Stands;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_object_marking_include_points_between_corner_references",

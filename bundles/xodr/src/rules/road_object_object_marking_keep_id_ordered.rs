@@ -1,10 +1,6 @@
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::corner_references::{Path, markings};
 use crate::families::object_parts::Stands;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_object_marking_keep_id_ordered",

@@ -1,11 +1,8 @@
-use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{Corner, CornerKind, Object, Outline, Road, RoadMap};
-use qcbus_sdk::{Backport, Param, Rule, Sink};
-
 use crate::families::object_frame::ObjectFrame;
 use crate::families::on_road::OnRoad;
 use crate::families::polygons::{contains, distance_to_boundary};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::Corner;
 
 const TOUCH: Param = Param::number(
     "touch",

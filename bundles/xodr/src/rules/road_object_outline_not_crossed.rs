@@ -1,11 +1,7 @@
-use qcbus_document::Node;
-use qcbus_opendrive::geometry::Point;
-use qcbus_opendrive::{Corner, CornerKind, Object, Outline, Road, RoadMap};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::object_parts::named;
 use crate::families::on_road::OnRoad;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::Corner;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_object_outline_not_crossed",

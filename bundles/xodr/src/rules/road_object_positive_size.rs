@@ -1,11 +1,7 @@
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::object_parts::{
     Stands, has_outline, is_before, is_by_schema, named, number, objects,
 };
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_object_positive_size",

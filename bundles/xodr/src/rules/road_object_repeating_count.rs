@@ -1,9 +1,6 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
 use crate::families::object_parts::named;
 use crate::families::on_road::OnRoad;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_object_repeating_count",

@@ -1,8 +1,5 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::object_parts::{Stands, named, objects, outlines};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_repeating_outline_use_cornerlocal",

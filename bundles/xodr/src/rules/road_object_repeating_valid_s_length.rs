@@ -1,10 +1,6 @@
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink};
-
 use crate::families::object_parts::{is_before, is_by_schema, number, objects};
 use crate::families::shown;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_repeating_valid_s_length",

@@ -1,9 +1,5 @@
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
 use crate::families::object_parts::{Stands, below, named, number, objects};
-use crate::model::Roads;
+use crate::prelude::*;
 
 const SLENDER: Param = Param::number(
     "slender",

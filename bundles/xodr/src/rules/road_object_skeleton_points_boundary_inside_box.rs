@@ -1,8 +1,5 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::object_frame::{ObjectFrame, TOLERANCE, report_too_large};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_skeleton_points_boundary_inside_box",

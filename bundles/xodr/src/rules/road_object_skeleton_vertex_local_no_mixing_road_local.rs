@@ -1,9 +1,6 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Rule, Sink, Version};
-
 use crate::families::object_parts::{Stands, owner, polylines};
 use crate::families::vertices::Vertices;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_skeleton_vertex_local_no_mixing_road_local",

@@ -1,8 +1,5 @@
-use qcbus_opendrive::{Road, RoadMap};
-use qcbus_sdk::{Backport, Level, Place, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_surface_avoid_skewed_crg_surfacees",

@@ -1,8 +1,6 @@
-use qcbus_opendrive::{Crg, Object, Road, RoadMap};
-use qcbus_sdk::{Place, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::Crg;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_object_surface_crg_hidden_on_object_overlap",

@@ -1,13 +1,10 @@
 use std::collections::BTreeSet;
 
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Param, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
 use crate::families::polygons::sides;
 use crate::families::strips::{area, common};
 use crate::families::surface_boxes::{SurfaceBox, surface_boxes};
-use crate::model::Roads;
+use crate::prelude::*;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

@@ -1,13 +1,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
-use qcbus_document::Node;
-use qcbus_opendrive::{Object, Road, RoadMap, Station};
-use qcbus_sdk::{Param, Rule, Sink};
-
 use crate::families::on_road::{MAX_PLACES, OnRoad};
 use crate::families::strips::{Patch, area, common, strip, traffic_edges};
 use crate::families::surface_boxes::{SurfaceBox, surface_boxes};
-use crate::model::Roads;
+use crate::prelude::*;
 
 const AREA: Param = Param::number(
     "area",

@@ -1,7 +1,4 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Place, Rule, Sink};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_railroad_one_rail_per_road",

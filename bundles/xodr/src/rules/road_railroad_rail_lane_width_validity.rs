@@ -1,9 +1,6 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::rails::rail_lanes;
-use crate::model::Roads;
+use crate::prelude::*;
 
 const TRAM: Param = Param::number("tram", 2.2, "m", "smallest width of a lane for trams");
 const RAIL: Param = Param::number("rail", 2.6, "m", "smallest width of a lane for trains");

@@ -1,10 +1,7 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Param, Rule, Sink};
-
 use crate::families::edges::{Piece, border, combine, sum};
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::rails::rail_lanes;
-use crate::model::Roads;
+use crate::prelude::*;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

@@ -1,10 +1,9 @@
-use qcbus_opendrive::{Road, RoadMap, Switch};
-use qcbus_sdk::{Backport, Place, Rule, Sink};
+use std::collections::HashMap;
 
 use crate::families::object_parts::named;
 use crate::families::switches::by_id;
-use crate::model::Roads;
-use std::collections::HashMap;
+use crate::prelude::*;
+use qcbus_opendrive::Switch;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_railroad_switch_check_switch_conn",

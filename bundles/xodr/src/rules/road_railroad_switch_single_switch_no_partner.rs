@@ -1,9 +1,7 @@
-use qcbus_opendrive::{Road, RoadMap, Switch};
-use qcbus_sdk::{Backport, Place, Rule, Sink};
-
 use crate::families::object_parts::named;
 use crate::families::switches::by_id;
-use crate::model::Roads;
+use crate::prelude::*;
+use qcbus_opendrive::Switch;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_railroad_switch_single_switch_no_partner",

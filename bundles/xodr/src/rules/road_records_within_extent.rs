@@ -1,11 +1,7 @@
-use qcbus_document::Node;
-use qcbus_opendrive::{LaneRef, RoadMap, SectionRef};
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
 use crate::families::ascending;
 use crate::families::object_parts::{is_by_schema, named, number};
 use crate::families::shown;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_records_within_extent",

@@ -1,13 +1,9 @@
 use std::f64::consts::TAU;
 
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
 use crate::families::object_parts::{named, number};
 use crate::families::on_road::OnRoad;
 use crate::families::roadside::{place, things};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_roadside_angles_in_radians",

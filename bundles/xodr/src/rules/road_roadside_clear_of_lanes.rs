@@ -1,11 +1,7 @@
-use qcbus_document::Node;
-use qcbus_opendrive::{Road, RoadMap};
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
 use crate::families::object_parts::{has_outline, named, number};
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::roadside::{Row, Spot, lane_at, lanes_at, place, stands_itself, things};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_roadside_clear_of_lanes",

@@ -1,11 +1,7 @@
-use qcbus_document::Node;
-use qcbus_opendrive::{Road, RoadMap};
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
 use crate::families::object_parts::{named, number};
 use crate::families::on_road::OnRoad;
 use crate::families::roadside::{NearRoads, Row, beside, place, stands_itself, things};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_roadside_near_road",

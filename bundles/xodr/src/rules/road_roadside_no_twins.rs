@@ -1,12 +1,8 @@
-use foldhash::HashMap;
-use qcbus_document::Node;
-use qcbus_opendrive::{Road, RoadMap};
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
 use crate::families::object_parts::{named, number};
 use crate::families::on_road::OnRoad;
 use crate::families::roadside::{place, things};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use foldhash::HashMap;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_roadside_no_twins",

@@ -1,10 +1,6 @@
-use qcbus_document::Node;
-use qcbus_opendrive::{Road, RoadMap};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::ascending::TOLERANCE;
 use crate::families::shown::number;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_shape_elem_asc_order",

@@ -1,7 +1,5 @@
-use qcbus_opendrive::{RoadMap, ShapeRow, Station};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::ShapeRow;
 
 const STEP: Param = Param::number(
     "step",

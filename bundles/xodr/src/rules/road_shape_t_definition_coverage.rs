@@ -1,11 +1,8 @@
-use qcbus_opendrive::geometry::{Cubic, Minimum};
-use qcbus_opendrive::{LaneRef, Road, RoadMap, Side};
-use qcbus_sdk::{Level, Param, Place, Rule, Sink, Version};
-
 use crate::families::edges::border;
 use crate::families::on_road::OnRoad;
 use crate::families::shown::number;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::geometry::Minimum;
 
 const TOLERANCE: Param = Param::number(
     "tolerance",

@@ -1,9 +1,6 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Place, Rule, Sink};
-
 use crate::families::boards::{Carrier, carriers};
 use crate::families::object_parts::{Stands, named};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_signal_boards_static_board_use_correct_type",

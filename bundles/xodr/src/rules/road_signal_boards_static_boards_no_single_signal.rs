@@ -1,10 +1,6 @@
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Level, Rule, Sink};
-
 use crate::families::boards::carriers;
 use crate::families::object_parts::Stands;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_signal_boards_static_boards_no_single_signal",

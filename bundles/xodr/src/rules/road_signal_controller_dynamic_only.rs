@@ -1,9 +1,7 @@
-use foldhash::{HashMap, HashSet};
-use qcbus_opendrive::{RoadMap, SignalKey};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::object_parts::named;
-use crate::model::Roads;
+use crate::prelude::*;
+use foldhash::{HashMap, HashSet};
+use qcbus_opendrive::SignalKey;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_signal_controller_dynamic_only",

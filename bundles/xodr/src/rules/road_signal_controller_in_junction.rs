@@ -1,9 +1,6 @@
-use foldhash::HashSet;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::object_parts::named;
-use crate::model::Roads;
+use crate::prelude::*;
+use foldhash::HashSet;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_signal_controller_in_junction",

@@ -1,10 +1,9 @@
-use foldhash::{HashMap, HashSet};
-use qcbus_document::Node;
-use qcbus_opendrive::{Control, Controller, RoadMap, Signal};
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
 use crate::families::object_parts::{Stands, named};
-use crate::model::Roads;
+use crate::prelude::*;
+use foldhash::{HashMap, HashSet};
+use qcbus_opendrive::Control;
+use qcbus_opendrive::Controller;
+use qcbus_opendrive::Signal;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_signal_controller_one_per_light",

@@ -1,11 +1,9 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Rule, Sink};
+use std::collections::HashSet;
 
 use crate::families::ids::{Class, Kind};
 use crate::families::object_parts::named;
-use crate::model::Roads;
+use crate::prelude::*;
 use qcbus_opendrive::Control;
-use std::collections::HashSet;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_signal_controller_valid_for_signals",

@@ -1,11 +1,8 @@
 use std::collections::BTreeSet;
 
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Level, Rule, Sink};
-
 use crate::families::gantries::gantry_of;
 use crate::families::on_road::OnRoad;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_signal_gantry_vmsgroup_at_least_one_reference",

@@ -1,9 +1,5 @@
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::object_parts::{Stands, below, named};
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_signal_no_self_reference",

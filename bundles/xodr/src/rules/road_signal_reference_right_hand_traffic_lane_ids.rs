@@ -1,8 +1,5 @@
-use qcbus_opendrive::{RoadMap, TrafficRule};
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::lane_ranges;
-use crate::model::Roads;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_signal_reference_right_hand_traffic_lane_ids",

@@ -1,11 +1,8 @@
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Backport, Place, Rule, Sink};
+use std::collections::HashMap;
 
 use crate::families::ids::{Class, Kind};
 use crate::families::object_parts::{Stands, below};
-use crate::model::Roads;
-use std::collections::HashMap;
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_signal_reference_used_for_signals_only",

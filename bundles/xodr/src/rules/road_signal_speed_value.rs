@@ -1,12 +1,8 @@
-use foldhash::HashSet;
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
 use crate::families::object_parts::{
     Stands, below, is_before, is_blank, named, number, stands_below,
 };
-use crate::model::Roads;
+use crate::prelude::*;
+use foldhash::HashSet;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_signal_speed_value",

@@ -1,9 +1,5 @@
-use qcbus_document::Node;
-use qcbus_opendrive::RoadMap;
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::object_parts::{Stands, below, is_blank, named, owner};
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_signal_use_country_code",

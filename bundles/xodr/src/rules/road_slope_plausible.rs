@@ -1,9 +1,6 @@
-use qcbus_opendrive::{Profile, Road, RoadMap, Stretch};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::on_road::OnRoad;
 use crate::families::written_numbers::brief;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
 
 const SLOPE: Param = Param::number(
     "slope",

@@ -1,10 +1,7 @@
-use qcbus_document::Node;
-use qcbus_opendrive::{Road, RoadMap, RoadType};
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::routes::is_route;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::RoadType;
 
 const SLOW: Param = Param::number(
     "slow",

@@ -1,10 +1,7 @@
-use qcbus_document::Node;
-use qcbus_opendrive::{LayerKind, Road, RoadMap, Validity};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::object_parts::{named, number, owner};
 use crate::families::on_road::OnRoad;
-use crate::model::{Part, Roads};
+use crate::prelude::*;
+use qcbus_opendrive::Validity;
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_qcbus_xodr_road_validity_lanes_exist",

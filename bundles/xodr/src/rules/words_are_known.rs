@@ -1,10 +1,7 @@
-use qcbus_document::{Document, Node};
-use qcbus_opendrive::is_user_data;
-use qcbus_sdk::{Rule, Sink, Version};
-
 use crate::families::object_parts::listed;
 use crate::families::own_schema::OwnSchema;
 use crate::families::vocabularies::{VOCABULARIES, Vocabulary};
+use crate::prelude::*;
 
 pub static RULE: Rule<Document> = Rule {
     id: "check_qcbus_xodr_words_are_known",

@@ -1,5 +1,4 @@
-use qcbus_document::Document;
-use qcbus_sdk::{Rule, Sink, basic};
+use crate::prelude::*;
 
 pub static RULE: Rule<Document> = Rule {
     id: "check_asam_xodr_xml_version_is_defined",

@@ -1,6 +1,6 @@
 //! Entities that an action moves, and their speeds and domains.
 
-use qcbus_openscenario::{Actors, Element, Entity};
+use crate::prelude::*;
 
 /// Returns the scenario objects that an action moves, including members of selections. Returns
 /// `None` if not all of them are known.

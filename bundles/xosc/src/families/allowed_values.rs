@@ -1,8 +1,7 @@
 //! Values that the constraint groups of a declaration allow.
 
-use qcbus_openscenario::{DataType, Element, Value};
-
 use super::constraints::{self, Constraint, Operand};
+use crate::prelude::*;
 
 /// Returns the constraints of a `ParameterDeclaration` if a value violates them. Returns `None` if
 /// the value is allowed, or if this is unknown. A value must meet every constraint of at least one

@@ -2,8 +2,8 @@
 
 use std::rc::Rc;
 
+use crate::prelude::*;
 use foldhash::HashMap;
-use qcbus_openscenario::{Actors, Element};
 
 /// The actors of a `ManeuverGroup` or `Private` by name, with the elements that name them.
 pub(crate) struct Cast<'m, 'd> {

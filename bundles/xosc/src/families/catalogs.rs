@@ -2,11 +2,10 @@
 
 use std::borrow::Cow;
 
+use crate::prelude::*;
 use foldhash::HashMap;
-use qcbus_document::Node;
 use qcbus_messages::{Absence, DocumentRole, MissingDocument};
-use qcbus_openscenario::{CatalogKind, Element, Form, Resolution, Scenario};
-use qcbus_sdk::{Level, Subject};
+use qcbus_sdk::Subject;
 
 /// Fault of the directory of one kind of catalogs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

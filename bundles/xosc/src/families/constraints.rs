@@ -2,9 +2,9 @@
 
 use std::borrow::Cow;
 
-use qcbus_openscenario::{DataType, DateTime, Element, Value};
-
 use super::values;
+use crate::prelude::*;
+use qcbus_openscenario::DateTime;
 
 /// Comparison of two values: the words of `rule`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,12 +3,9 @@
 
 use std::borrow::Cow;
 
-use foldhash::{HashMap, HashMapExt as _, HashSet};
-use qcbus_openscenario::{DataType, Element, Scenario};
-use qcbus_sdk::{Level, Sink};
-
 use super::references::{self, Dangling};
-use crate::model::About as _;
+use crate::prelude::*;
+use foldhash::{HashMap, HashMapExt as _, HashSet};
 
 /// A kind of declaration and the elements that refer to it.
 pub(crate) struct Declarable {

@@ -1,10 +1,9 @@
 //! Demands of several conditions on the same quantity.
 
-use qcbus_openscenario::Element;
-
 use crate::families::actions::stated;
 use crate::families::references::quoted;
 use crate::families::triggers::canonical_but;
+use crate::prelude::*;
 
 /// One end of a range.
 #[derive(Clone)]

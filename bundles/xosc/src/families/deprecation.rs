@@ -1,7 +1,7 @@
 //! Deprecated parts of the standard, which later versions keep only for older files.
 
-use qcbus_openscenario::{Element, Scenario, Version};
-use qcbus_sdk::{Place, Sink};
+use crate::prelude::*;
+use qcbus_openscenario::Version;
 
 /// Deprecated part of an element.
 #[derive(Clone, Copy)]

@@ -1,8 +1,10 @@
 //! Distributions of parameter values, and their target scenario.
 
+use crate::prelude::*;
 use qcbus_document::FileKind;
 use qcbus_messages::DocumentRole;
-use qcbus_openscenario::{DataType, Declaration, Element, Form, Inputs, LinkedMap, Scenario};
+use qcbus_openscenario::Inputs;
+use qcbus_openscenario::LinkedMap;
 use qcbus_sdk::Subject;
 
 /// Elements that give values to a parameter, and the attribute with the parameter's name.

@@ -1,10 +1,7 @@
 //! Numbers that must be neither infinite nor `NaN`. The schema accepts both as doubles.
 
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::Sink;
-
 use crate::families::references::quoted;
-use crate::model::About as _;
+use crate::prelude::*;
 
 /// Elements with the attributes that must be finite numbers.
 pub(crate) type Numbers = [(&'static str, &'static [&'static str])];

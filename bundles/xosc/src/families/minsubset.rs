@@ -1,8 +1,7 @@
 //! The minimum subset of the standard for the exchange between any two tools. Each rule states
 //! which part of it is allowed. These rules run only on request.
 
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Place, Sink};
+use crate::prelude::*;
 
 /// Reports every element of these names, because the subset has none of them. `instead` is the
 /// alternative.

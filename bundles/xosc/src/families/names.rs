@@ -3,9 +3,7 @@
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-use qcbus_document::{Document, Node};
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Place, Sink};
+use crate::prelude::*;
 
 /// Reports children of one element with the same `name`, of any kind.
 ///

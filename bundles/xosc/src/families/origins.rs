@@ -2,13 +2,13 @@
 
 use std::cell::RefCell;
 
-use foldhash::{HashMap, HashMapExt as _};
-use qcbus_opendrive::{Road, RoadMap, Side, TrafficRule};
-use qcbus_openscenario::{Element, LaneAt, RoadNetwork, Scenario};
-
 use crate::families::placement::{self, Start};
 use crate::families::positions::{AT_END, find_lane, lane_of, road_of, section_of, station};
 use crate::families::relative;
+use crate::prelude::*;
+use foldhash::{HashMap, HashMapExt as _};
+use qcbus_opendrive::TrafficRule;
+use qcbus_openscenario::RoadNetwork;
 
 /// Position in the world, and on the road if the road is known.
 #[derive(Debug, Clone, Copy)]

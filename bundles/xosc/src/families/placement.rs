@@ -1,7 +1,7 @@
 //! Start of entities: the elements that place them, and their order.
 
+use crate::prelude::*;
 use foldhash::HashSet;
-use qcbus_openscenario::{Actors, Element, Scenario};
 
 /// A `TeleportAction` of `Init` for one entity.
 pub(crate) struct Start<'m, 'd> {

@@ -2,8 +2,10 @@
 
 use std::borrow::Cow;
 
-use qcbus_opendrive::{LaneRef, Road, RoadMap, SectionRef, Side, Station};
-use qcbus_openscenario::{Actors, Element, Entity, LaneAt};
+use crate::prelude::*;
+use qcbus_opendrive::LaneRef;
+use qcbus_opendrive::SectionRef;
+use qcbus_opendrive::Station;
 
 /// Positions that name a road.
 pub(crate) const ON_ROAD: &[&str] = &["LanePosition", "RoadPosition"];

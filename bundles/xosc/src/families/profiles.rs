@@ -1,7 +1,6 @@
 //! Features that a simulator does not support. These rules run only on request.
 
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Place, Sink};
+use crate::prelude::*;
 
 /// Reaction of a simulator to a feature that it does not support.
 #[derive(Clone, Copy)]

@@ -1,11 +1,8 @@
 //! References by name: their targets, and the messages for unresolved names.
 
-use foldhash::HashSet;
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::Sink;
-
 use super::positions::{listed, sorted};
-use crate::model::About;
+use crate::prelude::*;
+use foldhash::HashSet;
 
 /// Attributes that name one entity, by the standard's table of entity type constraints.
 pub(crate) const SINGLE_ENTITY: &[(&str, &str)] = &[

@@ -1,11 +1,11 @@
 //! Positions relative to another on the same road: the lane, the station, and the remaining length
 //! of road.
 
-use foldhash::{HashMap, HashMapExt as _};
-use qcbus_opendrive::{ContactPoint, Road, RoadEnd, RoadMap};
-use qcbus_openscenario::Element;
-
 use crate::families::origins::OnRoad;
+use crate::prelude::*;
+use foldhash::{HashMap, HashMapExt as _};
+use qcbus_opendrive::ContactPoint;
+use qcbus_opendrive::RoadEnd;
 
 /// Returns the lanes that a `RelativeLanePosition` may mean. Tools disagree on whether the center
 /// lane counts. Against the road they also disagree on which side is left.

@@ -1,6 +1,6 @@
 //! Elements that need a road network.
 
-use qcbus_openscenario::{Element, Scenario};
+use crate::prelude::*;
 
 /// Elements that depend on roads, lanes or the map's datum.
 pub(crate) const ON_ROADS: &[&str] = &[

@@ -1,9 +1,8 @@
 //! Routes and their waypoints.
 
-use qcbus_opendrive::RoadMap;
-use qcbus_openscenario::{Element, EntityKind, Scenario, Stop};
-
 use crate::families::positions::{lane_of, moved, road_of, station};
+use crate::prelude::*;
+use qcbus_openscenario::Stop;
 
 /// Returns the waypoints of a route and the positions in their `Position`.
 pub(crate) fn waypoints<'m, 'd>(

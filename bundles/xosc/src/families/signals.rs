@@ -2,14 +2,10 @@
 
 use std::borrow::Cow;
 
-use foldhash::{HashMap, HashMapExt as _, HashSet};
-use qcbus_opendrive::RoadMap;
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::Sink;
-
 use crate::families::positions::listed;
 use crate::families::references::{self, quoted};
-use crate::model::About as _;
+use crate::prelude::*;
+use foldhash::{HashMap, HashMapExt as _, HashSet};
 
 /// Reports elements of a name that refer to signals that the map does not have.
 pub(crate) fn missing_signals(

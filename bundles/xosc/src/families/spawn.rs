@@ -2,12 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use foldhash::{HashMap, HashSet};
-use qcbus_opendrive::RoadMap;
-use qcbus_openscenario::{Element, EntityKind, Scenario};
-
 use crate::families::origins::{Origins, or};
 use crate::families::placement::{self, Start};
+use crate::prelude::*;
+use foldhash::{HashMap, HashSet};
 
 /// A vehicle or pedestrian at the last place that `Init` gives it.
 pub(crate) struct Body<'m, 'd> {

@@ -2,10 +2,11 @@
 
 use std::borrow::Cow;
 
-use foldhash::{HashMap, HashMapExt as _};
-use qcbus_openscenario::{Element, Scenario, StoryElement, StoryKind};
-
 use crate::families::triggers::groups;
+use crate::prelude::*;
+use foldhash::{HashMap, HashMapExt as _};
+use qcbus_openscenario::StoryElement;
+use qcbus_openscenario::StoryKind;
 
 /// A condition of a start trigger about the state of one known element.
 pub(crate) struct StateCondition<'m, 'd> {

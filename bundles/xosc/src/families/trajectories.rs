@@ -1,8 +1,7 @@
 //! Trajectories: the entities that follow them, and their times and places.
 
-use qcbus_openscenario::Element;
-
 use crate::families::positions::Spot;
+use crate::prelude::*;
 
 /// Whether the follower of a trajectory uses its times.
 #[derive(Debug, Clone, Copy)]

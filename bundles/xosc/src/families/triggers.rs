@@ -4,12 +4,10 @@ use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::hash::BuildHasher as _;
 
+use crate::prelude::*;
 use foldhash::HashMap;
-use qcbus_document::Attribute;
-use qcbus_openscenario::{Element, Reading, Scenario, parse_double};
-use qcbus_sdk::Sink;
-
-use crate::model::About;
+use qcbus_openscenario::Reading;
+use qcbus_openscenario::parse_double;
 
 /// Reports the elements of a name that matter and have a `StartTrigger` without any condition.
 pub(crate) fn empty_starts<'d>(

@@ -1,15 +1,11 @@
 //! Reports of value faults: values that cannot be resolved as written. The model lists them once,
 //! and each rule reports its kinds.
 
+use crate::prelude::*;
 use foldhash::{HashMap, HashMapExt as _};
-use qcbus_document::Attribute;
-use qcbus_openscenario::{
-    DataType, Declaration, Declared, Element, Form, Reading, Scenario, Value, ValueFault,
-    ValueFaultKind,
-};
-use qcbus_sdk::{Finding, Sink};
-
-use crate::model::About as _;
+use qcbus_openscenario::Reading;
+use qcbus_openscenario::ValueFault;
+use qcbus_sdk::Finding;
 
 /// Reports every fault of these kinds.
 pub(crate) fn report(scenario: &Scenario<'_>, kinds: &[ValueFaultKind], found: &mut Sink<'_>) {

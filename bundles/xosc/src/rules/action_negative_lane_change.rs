@@ -1,8 +1,5 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::actions::{short, stated};
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_action_negative_lane_change",

@@ -1,10 +1,6 @@
-use foldhash::HashMap;
-use qcbus_document::Node;
-use qcbus_openscenario::{Resolution, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::catalogs::{self, Once};
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use foldhash::HashMap;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_catalogs_duplicate_across_files",

@@ -1,11 +1,7 @@
-use foldhash::{HashMap, HashSet};
-use qcbus_document::Node;
-use qcbus_openscenario::{Element, Resolution, Scenario};
-use qcbus_schema_rule::{Breach, Weight, breaches};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::catalogs;
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use foldhash::{HashMap, HashSet};
+use qcbus_schema_rule::{Breach, Weight, breaches};
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_catalogs_entry_schema",

@@ -1,9 +1,5 @@
-use qcbus_document::Document;
+use crate::prelude::*;
 use qcbus_messages::DocumentRole;
-use qcbus_openscenario::{Form, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
-use crate::model::Scene;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_catalogs_file_valid",

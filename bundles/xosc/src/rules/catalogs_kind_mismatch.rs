@@ -1,8 +1,5 @@
-use qcbus_openscenario::{Resolution, Scenario};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::catalogs;
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_catalogs_kind_mismatch",

@@ -1,9 +1,6 @@
-use qcbus_openscenario::{CatalogKind, Scenario};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::catalogs;
 use crate::families::references::quoted;
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_catalogs_path_escape",

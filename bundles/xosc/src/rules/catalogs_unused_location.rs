@@ -1,8 +1,5 @@
-use qcbus_openscenario::{CatalogKind, Form, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::catalogs;
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_catalogs_unused_location",

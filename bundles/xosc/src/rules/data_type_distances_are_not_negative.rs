@@ -1,9 +1,6 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::ranges;
 use crate::families::ranges::tables::DISTANCES;
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_data_type_distances_are_not_negative",

@@ -1,9 +1,6 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::ranges;
 use crate::families::ranges::tables::TRANSITIONS;
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_data_type_non_negative_transition_time_in_light_state_action",

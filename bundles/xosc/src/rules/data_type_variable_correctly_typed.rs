@@ -1,9 +1,6 @@
-use qcbus_openscenario::{Scenario, ValueFaultKind};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::declared;
 use crate::families::values;
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_data_type_variable_correctly_typed",

@@ -1,7 +1,4 @@
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_deprecated_old_and_new_together",

@@ -1,8 +1,6 @@
-use qcbus_openscenario::{Dialect, Scenario, ValueFaultKind};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::values;
-use crate::model::Scene;
+use crate::prelude::*;
+use qcbus_openscenario::Dialect;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_dialect_ros_substitution",

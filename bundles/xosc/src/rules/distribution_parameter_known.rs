@@ -1,9 +1,6 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::distributions::{self, SOURCES};
 use crate::families::references::hint;
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_distribution_parameter_known",

@@ -1,9 +1,6 @@
-use qcbus_messages::DocumentRole;
-use qcbus_openscenario::{Form, Scenario};
-use qcbus_sdk::{Place, Rule, Sink};
-
 use crate::families::catalogs;
-use crate::model::Scene;
+use crate::prelude::*;
+use qcbus_messages::DocumentRole;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_distribution_scenario_file",

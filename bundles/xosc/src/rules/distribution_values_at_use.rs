@@ -1,12 +1,9 @@
-use foldhash::{HashMap, HashSet};
-use qcbus_document::Attribute;
-use qcbus_openscenario::{Declared, Element, Inputs, Scenario, Value, ValueFaultKind};
-use qcbus_sdk::{Place, Rule, Sink};
-
 use crate::families::distributions;
 use crate::families::references::{entity_references, hint};
 use crate::families::{allowed_values, ranges, values};
-use crate::model::Scene;
+use crate::prelude::*;
+use foldhash::{HashMap, HashSet};
+use qcbus_openscenario::Inputs;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_distribution_values_at_use",

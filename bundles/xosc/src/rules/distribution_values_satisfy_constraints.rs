@@ -1,9 +1,6 @@
-use qcbus_openscenario::{DataType, Declaration, Element, Scenario, Value};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::distributions::{self, SOURCES};
 use crate::families::{allowed_values, references::quoted};
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_distribution_values_satisfy_constraints",

@@ -1,7 +1,4 @@
-use qcbus_openscenario::{Form, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_entities_none",

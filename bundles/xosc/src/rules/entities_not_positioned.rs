@@ -1,10 +1,7 @@
 use std::cell::LazyCell;
 
-use qcbus_openscenario::{EntityKind, Form, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::{placement, references};
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_entities_not_positioned",

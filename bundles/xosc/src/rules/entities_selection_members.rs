@@ -1,8 +1,6 @@
+use crate::prelude::*;
 use foldhash::HashSet;
-use qcbus_openscenario::{EntityKind, Scenario, Selection};
-use qcbus_sdk::{Level, Rule, Sink};
-
-use crate::model::{About, Scene};
+use qcbus_openscenario::Selection;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_entities_selection_members",

@@ -1,9 +1,6 @@
-use foldhash::{HashMap, HashSet};
-use qcbus_openscenario::{Actors, Element, Entity, EntityKind, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::references::quoted;
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use foldhash::{HashMap, HashSet};
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_entities_trailer_reference",

@@ -1,12 +1,9 @@
 use std::borrow::Cow;
 use std::cell::LazyCell;
 
-use foldhash::HashSet;
-use qcbus_openscenario::{EntityKind, Form, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::references;
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use foldhash::HashSet;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_entities_unused",

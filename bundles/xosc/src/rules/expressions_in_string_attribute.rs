@@ -1,8 +1,6 @@
-use qcbus_openscenario::{Scenario, ValueFaultKind, expr};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::values;
-use crate::model::Scene;
+use crate::prelude::*;
+use qcbus_openscenario::expr;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_expressions_in_string_attribute",

@@ -1,7 +1,4 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_expressions_suspicious_units",

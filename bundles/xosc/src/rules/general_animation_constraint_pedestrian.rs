@@ -1,8 +1,5 @@
-use qcbus_openscenario::{EntityKind, Scenario};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::actions::acting;
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_general_animation_constraint_pedestrian",

@@ -1,10 +1,7 @@
-use foldhash::HashMap;
-use qcbus_openscenario::{Element, Entity, EntityKind, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::casts::{Cast, Casts};
 use crate::families::references::quoted;
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use foldhash::HashMap;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_general_references_to_scenario_object",

@@ -1,7 +1,5 @@
-use qcbus_openscenario::{DateTime, Scenario};
-use qcbus_sdk::{Level, Param, Place, Rule, Sink};
-
-use crate::model::Scene;
+use crate::prelude::*;
+use qcbus_openscenario::DateTime;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_header_date_plausible",

@@ -1,7 +1,4 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_header_metadata_filled",

@@ -1,8 +1,5 @@
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::minsubset;
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_minsubset_follow_trajectory_action_constraints",

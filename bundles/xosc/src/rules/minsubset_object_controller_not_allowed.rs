@@ -1,8 +1,5 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::minsubset;
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_minsubset_object_controller_not_allowed",

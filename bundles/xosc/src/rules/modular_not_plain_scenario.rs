@@ -1,9 +1,6 @@
+use crate::prelude::*;
 use qcbus_document::FileKind;
 use qcbus_messages::DocumentRole;
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Level, Rule, Sink};
-
-use crate::model::Scene;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_modular_not_plain_scenario",

@@ -1,9 +1,6 @@
-use foldhash::{HashSet, HashSetExt as _};
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::declared;
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use foldhash::{HashSet, HashSetExt as _};
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_monitors_no_change",

@@ -1,9 +1,5 @@
+use crate::prelude::*;
 use foldhash::HashMap;
-use qcbus_document::Node;
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
-use crate::model::Scene;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_naming_duplicate_property",

@@ -1,9 +1,7 @@
-use qcbus_openscenario::{Element, Scenario, StoryKind};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::names;
 use crate::families::references::quoted;
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use qcbus_openscenario::StoryKind;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_naming_empty_name",

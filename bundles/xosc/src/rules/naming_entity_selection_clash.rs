@@ -1,9 +1,6 @@
-use foldhash::HashMap;
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::references::quoted;
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use foldhash::HashMap;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_naming_entity_selection_clash",

@@ -1,9 +1,6 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::names;
 use crate::families::references::quoted;
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_naming_no_double_colon_prefix_in_names",

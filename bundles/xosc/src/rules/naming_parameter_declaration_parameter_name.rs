@@ -1,7 +1,5 @@
-use qcbus_openscenario::{Scenario, is_identifier};
-use qcbus_sdk::{Backport, Level, Rule, Sink};
-
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use qcbus_openscenario::is_identifier;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_naming_parameter_declaration_parameter_name",

@@ -1,8 +1,5 @@
+use crate::prelude::*;
 use foldhash::{HashMap, HashSet};
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
-use crate::model::Scene;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_parameters_assignment_duplicate",

@@ -1,10 +1,7 @@
-use qcbus_openscenario::{Declaration, Declared, Element, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::constraints;
 use crate::families::declared;
 use crate::families::values;
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_parameters_condition_constant",

@@ -1,9 +1,6 @@
-use qcbus_openscenario::{Element, Form, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::declared;
 use crate::families::references;
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_parameters_condition_reference",

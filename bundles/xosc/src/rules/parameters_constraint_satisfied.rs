@@ -1,8 +1,5 @@
-use qcbus_openscenario::{Declaration, Declared, Element, Scenario};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::constraints;
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_parameters_constraint_satisfied",

@@ -1,8 +1,5 @@
-use qcbus_openscenario::{Form, Scenario, ValueFaultKind};
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::values;
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_parameters_parameter_declaration_parameter_scope",

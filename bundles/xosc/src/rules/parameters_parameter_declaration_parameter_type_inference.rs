@@ -1,9 +1,7 @@
-use qcbus_openscenario::{DataType, Scenario, ValueFault, ValueFaultKind};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::declared;
 use crate::families::values;
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use qcbus_openscenario::ValueFault;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_parameters_parameter_declaration_parameter_type_inference",

@@ -1,9 +1,5 @@
-use qcbus_document::Attribute;
-use qcbus_openscenario::{DataType, Element, Scenario, ValueFaultKind};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::values;
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_parameters_partial_substitution",

@@ -1,9 +1,7 @@
-use foldhash::{HashSet, HashSetExt as _};
-use qcbus_openscenario::{Form, Scenario, ValueFaultKind, identifier};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::declared;
-use crate::model::Scene;
+use crate::prelude::*;
+use foldhash::{HashSet, HashSetExt as _};
+use qcbus_openscenario::identifier;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_parameters_unused",

@@ -1,10 +1,7 @@
-use foldhash::{HashMap, HashMapExt as _, HashSet};
-use qcbus_document::{Attribute, Node};
-use qcbus_openscenario::{DataType, Declared, Element, Form, Scenario, ValueFaultKind, identifier};
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::{catalogs, values};
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
+use foldhash::{HashMap, HashMapExt as _, HashSet};
+use qcbus_openscenario::identifier;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_parameters_valid_parameter_declaration_in_catalogs",

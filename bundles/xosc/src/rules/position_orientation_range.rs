@@ -1,9 +1,6 @@
-use foldhash::{HashSet, HashSetExt as _};
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::positions::shown;
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
+use foldhash::{HashSet, HashSetExt as _};
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_position_orientation_range",

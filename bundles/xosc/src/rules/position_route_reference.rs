@@ -1,15 +1,12 @@
 use std::cell::OnceCell;
 
-use qcbus_opendrive::{Road, RoadMap, Side, TrafficRule};
-use qcbus_openscenario::{Element, LaneAt, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::positions::{
     find_lane, lane_id, lane_of, metres, road_of, section_of, shown, station,
 };
 use crate::families::relative::Reach;
 use crate::families::routes::waypoints;
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
+use qcbus_opendrive::TrafficRule;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_position_route_reference",

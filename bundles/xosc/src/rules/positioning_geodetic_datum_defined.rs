@@ -1,8 +1,4 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Rule, Sink};
-
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_positioning_geodetic_datum_defined",

@@ -1,12 +1,9 @@
-use foldhash::HashSet;
-use qcbus_opendrive::{LaneRef, Road, RoadMap, Side};
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::origins::{OnRoad, Origins};
 use crate::families::positions::{ON_ROAD, lane_of, metres, road_of, section_of, shown, station};
 use crate::families::relative::{self, Reach};
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
+use foldhash::HashSet;
+use qcbus_opendrive::LaneRef;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_positioning_road_lane_offset_in_bounds",

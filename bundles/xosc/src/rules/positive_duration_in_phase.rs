@@ -1,9 +1,6 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::ranges;
 use crate::families::ranges::tables::PHASES;
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_positive_duration_in_phase",

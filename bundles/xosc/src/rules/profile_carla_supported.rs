@@ -1,9 +1,6 @@
-use qcbus_openscenario::{Form, Scenario};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::profiles::Fate::{Ignores, Stops};
 use crate::families::profiles::{self, Gap, gap};
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_profile_carla_supported",

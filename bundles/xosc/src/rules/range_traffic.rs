@@ -1,9 +1,6 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::ranges::tables::TRAFFIC;
 use crate::families::ranges::{self, RESOLVED};
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_range_traffic",

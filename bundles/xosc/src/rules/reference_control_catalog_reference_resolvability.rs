@@ -1,10 +1,6 @@
-use qcbus_document::Node;
-use qcbus_openscenario::{CatalogKind, Element, Resolution, Scenario};
-use qcbus_sdk::{Backport, Level, Rule, Sink};
-
 use crate::families::catalogs::{self, Fault, Once};
 use crate::families::references::{hint_or_all, quoted};
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_reference_control_catalog_reference_resolvability",

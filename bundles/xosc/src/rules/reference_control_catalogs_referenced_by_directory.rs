@@ -1,8 +1,5 @@
-use qcbus_openscenario::{CatalogKind, Resolution, Scenario};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::catalogs::{self, Fault};
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_reference_control_catalogs_referenced_by_directory",

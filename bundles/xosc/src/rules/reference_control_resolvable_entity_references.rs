@@ -1,8 +1,5 @@
-use qcbus_openscenario::{Form, Scenario};
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::references;
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_reference_control_resolvable_entity_references",

@@ -1,9 +1,8 @@
-use foldhash::{HashMap, HashMapExt as _};
-use qcbus_openscenario::{Element, Form, Scenario, StoryElement, StoryKind};
-use qcbus_sdk::{Backport, Level, Rule, Sink};
-
 use crate::families::references::{hint, quoted};
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use foldhash::{HashMap, HashMapExt as _};
+use qcbus_openscenario::StoryElement;
+use qcbus_openscenario::StoryKind;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_reference_control_resolvable_storyboard_element_reference",

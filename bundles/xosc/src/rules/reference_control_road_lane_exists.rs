@@ -1,16 +1,14 @@
 use std::cell::LazyCell;
 
-use foldhash::HashSet;
-use qcbus_opendrive::{Road, RoadMap, SectionRef};
-use qcbus_openscenario::{Element, LaneAt, Network, RoadNetwork, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::origins::{self, Origins};
 use crate::families::positions::{self, ON_ROAD, find_lane, lane_id, listed, metres, sorted};
 use crate::families::references::quoted;
 use crate::families::relative;
 use crate::families::values::short;
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
+use foldhash::HashSet;
+use qcbus_opendrive::SectionRef;
+use qcbus_openscenario::RoadNetwork;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_reference_control_road_lane_exists",

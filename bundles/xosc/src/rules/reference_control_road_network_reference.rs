@@ -1,8 +1,5 @@
-use qcbus_openscenario::{Form, Network, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::road_network::{ON_ROADS, ON_SIGNALS, used};
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_reference_control_road_network_reference",

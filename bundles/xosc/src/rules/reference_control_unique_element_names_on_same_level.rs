@@ -1,7 +1,5 @@
-use qcbus_document::Document;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::names;
+use crate::prelude::*;
 
 pub static RULE: Rule<Document> = Rule {
     id: "check_asam_xosc_reference_control_unique_element_names_on_same_level",

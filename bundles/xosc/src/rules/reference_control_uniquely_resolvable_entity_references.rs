@@ -1,9 +1,5 @@
+use crate::prelude::*;
 use foldhash::HashMap;
-use qcbus_document::Node;
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Backport, Level, Rule, Sink};
-
-use crate::model::Scene;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_reference_control_uniquely_resolvable_entity_references",

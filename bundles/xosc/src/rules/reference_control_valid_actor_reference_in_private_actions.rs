@@ -1,8 +1,5 @@
-use qcbus_openscenario::{Actors, Element, Scenario};
-use qcbus_sdk::{Backport, Rule, Sink};
-
 use crate::families::triggers::called;
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_reference_control_valid_actor_reference_in_private_actions",

@@ -1,10 +1,7 @@
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::casts::Casts;
 use crate::families::placement;
 use crate::families::references::quoted;
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_references_self_reference",

@@ -1,9 +1,6 @@
-use foldhash::HashSet;
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::references;
-use crate::model::Scene;
+use crate::prelude::*;
+use foldhash::HashSet;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_references_traffic_name",

@@ -1,11 +1,8 @@
-use foldhash::HashSet;
-use qcbus_opendrive::{LaneRef, RoadMap};
-use qcbus_openscenario::{Element, Entity, EntityKind, LaneAt, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::origins::Origins;
 use crate::families::positions::{find_lane, lane_of, metres, moved, owner, road_of};
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
+use foldhash::HashSet;
+use qcbus_opendrive::LaneRef;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_road_lane_type_drivable",

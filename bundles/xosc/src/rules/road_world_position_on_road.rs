@@ -1,10 +1,8 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_openscenario::{EntityKind, RoadNetwork, RoadsNearby, Scenario};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::origins::Origins;
 use crate::families::positions::{metres, moved, owner};
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
+use qcbus_openscenario::RoadNetwork;
+use qcbus_openscenario::RoadsNearby;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_road_world_position_on_road",

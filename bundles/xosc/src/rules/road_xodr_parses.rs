@@ -1,8 +1,5 @@
+use crate::prelude::*;
 use qcbus_messages::DocumentRole;
-use qcbus_openscenario::{Element, Network, Scenario};
-use qcbus_sdk::{Rule, Sink};
-
-use crate::model::{About as _, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_road_xodr_parses",

@@ -1,9 +1,7 @@
-use qcbus_openscenario::{Element, Scenario, Way};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::positions::metres;
 use crate::families::routes::{is_for_vehicles, routes, stop, waypoints};
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
+use qcbus_openscenario::Way;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_route_connected",

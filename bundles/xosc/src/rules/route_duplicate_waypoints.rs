@@ -1,9 +1,6 @@
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::positions::Spot;
 use crate::families::routes::{routes, waypoints};
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_route_duplicate_waypoints",

@@ -1,8 +1,6 @@
-use qcbus_openscenario::{Scenario, Version};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::routes::{routes, waypoints};
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
+use qcbus_openscenario::Version;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_route_min_waypoints",

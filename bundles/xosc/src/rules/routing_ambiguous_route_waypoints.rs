@@ -1,9 +1,6 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::positions::listed;
 use crate::families::routes::{is_for_vehicles, routes, waypoints};
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_routing_ambiguous_route_waypoints",

@@ -1,7 +1,4 @@
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Rule, Sink};
-
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_routing_cardinality_of_control_points_in_nurbs",

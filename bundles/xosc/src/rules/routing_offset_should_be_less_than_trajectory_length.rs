@@ -1,9 +1,6 @@
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::positions::{metres, shown};
 use crate::families::trajectories::{followed, longest, named};
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_routing_offset_should_be_less_than_trajectory_length",

@@ -1,10 +1,6 @@
-use qcbus_opendrive::RoadMap;
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::positions::road_of;
 use crate::families::routes::{routes, waypoints};
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_routing_route_waypoints_locations",

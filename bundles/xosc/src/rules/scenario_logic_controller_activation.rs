@@ -1,10 +1,6 @@
-use foldhash::HashMap;
-use qcbus_document::Node;
-use qcbus_openscenario::{Actors, Element, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::references::{hint, quoted};
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use foldhash::HashMap;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_scenario_logic_controller_activation",

@@ -1,8 +1,5 @@
-use qcbus_openscenario::{Form, Network, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::road_network::{ON_ROADS, ON_SIGNALS, used};
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_scenario_logic_invalid_elements_if_no_road_network",

@@ -1,8 +1,5 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Backport, Level, Param, Rule, Sink};
-
 use crate::families::actions::{short, slowest, stated};
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_asam_xosc_scenario_logic_targetspeed_maxspeed_general",

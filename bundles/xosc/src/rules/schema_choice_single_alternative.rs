@@ -1,7 +1,4 @@
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_schema_choice_single_alternative",

@@ -1,12 +1,9 @@
 use std::collections::BTreeSet;
 
-use foldhash::HashMap;
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::positions::listed;
 use crate::families::references::quoted;
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use foldhash::HashMap;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_signal_condition_never",

@@ -1,9 +1,6 @@
-use foldhash::HashMap;
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::references::quoted;
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use foldhash::HashMap;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_signal_phase_duplicate",

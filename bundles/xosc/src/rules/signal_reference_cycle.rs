@@ -1,8 +1,5 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Place, Rule, Sink};
-
 use crate::families::signals::Controllers;
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_signal_reference_cycle",

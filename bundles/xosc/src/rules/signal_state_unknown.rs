@@ -1,8 +1,5 @@
+use crate::prelude::*;
 use foldhash::{HashMap, HashMapExt as _};
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
-use crate::model::{About as _, Scene};
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_signal_state_unknown",

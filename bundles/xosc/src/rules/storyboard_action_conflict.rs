@@ -1,10 +1,7 @@
-use foldhash::{HashMap, HashMapExt as _};
-use qcbus_openscenario::{Element, Entity, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::actions::{Domain, acting, domains};
 use crate::families::triggers::{Kinds, called, events};
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use foldhash::{HashMap, HashMapExt as _};
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_storyboard_action_conflict",

@@ -1,8 +1,5 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::triggers;
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_storyboard_event_never_starts",

@@ -1,9 +1,6 @@
-use foldhash::{HashMap, HashMapExt as _};
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::triggers::{Kinds, called};
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use foldhash::{HashMap, HashMapExt as _};
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_storyboard_priority_conflict",

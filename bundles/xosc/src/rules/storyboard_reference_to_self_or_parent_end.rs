@@ -1,9 +1,6 @@
-use qcbus_openscenario::{Element, Form, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::states::{StateCondition, own_triggers};
 use crate::families::triggers::called;
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_storyboard_reference_to_self_or_parent_end",

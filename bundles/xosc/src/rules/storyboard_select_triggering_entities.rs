@@ -1,8 +1,5 @@
-use qcbus_openscenario::{Actors, Element, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::triggers::called;
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_storyboard_select_triggering_entities",

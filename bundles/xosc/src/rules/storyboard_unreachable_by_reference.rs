@@ -1,9 +1,6 @@
-use qcbus_openscenario::{Form, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::states::Waiting;
 use crate::families::triggers::called;
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_storyboard_unreachable_by_reference",

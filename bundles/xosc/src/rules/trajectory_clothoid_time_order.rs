@@ -1,9 +1,6 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::positions::shown;
 use crate::families::trajectories::{Timing, timing_of};
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_trajectory_clothoid_time_order",

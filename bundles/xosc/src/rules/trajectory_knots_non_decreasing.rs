@@ -1,8 +1,5 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Place, Rule, Sink};
-
 use crate::families::positions::shown;
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_trajectory_knots_non_decreasing",

@@ -1,9 +1,6 @@
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Param, Rule, Sink};
-
 use crate::families::positions::moved;
 use crate::families::trajectories::{Timing, followed, shape, timed_points, timing_of};
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_trajectory_speed_plausible",

@@ -1,9 +1,6 @@
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Place, Rule, Sink};
-
 use crate::families::positions::shown;
 use crate::families::trajectories::{TimedPoint, Timing, named, shape, timed_points, timing_of};
-use crate::model::{About as _, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_trajectory_times_increasing",

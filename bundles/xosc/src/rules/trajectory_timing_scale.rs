@@ -1,9 +1,6 @@
-use qcbus_openscenario::Scenario;
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::ranges;
 use crate::families::ranges::tables::TIMING;
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_trajectory_timing_scale",

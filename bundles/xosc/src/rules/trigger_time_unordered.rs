@@ -1,9 +1,6 @@
-use qcbus_openscenario::{Element, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::actions::short;
 use crate::families::triggers::{self, called, earliest, groups, holds_at_once, time};
-use crate::model::{About, Scene};
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_trigger_time_unordered",

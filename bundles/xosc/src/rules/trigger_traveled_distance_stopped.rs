@@ -1,9 +1,6 @@
-use foldhash::{HashSet, HashSetExt as _};
-use qcbus_openscenario::{Element, Entity, EntityKind, Scenario};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::actions::acting;
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use foldhash::{HashSet, HashSetExt as _};
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_trigger_traveled_distance_stopped",

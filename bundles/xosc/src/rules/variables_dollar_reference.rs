@@ -1,8 +1,5 @@
-use qcbus_openscenario::{Scenario, ValueFaultKind};
-use qcbus_sdk::{Rule, Sink};
-
 use crate::families::values;
-use crate::model::Scene;
+use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_variables_dollar_reference",

@@ -1,8 +1,6 @@
-use qcbus_openscenario::{Scenario, is_identifier};
-use qcbus_sdk::{Level, Rule, Sink};
-
 use crate::families::declared;
-use crate::model::{About, Scene};
+use crate::prelude::*;
+use qcbus_openscenario::is_identifier;
 
 pub static RULE: Rule<Scene> = Rule {
     id: "check_qcbus_xosc_variables_name_syntax",

@@ -1,5 +1,4 @@
-use qcbus_document::Document;
-use qcbus_sdk::{Rule, Sink, basic};
+use crate::prelude::*;
 
 pub static RULE: Rule<Document> = Rule {
     id: "check_asam_xosc_xml_root_tag_is_openscenario",

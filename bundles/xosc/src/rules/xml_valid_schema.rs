@@ -1,5 +1,5 @@
+use crate::prelude::*;
 use qcbus_schema_rule::Validated;
-use qcbus_sdk::Rule;
 
 pub static RULE: Rule<Validated> = Rule {
     id: "check_asam_xosc_xml_valid_schema",

@@ -1,0 +1,10 @@
+//! Names that most rules use.
+
+pub(crate) use crate::model::{About as _, Scene};
+pub(crate) use qcbus_document::{Attribute, Document, Node};
+pub(crate) use qcbus_opendrive::{Road, RoadMap, Side};
+pub(crate) use qcbus_openscenario::{
+    Actors, CatalogKind, DataType, Declaration, Declared, Element, Entity, EntityKind, Form,
+    LaneAt, Network, Resolution, Scenario, Value, ValueFaultKind,
+};
+pub(crate) use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink, basic};
