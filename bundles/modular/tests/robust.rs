@@ -1,7 +1,7 @@
 //! Checks that a damaged set of files never makes a rule panic.
 
 use qcbus_modular::BUNDLE;
-use qcbus_sdk::robust::Robust;
+use qcbus_rule_tests::robust::Robust;
 
 const ROBUST: Robust = Robust {
     bundle: &BUNDLE,

@@ -21,7 +21,7 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use edit::{Edit, Entry};
-use qcbus_sdk::mutate::in_parallel;
+use qcbus_rule_tests::mutate::in_parallel;
 use qcbus_sdk::{Issue, Level, Listener, Loaded, Outcome, Plan, Status, check};
 use qcbus_xodr::BUNDLE;
 

@@ -1,11 +1,11 @@
 //! Checks that a damaged file never makes a rule panic. The tests break the examples of the pages
-//! and, if they are available, real maps. They use the methods of `qcbus_sdk::robust`.
+//! and, if they are available, real maps. They use the methods of `qcbus_rule_tests::robust`.
 
 use std::path::Path;
 
+use qcbus_rule_tests::robust::{NUMBERS, Robust};
 use qcbus_sdk::Plan;
 use qcbus_sdk::pages::evidence;
-use qcbus_sdk::robust::{NUMBERS, Robust};
 use qcbus_xodr::BUNDLE;
 
 const ROBUST: Robust = Robust {

@@ -1,9 +1,9 @@
 //! Tests with real maps, broken as authors and tools break them, and changed within the allowed
-//! range. See `qcbus_sdk::mutate::seeded` and `tests/seeded/README.md`.
+//! range. See `qcbus_rule_tests::mutate::seeded` and `tests/seeded/README.md`.
 
 use std::path::Path;
 
-use qcbus_sdk::mutate::seeded::Study;
+use qcbus_rule_tests::mutate::seeded::Study;
 use qcbus_xodr::BUNDLE;
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");

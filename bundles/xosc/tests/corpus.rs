@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use qcbus_sdk::corpus::{Deviations, Parity};
+use qcbus_rule_tests::corpus::{Deviations, Parity};
 
 /// Directory of the recorded results, if they are available.
 const CASES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/cases");

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
-use qcbus_sdk::corpus::agrees_or_says;
+use qcbus_rule_tests::corpus::agrees_or_says;
 use qcbus_sdk::pages::evidence;
 use qcbus_xosc::BUNDLE;
 

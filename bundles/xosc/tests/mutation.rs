@@ -24,8 +24,8 @@ use std::io::Write as _;
 use std::path::Path;
 
 use list::{Entry, Mutation};
-use qcbus_sdk::corpus::agrees_or_says;
-use qcbus_sdk::mutate::in_parallel;
+use qcbus_rule_tests::corpus::agrees_or_says;
+use qcbus_rule_tests::mutate::in_parallel;
 use qcbus_xosc::BUNDLE;
 use trial::{BASES, Base, Bench, Trial, rule_of};
 

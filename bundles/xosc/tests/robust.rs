@@ -1,9 +1,9 @@
 //! Checks that a damaged file never makes a rule panic. The tests break the examples of the pages
-//! and, if they are available, real scenarios. They use the methods of `qcbus_sdk::robust`.
+//! and, if they are available, real scenarios. They use the methods of `qcbus_rule_tests::robust`.
 
 use std::path::Path;
 
-use qcbus_sdk::robust::Robust;
+use qcbus_rule_tests::robust::Robust;
 use qcbus_xosc::BUNDLE;
 
 const ROBUST: Robust = Robust {

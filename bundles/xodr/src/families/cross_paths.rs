@@ -69,7 +69,7 @@ impl<'m, 'a> Crossing<'m, 'a> {
             let section = self.road.permanent()?.end_section(self.road, side, end)?;
             let lane = section.side(side).next_back();
             let t = match lane {
-                Some(lane) => lane.t(qcbus_opendrive::Edge::Outer, lane.end_station(end)?)?,
+                Some(lane) => lane.t(Edge::Outer, lane.end_station(end)?)?,
                 None => section.center_t(match end {
                     ContactPoint::Start => Station::at(0.0),
                     ContactPoint::End => Station::before(section.length(side)?),

@@ -155,7 +155,7 @@ fn turn_joints(stretches: &mut [Stretch<'_>]) {
 /// Returns the reference line of a junction if it is a single line.
 pub(crate) fn reference_line(junction: &Junction<'_>) -> Option<Placed> {
     match junction.plan_view().geometries() {
-        [only] if only.kind() == Some(qcbus_opendrive::ShapeKind::Line) => only.placed(),
+        [only] if only.kind() == Some(ShapeKind::Line) => only.placed(),
         _ => None,
     }
 }

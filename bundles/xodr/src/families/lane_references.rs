@@ -166,6 +166,6 @@ fn demand_lane(
         link.name()
     );
     found
-        .issue(qcbus_sdk::Place::attribute_or_node(link, attribute), text)
+        .issue(Place::attribute_or_node(link, attribute), text)
         .at(section.node(), "the lane section without this lane");
 }

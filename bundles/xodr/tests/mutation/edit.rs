@@ -1,6 +1,6 @@
 //! The table of edits: parses it, finds the element of an edit and changes it.
 
-use qcbus_sdk::mutate::{Action, Scan, Selector};
+use qcbus_rule_tests::mutate::{Action, Scan, Selector};
 
 /// A rule and the edits that should make it fire.
 #[derive(Debug)]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use qcbus_sdk::mutate::{Edit, Target};
+use qcbus_rule_tests::mutate::{Edit, Target};
 
 /// A rule and the edits that should make it fire.
 #[derive(Debug)]

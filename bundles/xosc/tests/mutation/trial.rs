@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
 
-use qcbus_sdk::mutate::{Changed, Overlay, Said, Spots, apply, said};
+use qcbus_rule_tests::mutate::{Changed, Overlay, Said, Spots, apply, said};
 use qcbus_sdk::{BACKPORT_SUFFIX, Plan};
 use qcbus_xosc::BUNDLE;
 

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use qcbus_document::FileKind;
 use qcbus_formats::xqar::{Issue, Level, Location};
 
-use crate::run::examine;
-use crate::{BACKPORT_SUFFIX, Bundle, Loaded, Plan};
+use qcbus_sdk::run::examine;
+use qcbus_sdk::{BACKPORT_SUFFIX, Bundle, Loaded, Plan};
 
 /// Prints every finding in the given files and in the files below given directories: file, checker,
 /// level, row, text. With `--counts` it prints a table with the number of findings and files of

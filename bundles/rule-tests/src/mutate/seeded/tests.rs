@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use crate::Level;
 use crate::mutate::{Rows, Said, Spots, new_ones};
+use qcbus_sdk::Level;
 
 use super::judge::{Found, judge};
 use super::table;

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use crate::Plan;
 use crate::mutate::{Changed, Overlay, Said, apply, in_parallel, new_ones, said};
+use qcbus_sdk::Plan;
 
 use super::Study;
 use super::judge::{Trial, judge};

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use crate::Level;
 use crate::mutate::{Said, Spots};
+use qcbus_sdk::Level;
 
 use super::table::Entry;
 

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-use crate::Level;
 use crate::mutate::{Said, name};
+use qcbus_sdk::Level;
 
 use super::Study;
 use super::judge::{Found, Trial};

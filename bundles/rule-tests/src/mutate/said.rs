@@ -6,7 +6,7 @@ use qcbus_formats::pool::{CheckerOutcome, Remark};
 use qcbus_formats::xqar::{Issue, Level, Location, Locations, Status};
 
 use super::change::normal;
-use crate::{Loaded, Plan, examine};
+use qcbus_sdk::{Loaded, Plan, examine};
 
 /// An issue, independent of the directory of the scenario.
 #[derive(Debug, Clone, PartialEq, Eq)]

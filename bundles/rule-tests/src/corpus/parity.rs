@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::{Comparison, Deviation, NOTHING_THERE, compare_asam_cases, compare_real_files, settle};
-use crate::Bundle;
+use qcbus_sdk::Bundle;
 
 /// Inputs on which a checker differs from the record, all for the same reason.
 #[derive(Debug, Clone, Copy)]
@@ -76,7 +76,7 @@ impl Parity {
             Err(error) => panic!("{error}"),
         };
         let Some(mut comparisons) = comparisons else {
-            crate::run::complain(&format!("skipped: {} is missing\n", cases.display()));
+            crate::note(&format!("skipped: {} is missing\n", cases.display()));
             return None;
         };
         for one in comparisons

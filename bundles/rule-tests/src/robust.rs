@@ -17,8 +17,8 @@ use std::path::{Path, PathBuf};
 
 use qcbus_document::fuzzing::Random;
 
-use crate::pages::evidence;
-use crate::{Bundle, Issue, Listener, Loaded, Outcome, Plan, Status, check};
+use qcbus_sdk::pages::evidence;
+use qcbus_sdk::{Bundle, Issue, Listener, Loaded, Outcome, Plan, Status, check};
 
 /// A bundle under test.
 #[derive(Clone, Copy)]
@@ -127,7 +127,7 @@ impl Robust {
         files.sort();
         let plan = Plan::by_default(self.bundle);
         let places = setting("QCBUS_FUZZ_PLACES", 2);
-        crate::run::complain(&format!(
+        crate::note(&format!(
             "{} files, each cut at {places} places\n",
             files.len()
         ));

@@ -27,7 +27,7 @@ use judge::Trial;
 use table::Entry;
 use trials::Trials;
 
-use crate::Bundle;
+use qcbus_sdk::Bundle;
 
 /// Input and requirements of a study.
 pub struct Study<'s> {

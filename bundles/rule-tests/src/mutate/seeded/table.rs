@@ -4,8 +4,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use crate::Level;
 use crate::mutate::{Edit, Target, beside};
+use qcbus_sdk::Level;
 
 /// A real file and its edits.
 #[derive(Debug)]

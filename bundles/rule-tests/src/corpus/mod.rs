@@ -11,8 +11,8 @@ use qcbus_formats::pool::CheckerOutcome;
 use qcbus_formats::xqar::{Issue, Location};
 use serde_json::Value;
 
-use crate::run::examine;
-use crate::{Bundle, Loaded, Plan};
+use qcbus_sdk::run::examine;
+use qcbus_sdk::{Bundle, Loaded, Plan};
 
 pub use findings::print_findings;
 pub use parity::{Deviations, Parity, agrees_or_says};
@@ -202,7 +202,7 @@ pub fn settle(bundle: &Bundle, comparisons: &[Comparison], deviations: &[Deviati
         .filter(|(index, _)| !used.contains(index));
     complaints.extend(unused.map(|(_, deviation)| format!("no longer a deviation: {deviation:?}")));
     let compared = comparisons.len();
-    crate::run::complain(&format!(
+    crate::note(&format!(
         "{}: {compared} recorded results compared\n",
         bundle.alias
     ));

@@ -1,0 +1,16 @@
+//! Tests of checker bundles that go beyond the examples of their pages.
+//!
+//! [`mutate`] edits valid files and compares the findings with the expected ones. [`robust`] damages
+//! files. [`corpus`] compares findings with those that other tools recorded. These are used only in
+//! tests.
+
+pub mod corpus;
+pub mod mutate;
+pub mod robust;
+
+/// Writes a note about skipped or failed cases to stderr.
+pub(crate) fn note(text: &str) {
+    use std::io::Write as _;
+    // The error is ignored, because the note is only an aid.
+    let _ = std::io::stderr().lock().write_all(text.as_bytes());
+}
