@@ -8,8 +8,7 @@ use sha2::{Digest as _, Sha256};
 use crate::core::{ChildSpec, Settings};
 use crate::options::Options;
 
-/// Option that is removed from a bundle's command with its value, because it does not change the
-/// findings.
+/// Option that is removed from a bundle's command with its value, because it does not change the findings.
 const WITHOUT: &str = "--threads";
 
 /// Returns the check context of a broker with these `options` and a configuration of this digest.

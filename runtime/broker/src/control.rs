@@ -1,5 +1,4 @@
-//! Control socket: short-lived commands send requests, and the broker answers with one JSON object
-//! per line.
+//! Control socket: short-lived commands send requests, and the broker answers with one JSON object per line.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

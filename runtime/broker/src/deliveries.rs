@@ -74,8 +74,7 @@ pub fn withdrawn(
     }
 }
 
-/// Maximum size of a result. A result with all the data that the broker keeps of every bundle is
-/// far smaller.
+/// Maximum size of a result. A result with all the data that the broker keeps of every bundle is far smaller.
 const MOST_OF_A_RESULT: u64 = 4 << 30;
 
 /// Maximum bytes of memory for the findings in one message. It is half of the message limit of the

@@ -17,11 +17,9 @@ use crate::reload::{LoadError, Loaded, Sources};
 /// The configuration in force: parsed, encoded for the bus and with its digest.
 #[derive(Debug, Clone)]
 pub struct InForce {
-    /// The configuration. `None` if there is none, so that every checker that is on by default
-    /// runs.
+    /// The configuration. `None` if there is none, so that every checker that is on by default runs.
     pub config: Option<Arc<Config>>,
-    /// The configuration without the named shadows. Results are pooled with it, because shadows are
-    /// not required.
+    /// The configuration without the named shadows. Results are pooled with it, because shadows are not required.
     pub judging: Option<Arc<Config>>,
     /// Encoded form for the bus.
     pub encoded: Vec<u8>,

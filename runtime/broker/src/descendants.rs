@@ -21,8 +21,7 @@ pub struct Strangers {
     is_first: bool,
 }
 
-/// Makes this process the subreaper of its descendants. Returns the processes that must be left
-/// alone.
+/// Makes this process the subreaper of its descendants. Returns the processes that must be left alone.
 pub fn adopt() -> Strangers {
     let strangers = Strangers {
         before: children(),
@@ -64,8 +63,7 @@ fn listed(pid: i32) -> Option<Listed> {
     })
 }
 
-/// Kills all descendants of a process. The caller must stop or kill the process itself immediately
-/// afterwards.
+/// Kills all descendants of a process. The caller must stop or kill the process itself immediately afterwards.
 pub fn kill_below(process: &Process) {
     // The process must not notice the loss of its children and exit with a misleading code.
     if let Some(pid) = Pid::from_raw(process.id().cast_signed()) {
@@ -82,10 +80,9 @@ pub fn kill_below(process: &Process) {
     }
 }
 
-/// Returns the living descendants of a process. Uses the kernel's lists of children if they exist,
-/// because a search through all processes takes milliseconds. A list may miss an entry while other
-/// entries end. Such a process becomes a child of the broker when its parent ends, and is found
-/// then.
+/// Returns the living descendants of a process. Uses the kernel's lists of children if they exist, because a search
+/// through all processes takes milliseconds. A list may miss an entry while other entries end. Such a process becomes
+/// a child of the broker when its parent ends, and is found then.
 fn living_below(root: i32) -> Vec<i32> {
     let is_alive = |pid: &i32| listed(*pid).is_some_and(|it| !it.is_dead);
     let mut found = BTreeSet::from([root]);
@@ -105,8 +102,7 @@ fn living_below(root: i32) -> Vec<i32> {
 /// Checks whether a process is a descendant of another one.
 pub fn is_below(pid: u32, root: u32) -> bool {
     let mut pid = pid.cast_signed();
-    // No ancestry is that deep. The limit also ends the loop if the kernel's lists change
-    // meanwhile.
+    // No ancestry is that deep. The limit also ends the loop if the kernel's lists change meanwhile.
     for _ in 0..64 {
         match listed(pid) {
             Some(found) if found.parent == root.cast_signed() => return true,
@@ -132,10 +128,9 @@ fn below(all: &BTreeMap<i32, Listed>, root: i32) -> BTreeSet<i32> {
     }
 }
 
-/// Kills and reaps descendants: children of this process that are not in `ours`. Processes left on
-/// purpose by a launch in `ours` stay as long as it does. The environment identifies the launch. A
-/// process without a proof is killed unless it may be a stranger. Returns the number of processes
-/// that were still alive.
+/// Kills and reaps descendants: children of this process that are not in `ours`. Processes left on purpose by a
+/// launch in `ours` stay as long as it does. The environment identifies the launch. A process without a proof is
+/// killed unless it may be a stranger. Returns the number of processes that were still alive.
 pub fn sweep(
     ours: &BTreeMap<Launch, Option<u32>>,
     strangers: &Strangers,
@@ -159,8 +154,7 @@ pub fn sweep(
         };
         if is_left {
             left += 1;
-            // Its descendants are killed too, otherwise the next sweep would find them as orphaned
-            // processes.
+            // Its descendants are killed too, otherwise the next sweep would find them as orphaned processes.
             living_below(pid).into_iter().for_each(kill);
             kill(pid);
         }
@@ -219,8 +213,7 @@ fn kill(pid: i32) {
     }
 }
 
-/// Reaps an ended process. Only for descendants: other processes are reaped by the code that
-/// started them.
+/// Reaps an ended process. Only for descendants: other processes are reaped by the code that started them.
 fn bury(pid: i32) {
     if let Some(pid) = Pid::from_raw(pid) {
         let _ = waitpid(Some(pid), WaitOptions::NOHANG);

@@ -12,8 +12,7 @@ const PER_PEER: u64 = 26;
 const FOR_THE_REST: u64 = 448;
 /// Minimum number of descriptors for the start of the bus.
 const FOR_THE_BUS: u64 = 64;
-/// Maximum number of descriptors. More are useless, and some programs iterate over all permitted
-/// descriptors.
+/// Maximum number of descriptors. More are useless, and some programs iterate over all permitted descriptors.
 const ENOUGH: u64 = 1 << 16;
 
 /// Limits of the system.
@@ -21,8 +20,7 @@ const ENOUGH: u64 = 1 << 16;
 pub struct Descriptors {
     /// Maximum number of open descriptors.
     pub allowed: u64,
-    /// Former limit for the programs that the broker starts, because some cannot handle a higher
-    /// one.
+    /// Former limit for the programs that the broker starts, because some cannot handle a higher one.
     pub before: Option<Rlimit>,
 }
 
@@ -61,14 +59,12 @@ impl Descriptors {
         }
     }
 
-    /// Raises the limit and reduces the maximum number of peers to it. Returns the notice for a
-    /// reduced number.
+    /// Raises the limit and reduces the maximum number of peers to it. Returns the notice for a reduced number.
     pub fn for_peers(most: &mut usize) -> (Descriptors, Option<String>) {
         let descriptors = Descriptors::take();
         let (peers, limited) = descriptors.peers(*most);
         *most = peers;
-        // The bus may fail to start with so few descriptors, and its error would not state the
-        // reason.
+        // The bus may fail to start with so few descriptors, and its error would not state the reason.
         if let Some(said) = limited
             .as_ref()
             .filter(|_| descriptors.allowed < FOR_THE_BUS)

@@ -1,5 +1,4 @@
-//! Directory locks: while a broker runs, its state, results and gate directories belong to it
-//! alone.
+//! Directory locks: while a broker runs, its state, results and gate directories belong to it alone.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
@@ -38,8 +37,7 @@ impl Purpose {
         }
     }
 
-    /// Returns the name of the file that identifies the owner. The file remains when the directory
-    /// is released.
+    /// Returns the name of the file that identifies the owner. The file remains when the directory is released.
     fn file(self) -> &'static str {
         match self {
             Purpose::State => "lock",
@@ -105,8 +103,7 @@ pub struct DirectoryLock {
 #[derive(Debug)]
 struct Locked {
     file: File,
-    /// The directory itself. It stays open so that no later directory gets its inode. `None` if it
-    /// cannot be opened.
+    /// The directory itself. It stays open so that no later directory gets its inode. `None` if it cannot be opened.
     directory: Option<File>,
 }
 
@@ -209,8 +206,7 @@ fn lock_alone(directory: &Path, purpose: Purpose, instance: &str) -> Result<File
         Err(TryLockError::WouldBlock) => return Err(refusal(&mut file, directory, purpose)),
         Err(TryLockError::Error(error)) => without_locks(directory, &error),
     }
-    // The check needs the lock: of two brokers that start at the same time, at least one sees the
-    // other.
+    // The check needs the lock: of two brokers that start at the same time, at least one sees the other.
     if purpose != Purpose::State {
         is_free_above(directory, purpose)?;
         is_free_below(directory)?;
@@ -256,8 +252,7 @@ impl Drop for DirectoryLock {
         {
             let _ = std::fs::remove_dir(made);
         }
-        // The unlock is explicit, because a starting process also has the descriptor until it
-        // executes its program.
+        // The unlock is explicit, because a starting process also has the descriptor until it executes its program.
         let _ = self.locked().file.unlock();
     }
 }
@@ -377,8 +372,7 @@ fn refusal(file: &mut File, directory: &Path, purpose: Purpose) -> LockError {
     }
 }
 
-/// Returns warnings about directories that other users may write to. This is often intended, but it
-/// has risks.
+/// Returns warnings about directories that other users may write to. This is often intended, but it has risks.
 pub fn open_to_others<'p>(
     directories: impl Iterator<Item = &'p Path>,
 ) -> impl Iterator<Item = String> {

@@ -46,8 +46,7 @@ impl FinalOutput {
         self.kept().joined.insert(launch);
     }
 
-    /// Deletes the output of the previous process of this name, because the next process did not
-    /// even start.
+    /// Deletes the output of the previous process of this name, because the next process did not even start.
     pub fn forget(&self, name: &str) {
         self.kept().words.remove(name);
     }

@@ -59,8 +59,7 @@ pub struct Options {
     pub standard: Vec<ChildSpec>,
     /// Start commands of reporters that the configuration may name, by their qcbus names.
     pub reporters: Vec<ChildSpec>,
-    /// Known facts about the bundles that come with the program, used to validate the
-    /// configuration.
+    /// Known facts about the bundles that come with the program, used to validate the configuration.
     pub known: Known,
     /// Adapter that runs ASAM modules as bundles.
     pub adapter: Adapter,

@@ -1,5 +1,4 @@
-//! The running program: its path, a replacement at this path, and the environment that it belongs
-//! to.
+//! The running program: its path, a replacement at this path, and the environment that it belongs to.
 
 use std::ffi::OsString;
 use std::fs::Metadata;
@@ -15,8 +14,7 @@ use rustix::fs::{Access, access};
 /// Path of the running program, even if the file was replaced. Also valid between fork and exec.
 pub(crate) const RUNNING: &str = "/proc/self/exe";
 
-/// Maximum number of links followed from the path by which the program was called. The kernel
-/// follows as many.
+/// Maximum number of links followed from the path by which the program was called. The kernel follows as many.
 const LINKS: usize = 40;
 
 /// Location of this program.
@@ -85,8 +83,7 @@ impl OwnProgram {
         behind(environment, path)
     }
 
-    /// Returns a message for the user if another file, or none, is at the program's path. Waits for
-    /// the disk.
+    /// Returns a message for the user if another file, or none, is at the program's path. Waits for the disk.
     pub(crate) fn replaced(&self) -> Option<String> {
         let shown = to_text(&self.called);
         let what = match foreign::metadata(&self.called) {
@@ -144,9 +141,8 @@ fn is_same(a: &Metadata, b: &Metadata) -> bool {
     (a.dev(), a.ino()) == (b.dev(), b.ino())
 }
 
-/// Returns the environment of a program that was called by this path. Both a link and its target
-/// may lie in one. A virtual environment has priority over a directory that only contains an
-/// interpreter.
+/// Returns the environment of a program that was called by this path. Both a link and its target may lie in one. A
+/// virtual environment has priority over a directory that only contains an interpreter.
 fn environment_of(called: &Path) -> Option<Environment> {
     let next = |path: &PathBuf| {
         let target = path.parent()?.join(std::fs::read_link(path).ok()?);
@@ -180,8 +176,7 @@ mod tests {
 
     use super::*;
 
-    /// Creates a directory with programs, optionally with `pyvenv.cfg` above it and an interpreter
-    /// in it.
+    /// Creates a directory with programs, optionally with `pyvenv.cfg` above it and an interpreter in it.
     fn place(dir: &Path, name: &str, is_virtual: bool, has_python: bool) -> PathBuf {
         let programs = dir.join(name).join("bin");
         std::fs::create_dir_all(&programs).unwrap();

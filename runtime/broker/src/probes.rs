@@ -54,8 +54,7 @@ struct Waiting {
 }
 
 impl Probes {
-    /// Creates an empty set of threads. `io_watchdog` monitors them and abandons them after
-    /// `patience`.
+    /// Creates an empty set of threads. `io_watchdog` monitors them and abandons them after `patience`.
     pub fn new(io_watchdog: Arc<IoWatchdog>, patience: Duration) -> Probes {
         Probes {
             io_watchdog,

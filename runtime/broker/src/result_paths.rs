@@ -88,8 +88,7 @@ impl ResultPaths {
         })
     }
 
-    /// Returns the path for display of the file with this result, or `None` if the result lies
-    /// elsewhere.
+    /// Returns the path for display of the file with this result, or `None` if the result lies elsewhere.
     pub fn shown_at(&self, xqar: &Path) -> Option<PathBuf> {
         let shown = xqar.strip_prefix(&self.out).ok()?;
         let name = shown.file_name()?.as_bytes().strip_suffix(b".xqar")?;

@@ -10,9 +10,8 @@ use qcbus_bus::Process;
 use crate::core::Launch;
 use crate::launches::Launches;
 
-/// Processes that former brokers of an instance have started, and their descendants. They are
-/// identified by their environment. Unlike a list, this also covers a broker that was killed before
-/// it wrote the list.
+/// Processes that former brokers of an instance have started, and their descendants. They are identified by their
+/// environment. Unlike a list, this also covers a broker that was killed before it wrote the list.
 #[derive(Debug)]
 pub struct StaleChildren {
     launches: Launches,
@@ -39,8 +38,7 @@ impl StaleChildren {
     fn kill(&self, is_meant: impl Fn(Launch) -> bool) -> Vec<(u32, String)> {
         let mut killed = Vec::new();
         for id in processes() {
-            // The handle comes first, so that all data read later belongs to this process or to
-            // none.
+            // The handle comes first, so that all data read later belongs to this process or to none.
             let Some(process) = Process::open(id, None) else {
                 continue;
             };

@@ -36,10 +36,9 @@ pub fn stamp_of(path: &Path) -> io::Result<Option<Stamp>> {
     }
 }
 
-/// Returns the stamp of a file that may be reached through symbolic links, as dependencies may. The
-/// stamp of a directory describes its scenarios: it changes when one appears or disappears, not
-/// when another file, such as a result, is written there. A pipe or a device has a stamp, too,
-/// because it differs from a missing file.
+/// Returns the stamp of a file that may be reached through symbolic links, as dependencies may. The stamp of a
+/// directory describes its scenarios: it changes when one appears or disappears, not when another file, such as a
+/// result, is written there. A pipe or a device has a stamp, too, because it differs from a missing file.
 pub fn stamp_through_links(path: &Path) -> Option<Stamp> {
     let data = foreign::metadata(path).ok()?;
     if data.is_file() {
@@ -58,8 +57,7 @@ pub fn stamp_through_links(path: &Path) -> Option<Stamp> {
 /// Time of change in a directory's stamp. No file can have it, because it is centuries ago.
 const LISTED: i128 = i64::MIN as i128;
 
-/// Time of change for entries that are neither file nor directory. Their own times only show their
-/// use.
+/// Time of change for entries that are neither file nor directory. Their own times only show their use.
 const NO_FILE: i128 = LISTED + 1;
 
 fn listing(directory: &Path, inode: u64) -> Option<Stamp> {
@@ -136,13 +134,12 @@ pub fn is_racy(stamp: Stamp) -> bool {
     is_younger(stamp, RACY)
 }
 
-/// Checks whether a file was changed within that time. Both of its times count: a copy may have an
-/// old time of modification, and some file systems have no true time of change.
+/// Checks whether a file was changed within that time. Both of its times count: a copy may have an old time of
+/// modification, and some file systems have no true time of change.
 ///
-/// A modification time in the future was set explicitly and proves nothing. A time of change in the
-/// future has two possible causes: another machine's clock is ahead, or the local clock was set
-/// back. More than an hour ahead only the latter is possible, and then another change would have a
-/// different time.
+/// A modification time in the future was set explicitly and proves nothing. A time of change in the future has two
+/// possible causes: another machine's clock is ahead, or the local clock was set back. More than an hour ahead only
+/// the latter is possible, and then another change would have a different time.
 pub fn is_younger(stamp: Stamp, limit: Duration) -> bool {
     let now = wall_time().duration_since(UNIX_EPOCH);
     was_younger(stamp, limit, nanoseconds(now.unwrap_or_default()))
@@ -211,8 +208,7 @@ pub(crate) mod tests {
         let path = dir.path().join("a.xodr");
         let time = SystemTime::now() - HOUR;
         let before = put(&path, b"one", time);
-        // The clock of the file system advances in steps, so only a later change is
-        // distinguishable.
+        // The clock of the file system advances in steps, so only a later change is distinguishable.
         let after = std::iter::repeat_with(|| put(&path, b"two", time))
             .find(|after| *after != before)
             .unwrap();

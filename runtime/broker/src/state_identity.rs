@@ -1,8 +1,7 @@
 //! Identity of a state directory, to detect that it was copied or moved.
 //!
-//! A state directory may be copied for a backup or a staging farm. Its journal then names the
-//! results of the original farm. This broker leaves them alone and tells the user why it judges
-//! everything again.
+//! A state directory may be copied for a backup or a staging farm. Its journal then names the results of the original
+//! farm. This broker leaves them alone and tells the user why it judges everything again.
 
 use std::io;
 use std::os::unix::fs::MetadataExt;

@@ -84,8 +84,7 @@ struct Started {
 }
 
 impl Children {
-    /// Creates an empty set of children for the broker of this generation. Their ends are sent to
-    /// `events`.
+    /// Creates an empty set of children for the broker of this generation. Their ends are sent to `events`.
     pub fn new(
         surroundings: Surroundings,
         launches: Launches,
@@ -105,10 +104,9 @@ impl Children {
         }
     }
 
-    /// Starts the children that the state machine will request first, with the same numbers. They
-    /// prepare while the bus is set up, and wait for it. Children that are not requested are killed
-    /// when this value is dropped. A child that cannot be started now is tried again at the
-    /// request.
+    /// Starts the children that the state machine will request first, with the same numbers. They prepare while the
+    /// bus is set up, and wait for it. Children that are not requested are killed when this value is dropped. A child
+    /// that cannot be started now is tried again at the request.
     pub fn start_early(&mut self, specs: &[ChildSpec]) {
         let specs: BTreeMap<&str, &ChildSpec> =
             specs.iter().map(|it| (it.name.as_str(), it)).collect();
@@ -195,8 +193,7 @@ impl Children {
         })
     }
 
-    /// Checks whether the output of a child is read. The user needs it if an added bundle does not
-    /// become ready.
+    /// Checks whether the output of a child is read. The user needs it if an added bundle does not become ready.
     fn listens_to(&self, spec: &ChildSpec) -> bool {
         !self.surroundings.die_with_broker && reload::command_of(&spec.command).is_some()
     }
@@ -206,8 +203,7 @@ impl Children {
         self.final_output.of(name)
     }
 
-    /// Puts a bundle into the sandbox. Reporters are trusted and write files anywhere, so they run
-    /// outside.
+    /// Puts a bundle into the sandbox. Reporters are trusted and write files anywhere, so they run outside.
     fn confine(&self, command: &mut Command, spec: &ChildSpec) -> Result<(), SandboxError> {
         let command = command.as_std_mut();
         if !self.surroundings.sandbox {
@@ -218,8 +214,7 @@ impl Children {
         Ok(())
     }
 
-    /// Returns the sandbox state of a bundle as the kernel reports it. The bundle itself is not
-    /// asked.
+    /// Returns the sandbox state of a bundle as the kernel reports it. The bundle itself is not asked.
     pub fn sandbox_of(&self, peer: &PeerStatus) -> Option<SandboxStatus> {
         let there = peer.role == "bundle" && peer.pid != 0 && peer.state != "down";
         if !there || peer.state == "starting" {
@@ -317,8 +312,7 @@ impl Children {
         Ok(())
     }
 
-    /// Kills a child with its process group. It may be a child of this broker, or a stale child
-    /// that has joined.
+    /// Kills a child with its process group. It may be a child of this broker, or a stale child that has joined.
     pub fn kill(&self, launch: Launch) {
         let own = self.own.get(&launch).and_then(|it| it.process.as_ref());
         if let Some(process) = own.or(self.adopted.get(&launch)) {
@@ -339,8 +333,7 @@ impl Children {
         may_be.then(|| StaleChildren::of(&self.launches, self.first))
     }
 
-    /// Kills all remaining children and their descendants. [`Children::bury_all`] finds escaped
-    /// processes.
+    /// Kills all remaining children and their descendants. [`Children::bury_all`] finds escaped processes.
     pub fn kill_all(&self) {
         for launch in self.own.keys() {
             self.kill(*launch);
@@ -357,8 +350,7 @@ impl Children {
                 let _ = process.ends_within(left);
             }
         }
-        // An ended process passes on its children, so several searches are needed. Their number is
-        // limited.
+        // An ended process passes on its children, so several searches are needed. Their number is limited.
         let nobody = BTreeMap::new();
         for _ in 0..DESCENDANTS_AT_MOST {
             if descendants::sweep(&nobody, &self.strangers, &self.launches) == 0 {
@@ -389,9 +381,8 @@ impl Drop for Children {
     }
 }
 
-/// Returns the command for a program. The broker's own program is started from the running image,
-/// because another version may be at its path, or none. Other programs are started from their
-/// paths.
+/// Returns the command for a program. The broker's own program is started from the running image, because another
+/// version may be at its path, or none. Other programs are started from their paths.
 fn command_of(program: &str) -> Command {
     if !OwnProgram::this().is(program) {
         return Command::new(program);

@@ -240,9 +240,8 @@ impl Writer {
         self.waiting.push_back(order);
     }
 
-    /// Removes a file from the gate immediately, even if the order must wait for a disk or the
-    /// journal. The order removes the file again later, because an earlier order may have published
-    /// it again.
+    /// Removes a file from the gate immediately, even if the order must wait for a disk or the journal. The order
+    /// removes the file again later, because an earlier order may have published it again.
     fn withdraw_early(&mut self, order: &Order) {
         if let Order::CloseGate { path } | Order::Withdraw { path, .. } = order
             && let Err(failure) = self.store.close_gate(path)
@@ -294,8 +293,7 @@ impl Writer {
             Order::Withdraw { path, reporters } => {
                 self.store.withdraw(path, reporters)?;
                 let path = path.clone();
-                // After the end of the loop the reporters are not informed. The journal contains
-                // them.
+                // After the end of the loop the reporters are not informed. The journal contains them.
                 let _ = self.events.send(Event::Withdrawn { path });
             }
             Order::Restamp { path, judged } => {

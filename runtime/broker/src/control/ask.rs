@@ -122,8 +122,7 @@ impl Line {
         self.process.as_ref().map(Process::id)
     }
 
-    /// Checks whether the broker is the same program, has the rights of this process and sees the
-    /// same files.
+    /// Checks whether the broker is the same program, has the rights of this process and sees the same files.
     pub fn is_like_us(&self) -> bool {
         self.process.as_ref().is_some_and(file_view::is_like_us)
     }

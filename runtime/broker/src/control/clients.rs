@@ -1,8 +1,7 @@
 //! Clients of the control socket: limits their number, their requests and their time.
 //!
-//! A client that waits for a verdict stays as long as it lives. Every other client has a few
-//! seconds. If there is no room for a new client, the client that has been silent longest is
-//! removed.
+//! A client that waits for a verdict stays as long as it lives. Every other client has a few seconds. If there is no
+//! room for a new client, the client that has been silent longest is removed.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -42,8 +41,7 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// Returns the limits of this process. The broker keeps half of its file descriptors for
-    /// itself.
+    /// Returns the limits of this process. The broker keeps half of its file descriptors for itself.
     pub(super) fn of_this_process() -> Bounds {
         let limit = rustix::process::getrlimit(rustix::process::Resource::Nofile).current;
         let limit = limit.map_or(usize::MAX, |it| usize::try_from(it).unwrap_or(usize::MAX));
@@ -323,8 +321,7 @@ async fn answer(connection: &Connection, line: &[u8], stream: &UnixStream) -> Op
     }
 }
 
-/// Checks whether the client has disconnected. A client that has only closed its send side still
-/// listens.
+/// Checks whether the client has disconnected. A client that has only closed its send side still listens.
 fn has_left(stream: &UnixStream) -> bool {
     let mut ends = [PollFd::new(stream, PollFlags::empty())];
     let at_once = Timespec::default();

@@ -47,8 +47,7 @@ pub(super) fn brokers(instance: &str) -> Vec<String> {
     found.collect()
 }
 
-/// Returns the instance that a command line serves, or `None` if it is not the command line of a
-/// broker.
+/// Returns the instance that a command line serves, or `None` if it is not the command line of a broker.
 fn served<'w>(words: &[&'w str]) -> Option<&'w str> {
     let (program, rest) = words.split_first()?;
     let (command, rest) = rest.split_first()?;

@@ -1,5 +1,4 @@
-//! Location of the control socket: its path may have any length, and a removed socket is created
-//! again.
+//! Location of the control socket: its path may have any length, and a removed socket is created again.
 
 use std::fs::Permissions;
 use std::io;
@@ -19,9 +18,8 @@ use super::SOCKET;
 /// Interval of the checks whether the socket still exists.
 const EVERY: Duration = Duration::from_millis(500);
 
-/// Returns the path of the socket through a descriptor of its directory. The kernel accepts at most
-/// 107 bytes for a socket path, and the real path may be longer. The returned path is valid as long
-/// as the descriptor is open.
+/// Returns the path of the socket through a descriptor of its directory. The kernel accepts at most 107 bytes for a
+/// socket path, and the real path may be longer. The returned path is valid as long as the descriptor is open.
 fn short(directory: &Path) -> io::Result<(OwnedFd, PathBuf)> {
     let flags = OFlags::PATH | OFlags::DIRECTORY | OFlags::CLOEXEC;
     let descriptor = open(directory, flags, Mode::empty())?;
@@ -50,8 +48,7 @@ pub(super) fn connect(directory: &Path) -> io::Result<UnixStream> {
     UnixStream::connect(path)
 }
 
-/// Connects to the broker if it accepts a client at this moment. A stopped broker would let the
-/// client wait.
+/// Connects to the broker if it accepts a client at this moment. A stopped broker would let the client wait.
 pub(super) fn connect_at_once(directory: &Path) -> io::Result<UnixStream> {
     let (_directory, path) = short(directory)?;
     let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;

@@ -77,8 +77,7 @@ pub enum Action {
         /// Start of the child.
         launch: Launch,
     },
-    /// Kill stale children: former brokers of this instance started them, and they have not joined
-    /// this one.
+    /// Kill stale children: former brokers of this instance started them, and they have not joined this one.
     KillStaleChildren {
         /// Starts of the children that have joined.
         joined: BTreeSet<Launch>,
@@ -195,8 +194,7 @@ pub enum Action {
 }
 
 impl Action {
-    /// Returns the action that kills a process that has not joined. Such a process has no work to
-    /// finish.
+    /// Returns the action that kills a process that has not joined. Such a process has no work to finish.
     pub(super) fn kill_unjoined(launch: Launch) -> Action {
         Action::Kill { launch }
     }

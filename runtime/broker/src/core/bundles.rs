@@ -78,8 +78,7 @@ pub(super) struct Given {
 enum Word {
     /// The bundle has the job.
     Due,
-    /// The bundle had the job or may have had it. The message was already sent when the job was
-    /// cancelled.
+    /// The bundle had the job or may have had it. The message was already sent when the job was cancelled.
     Late,
     /// The bundle never received such a job.
     Lie,
@@ -295,8 +294,7 @@ impl State {
         }
     }
 
-    /// Handles a message of a bundle. Returns `false` if the message was only added to the pending
-    /// findings.
+    /// Handles a message of a bundle. Returns `false` if the message was only added to the pending findings.
     pub(super) fn bundle_says(
         &mut self,
         name: &str,

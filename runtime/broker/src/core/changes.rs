@@ -1,5 +1,4 @@
-//! File events: handles new, changed and removed files, and changes of the files that verdicts
-//! depend on.
+//! File events: handles new, changed and removed files, and changes of the files that verdicts depend on.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -78,9 +77,8 @@ impl State {
         }
     }
 
-    /// Marks a verdict as stale while a file that it depends on is being written to. The verdict is
-    /// not reported before that file has settled. An active job notices the change by itself when
-    /// it is stored.
+    /// Marks a verdict as stale while a file that it depends on is being written to. The verdict is not reported
+    /// before that file has settled. An active job notices the change by itself when it is stored.
     fn stale_until_settled(&mut self, id: FileId) {
         if let Some(entry) = self.files.get_mut(id)
             && !matches!(entry.stage(), Stage::Active(_))
@@ -333,8 +331,7 @@ impl State {
         }
     }
 
-    /// Handles the end of the first scan. Files that the journal knows and the scan did not find
-    /// were removed.
+    /// Handles the end of the first scan. Files that the journal knows and the scan did not find were removed.
     pub(super) fn scanned(&mut self, actions: &mut Actions) {
         self.scanned = true;
         let gone: Vec<FileId> = self

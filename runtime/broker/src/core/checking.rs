@@ -22,8 +22,7 @@ impl State {
         self.fail_missing();
     }
 
-    /// Sends a bundle its next jobs: quarantined jobs one at a time and alone, other jobs up to its
-    /// capacity.
+    /// Sends a bundle its next jobs: quarantined jobs one at a time and alone, other jobs up to its capacity.
     pub(super) fn dispatch(&mut self, name: &str, actions: &mut Actions) {
         loop {
             let findings = self.room_for_findings();

@@ -51,8 +51,7 @@ const START_LIMIT: Duration = Duration::from_secs(15);
 /// The same limit for a child that first runs other programs, which may come from a slow disk.
 const SLOW_START_LIMIT: Duration = Duration::from_secs(120);
 
-/// Number of consecutive failures without joining after which the broker no longer waits for a
-/// child.
+/// Number of consecutive failures without joining after which the broker no longer waits for a child.
 const STUCK_AFTER: u32 = 3;
 
 impl Child {
@@ -69,10 +68,9 @@ impl Child {
         }
     }
 
-    /// Takes a new manifest. A running process continues until a newer one has joined. It stays for
-    /// good if it matches the manifest, because the user has reverted a change. A process that was
-    /// started and has not joined belongs to the previous manifest. Its launch is returned, because
-    /// it is not wanted any more.
+    /// Takes a new manifest. A running process continues until a newer one has joined. It stays for good if it
+    /// matches the manifest, because the user has reverted a change. A process that was started and has not joined
+    /// belongs to the previous manifest. Its launch is returned, because it is not wanted any more.
     fn respecify(
         &mut self,
         spec: ChildSpec,
@@ -129,8 +127,7 @@ impl Child {
 }
 
 impl State {
-    /// Sets the children that must run. Starts new ones, replaces changed ones and drains the
-    /// others.
+    /// Sets the children that must run. Starts new ones, replaces changed ones and drains the others.
     pub(super) fn set_children(&mut self, specs: Vec<ChildSpec>, actions: &mut Actions) {
         let unwanted = |name: &&String| specs.iter().all(|it| it.name != **name);
         let gone: Vec<String> = self.children.keys().filter(unwanted).cloned().collect();
@@ -138,8 +135,7 @@ impl State {
             self.dismiss(&name, actions);
         }
         for spec in specs.iter().filter(|it| it.role == Role::Reporter) {
-            // The reporter is registered now, so that it also learns of files that are removed
-            // before it joins.
+            // The reporter is registered now, so that it also learns of files that are removed before it joins.
             self.reporter_index(&spec.name);
         }
         let due = self.now.max(self.settings.collect);
@@ -412,8 +408,7 @@ impl State {
         child.stuck.as_deref()
     }
 
-    /// Checks whether every bundle that should be started has joined or cannot be waited for any
-    /// more.
+    /// Checks whether every bundle that should be started has joined or cannot be waited for any more.
     pub(super) fn children_settled(&self) -> bool {
         let children = self.children.iter();
         let mut bundles = children.filter(|(_, child)| child.spec.judges());

@@ -1,5 +1,4 @@
-//! Delivery: every result reaches every reporter at least once, and no reporter can delay a
-//! verdict.
+//! Delivery: every result reaches every reporter at least once, and no reporter can delay a verdict.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -90,8 +89,7 @@ impl State {
             if reporter.active.len() + reporter.voiding.len() >= reporter.capacity {
                 return;
             }
-            // Withdrawals precede results, because the new report of a file that exists again must
-            // be written later.
+            // Withdrawals precede results, because the new report of a file that exists again must be written later.
             let recorded = |path: &&Arc<Path>| !self.withdrawing.contains_key(*path);
             let gone = reporter.void.iter().find(recorded).cloned();
             if let Some(path) = gone {
@@ -224,8 +222,7 @@ impl State {
         }
     }
 
-    /// Handles the answer of a reporter that it has withdrawn its report of a removed file, or
-    /// could not.
+    /// Handles the answer of a reporter that it has withdrawn its report of a removed file, or could not.
     pub(super) fn withdrawal_done(
         &mut self,
         index: u32,
@@ -257,8 +254,7 @@ impl State {
         self.deliver(index, actions);
     }
 
-    /// Handles a result that could not be read back: it was withdrawn or replaced, or the disk has
-    /// failed.
+    /// Handles a result that could not be read back: it was withdrawn or replaced, or the disk has failed.
     pub(super) fn undeliverable(
         &mut self,
         session: SessionId,

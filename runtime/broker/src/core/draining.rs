@@ -30,8 +30,7 @@ impl State {
         if let Some(bundle) = self.bundles.get_mut(name) {
             bundle.draining = true;
             bundle.moved = now;
-            // From now on the bundle is not required, even if the broker ends before the bundle has
-            // left.
+            // From now on the bundle is not required, even if the broker ends before the bundle has left.
             if bundle.origin.take().is_some() {
                 let name = name.to_owned();
                 actions.push(Action::Strike { name });

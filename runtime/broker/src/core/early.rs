@@ -23,9 +23,8 @@ impl State {
         self.may_judge() || self.judged_once
     }
 
-    /// Checks whether files are read before any bundle can judge them. A run has no other work
-    /// while its bundles start. The read data is not evaluated before the bundles have joined,
-    /// because the result depends on them.
+    /// Checks whether files are read before any bundle can judge them. A run has no other work while its bundles
+    /// start. The read data is not evaluated before the bundles have joined, because the result depends on them.
     pub(super) fn reads_early(&mut self) -> bool {
         self.settings.once && self.phase == Phase::Running && !self.has_judges()
     }

@@ -65,8 +65,7 @@ pub enum Event {
         /// Its path.
         path: Arc<Path>,
     },
-    /// The journal has recorded that a file was removed, and the reporters that must withdraw their
-    /// report.
+    /// The journal has recorded that a file was removed, and the reporters that must withdraw their report.
     Withdrawn {
         /// Its path.
         path: Arc<Path>,

@@ -1,6 +1,5 @@
-//! Files table: every known file with its state, and the queues of waiting files. A path is in the
-//! queue at most once. A file that changes a hundred times while it waits is checked once, with its
-//! newest bytes.
+//! Files table: every known file with its state, and the queues of waiting files. A path is in the queue at most
+//! once. A file that changes a hundred times while it waits is checked once, with its newest bytes.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::path::Path;
@@ -60,8 +59,7 @@ pub struct FileEntry {
     pub unpublished: bool,
     /// Number of pending publications. The acceptance is not reported before they are done.
     pub opening: u32,
-    /// The file is not processed before this time, because something failed for lack of room or
-    /// disk space.
+    /// The file is not processed before this time, because something failed for lack of room or disk space.
     pub not_before: Duration,
     /// The bus had no place for the file, and it waits for one.
     pub in_line: bool,
@@ -70,8 +68,7 @@ pub struct FileEntry {
     /// The result contains outdated statements although no input of the verdict has changed. The
     /// file is checked again even if its inputs are unchanged.
     pub anew: bool,
-    /// Writing a result has failed since the last verdict, so a result of other bytes may be in its
-    /// place.
+    /// Writing a result has failed since the last verdict, so a result of other bytes may be in its place.
     pub half_written: bool,
     /// Time when the file was last queued, or requested while it waited. Data that is read for its
     /// verdict must not be older.
@@ -265,8 +262,7 @@ impl Files {
         }
     }
 
-    /// Moves a file to another stage. Only [`Files::enqueue`] and [`Files::dequeue`] change the
-    /// queues themselves.
+    /// Moves a file to another stage. Only [`Files::enqueue`] and [`Files::dequeue`] change the queues themselves.
     pub fn set_stage(&mut self, id: FileId, stage: Stage) {
         let Some(entry) = self.entries.get_mut(&id) else {
             return;

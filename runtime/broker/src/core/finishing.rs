@@ -260,8 +260,7 @@ impl State {
         }
     }
 
-    /// Returns the priority of a file with an invalid verdict. It is judged at once if a client
-    /// waits for it.
+    /// Returns the priority of a file with an invalid verdict. It is judged at once if a client waits for it.
     pub(super) fn priority_of(&self, path: &Path) -> Priority {
         if self.is_awaited(path) {
             Priority::Fresh

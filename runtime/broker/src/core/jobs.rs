@@ -42,8 +42,7 @@ pub(super) struct ActiveJob {
     pub tasks: BTreeMap<String, Task>,
     /// The job is an on-demand check, and its outcome is not stored.
     pub on_demand: Option<OnDemand>,
-    /// Used while the job is stored: the file was to be judged again. This is restored if no result
-    /// is stored.
+    /// Used while the job is stored: the file was to be judged again. This is restored if no result is stored.
     pub anew: bool,
     /// Its bundles have answered and the job must wait. Only its root document is still on the bus.
     pub is_slim: bool,
@@ -159,8 +158,7 @@ impl State {
         }
     }
 
-    /// Returns the number of jobs that wait for verdicts they rest on. These verdicts need
-    /// additional places.
+    /// Returns the number of jobs that wait for verdicts they rest on. These verdicts need additional places.
     fn held_up(&self) -> usize {
         let held_up = self.jobs.keys().filter(|id| self.is_held_up(**id));
         held_up.count().min(self.settings.max_active)
@@ -286,9 +284,8 @@ impl State {
         self.requeue_later(id, pause, actions);
     }
 
-    /// Handles a file that has no room now. It waits as long as other jobs progress, because room
-    /// will become free. If no job progresses for long enough, its verdict is undetermined. An
-    /// existing verdict stays meanwhile.
+    /// Handles a file that has no room now. It waits as long as other jobs progress, because room will become free.
+    /// If no job progresses for long enough, its verdict is undetermined. An existing verdict stays meanwhile.
     fn wait_for_room(&mut self, id: JobId, why: &str, pause: Duration, actions: &mut Actions) {
         let moves = |job: &ActiveJob| job.stage != JobStage::Preparing && job.unreadable.is_none();
         if self.jobs.values().any(moves) {
@@ -304,9 +301,8 @@ impl State {
         self.not_read(id, reason, actions);
     }
 
-    /// Queues the file for the next free place on the bus. Each free place admits one file. Returns
-    /// the number of pauses after which the file is retried anyway. It grows with the queue,
-    /// because each try reads the file.
+    /// Queues the file for the next free place on the bus. Each free place admits one file. Returns the number of
+    /// pauses after which the file is retried anyway. It grows with the queue, because each try reads the file.
     fn stand_in_line(&mut self, id: JobId) -> u32 {
         let file = self.jobs.get(&id).map(|job| job.file);
         if let Some((file, entry)) = file.and_then(|id| Some((id, self.files.get_mut(id)?)))

@@ -1,5 +1,4 @@
-//! Missing required bundles: how long the broker waits for them, and when their tasks of a job
-//! fail.
+//! Missing required bundles: how long the broker waits for them, and when their tasks of a job fail.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -7,6 +6,7 @@ use std::time::Duration;
 use qcbus_messages::JobId;
 
 use super::State;
+use super::bundles::Bundle;
 use super::jobs::TaskState;
 use super::required_set::Origin;
 
@@ -55,8 +55,7 @@ impl State {
         }
     }
 
-    /// Returns how long to wait for a missing bundle. A bundle with a slow start has its whole
-    /// start limit.
+    /// Returns how long to wait for a missing bundle. A bundle with a slow start has its whole start limit.
     fn patience_with(&self, name: &str) -> Duration {
         let child = self.children.get(name);
         let slow = child.filter(|it| it.spec.slow_start && self.child_is_coming(name));
@@ -82,5 +81,11 @@ impl State {
                 self.finish_if_over(id);
             }
         }
+    }
+
+    /// Returns how long a bundle has been missing, or `None` if it is connected.
+    pub(super) fn away_for(&self, bundle: &Bundle) -> Option<Duration> {
+        let since = bundle.away_since.filter(|_| bundle.session.is_none())?;
+        Some(self.now.saturating_sub(since))
     }
 }

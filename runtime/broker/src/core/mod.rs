@@ -149,8 +149,7 @@ const NOTICES: usize = 50;
 impl State {
     /// Returns the state of a new broker.
     pub fn new(settings: Settings, config: Digest, demand: Arc<dyn Demand>) -> State {
-        // Launches must differ from those of earlier generations, because their children may be
-        // adopted.
+        // Launches must differ from those of earlier generations, because their children may be adopted.
         let last_launch = Launch::first_of(settings.generation);
         let epoch = Epoch::first_of(settings.numbers);
         let mut state = State {
@@ -219,8 +218,7 @@ impl State {
         }
     }
 
-    /// Marks a file from the journal as accepted but not published. It is published when its
-    /// acceptance is confirmed.
+    /// Marks a file from the journal as accepted but not published. It is published when its acceptance is confirmed.
     pub fn remember_unpublished(&mut self, path: &Path) {
         let id = self.files.id(path);
         if let Some(entry) = id.and_then(|id| self.files.get_mut(id)) {
@@ -228,8 +226,7 @@ impl State {
         }
     }
 
-    /// Handles one event and returns the resulting actions. `now` is the time since the start and
-    /// never decreases.
+    /// Handles one event and returns the resulting actions. `now` is the time since the start and never decreases.
     pub fn handle(&mut self, now: Duration, event: Event) -> Vec<Action> {
         self.now = self.now.max(now);
         let mut actions = Vec::new();

@@ -1,5 +1,4 @@
-//! Notices for the user: a closed list, so that `status`, JSON and tests need not parse English
-//! text.
+//! Notices for the user: a closed list, so that `status`, JSON and tests need not parse English text.
 
 use std::fmt;
 
@@ -18,8 +17,7 @@ pub enum Notice {
         /// How it ended.
         why: String,
     },
-    /// The broker has ended the session of a bundle or reporter, and its process if the broker
-    /// started it.
+    /// The broker has ended the session of a bundle or reporter, and its process if the broker started it.
     Killed {
         /// Its name.
         name: String,

@@ -197,8 +197,7 @@ impl State {
         self.end_job(id, actions);
     }
 
-    /// Handles the end of an on-demand job. The job starts again unless the client was answered or
-    /// has disconnected.
+    /// Handles the end of an on-demand job. The job starts again unless the client was answered or has disconnected.
     pub(super) fn on_demand_is_over(
         &mut self,
         file: FileId,
@@ -255,9 +254,8 @@ impl State {
         }
     }
 
-    /// Rejects the on-demand checks of a bundle that died. They are not retried. A verdict would
-    /// protect other runs from the same file, but an on-demand check leaves no record. Every job
-    /// needs this bundle.
+    /// Rejects the on-demand checks of a bundle that died. They are not retried. A verdict would protect other runs
+    /// from the same file, but an on-demand check leaves no record. Every job needs this bundle.
     pub(super) fn refuse_quarantined(&mut self, actions: &mut Actions) {
         let quarantined = |job: &ActiveJob| job.tasks.values().any(|task| task.quarantined);
         let jobs = self.jobs.iter();

@@ -1,5 +1,4 @@
-//! Outcome of tasks: measures what a bundle reported about a job, limits its size and converts it
-//! to a result.
+//! Outcome of tasks: measures what a bundle reported about a job, limits its size and converts it to a result.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -40,8 +39,7 @@ pub enum Answer {
     OtherKind(FileKind),
 }
 
-/// Returns the outcome of one task. The code that stores it converts it to a result, outside the
-/// loop.
+/// Returns the outcome of one task. The code that stores it converts it to a result, outside the loop.
 pub(super) fn outcome(name: &str, task: &Task) -> TaskOutcome {
     TaskOutcome {
         name: name.to_owned(),
@@ -179,8 +177,7 @@ fn bundle(task: &TaskOutcome, demanded: &[u32], checkers: Vec<CheckerOutcome>) -
     }
 }
 
-/// Counts the checkers that can be requested. A checker that is off by default counts only if it is
-/// demanded.
+/// Counts the checkers that can be requested. A checker that is off by default counts only if it is demanded.
 fn in_question(catalogue: &Catalogue, demanded: &[u32]) -> usize {
     let is_demanded = |index: &u32| demanded.binary_search(index).is_ok();
     let checkers = (0..).zip(&catalogue.checkers);

@@ -87,8 +87,7 @@ fn an_issue(text: &str) -> Issue {
     }
 }
 
-/// Returns the entry of a checker with this ending and these findings in the result: status,
-/// reason, findings.
+/// Returns the entry of a checker with this ending and these findings in the result: status, reason, findings.
 fn in_the_result(ending: Ending, issues: Vec<Issue>) -> (Status, String, Vec<String>) {
     let pending = Pending {
         issues,
@@ -155,8 +154,7 @@ fn selected_checkers_of_other_file_kind_are_not_applicable() {
     assert_eq!(only.ending, Some(Ending::NotApplicable { reason }));
 }
 
-/// Checks that every text from a bundle counts, byte for byte, because the weight limits the kept
-/// data.
+/// Checks that every text from a bundle counts, byte for byte, because the weight limits the kept data.
 #[test]
 fn issue_weight_grows_with_each_text() {
     let place = |text: &str, which: usize| {

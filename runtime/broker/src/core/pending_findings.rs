@@ -40,8 +40,7 @@ pub(super) enum Room {
 }
 
 impl State {
-    /// Returns the room for findings. While findings occupy all permitted room, younger jobs stay
-    /// queued.
+    /// Returns the room for findings. While findings occupy all permitted room, younger jobs stay queued.
     pub(super) fn room_for_findings(&self) -> Room {
         // A trial is limited to the findings of one bundle for one file and blocks no other job.
         let counts = |job: &&ActiveJob| !job.is_trial();

@@ -8,8 +8,7 @@ use super::jobs::TaskState;
 const STRIKES: u8 = 2;
 
 impl State {
-    /// Returns the jobs of an ended session to the bundle's queue. After a death each of them is
-    /// quarantined.
+    /// Returns the jobs of an ended session to the bundle's queue. After a death each of them is quarantined.
     pub(super) fn take_back(&mut self, name: &str, died: bool) {
         let Some(bundle) = self.bundles.get_mut(name) else {
             return;

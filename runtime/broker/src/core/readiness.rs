@@ -9,9 +9,8 @@ use super::bundles::Bundle;
 use super::children::{Child, ChildState};
 
 impl State {
-    /// Returns the readiness of the bundle with this name, or `None` if it is neither wanted nor
-    /// known. It describes the process that is wanted now, and distinguishes it from an older one
-    /// that is still running.
+    /// Returns the readiness of the bundle with this name, or `None` if it is neither wanted nor known. It describes
+    /// the process that is wanted now, and distinguishes it from an older one that is still running.
     pub fn readiness(&self, name: &str) -> Option<BundleReadiness> {
         let (child, bundle) = (self.children.get(name), self.bundles.get(name));
         if child.is_none() && bundle.is_none() {

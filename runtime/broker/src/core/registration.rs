@@ -1,6 +1,5 @@
-//! Registration of bundles: limits the size of a catalogue and the rate of its changes. Every
-//! change causes all files to be judged again, so a flapping bundle is accepted only at growing
-//! intervals.
+//! Registration of bundles: limits the size of a catalogue and the rate of its changes. Every change causes all files
+//! to be judged again, so a flapping bundle is accepted only at growing intervals.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -25,8 +24,7 @@ const MOST_OF_A_NAME: usize = 256;
 
 /// Maximum number of names with remembered changes.
 const MOST_FLAPPING: usize = 1024;
-/// Key for all bundles together that the broker does not start itself. No bundle can have this
-/// name.
+/// Key for all bundles together that the broker does not start itself. No bundle can have this name.
 const EVERYBODY: &str = "";
 
 /// Number of registration changes of one name.
@@ -164,8 +162,7 @@ impl State {
         let settings = &self.settings;
         let started = bundle.launch.map(Launch::started);
         if self.children.contains_key(name) && bundle.accepted_spec != started {
-            // The bundle did not cause the change: the user has changed the program that the broker
-            // starts.
+            // The bundle did not cause the change: the user has changed the program that the broker starts.
             return self.now;
         }
         let of = |name: &str, forgiven: u32, longest: Duration| {
@@ -179,8 +176,7 @@ impl State {
             return own;
         }
         let all = settings.changes_forgiven.saturating_mul(8);
-        // The pause of the common key stays short, because a well-behaved new bundle also waits for
-        // it.
+        // The pause of the common key stays short, because a well-behaved new bundle also waits for it.
         own.max(of(EVERYBODY, all, settings.distrust * 4))
     }
 

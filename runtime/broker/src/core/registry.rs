@@ -3,7 +3,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-use std::time::Duration;
 
 use qcbus_document::FileKind;
 use qcbus_messages::JobId;
@@ -27,8 +26,7 @@ impl State {
         self.epoch
     }
 
-    /// Adds a bundle from the journal. Unwanted children are removed as soon as the wanted children
-    /// are known.
+    /// Adds a bundle from the journal. Unwanted children are removed as soon as the wanted children are known.
     pub fn remember_member(&mut self, member: Member) {
         let bundle = Bundle {
             version_digest: member
@@ -134,8 +132,7 @@ impl State {
             actions.extend(bundle.as_member(name).map(Action::Enrol));
             self.begin_epoch();
         }
-        // This also applies to a bundle that returns, because jobs that finished without it are not
-        // settled.
+        // This also applies to a bundle that returns, because jobs that finished without it are not settled.
         self.reseat = true;
     }
 
@@ -241,8 +238,7 @@ impl State {
         })
     }
 
-    /// Returns the bundles that the configuration names and that were never seen. A named shadow is
-    /// not required.
+    /// Returns the bundles that the configuration names and that were never seen. A named shadow is not required.
     pub(super) fn missing_by_name(&self) -> Vec<String> {
         let means = |named: &str, name: &str, alias: &str| self.demand.means(named, name, alias);
         let is_shadow = |named: &str| {
@@ -268,8 +264,7 @@ impl State {
         self.requirements.get(&kind).cloned().unwrap_or_default()
     }
 
-    /// Checks whether a verdict was given under the current configuration by the bundles that are
-    /// required now.
+    /// Checks whether a verdict was given under the current configuration by the bundles that are required now.
     pub(super) fn stands(&self, kind: FileKind, judged: &Judged) -> bool {
         let requirements = self.requirements(kind);
         let same = |(requirement, required_bundle): (&Requirement, &RequiredBundle)| {
@@ -402,11 +397,5 @@ impl State {
                     || !self.is_served_by(requirement, version_digest)
             }
         }
-    }
-
-    /// Returns how long a bundle has been missing, or `None` if it is connected.
-    pub(super) fn away_for(&self, bundle: &Bundle) -> Option<Duration> {
-        let since = bundle.away_since.filter(|_| bundle.session.is_none())?;
-        Some(self.now.saturating_sub(since))
     }
 }

@@ -1,5 +1,4 @@
-//! Missing reports: finds the reporters that have not reported a verdict yet, for clients that wait
-//! for reports.
+//! Missing reports: finds the reporters that have not reported a verdict yet, for clients that wait for reports.
 
 use std::collections::BTreeSet;
 

@@ -84,8 +84,7 @@ impl Setup {
         self.state.settings.collect = Duration::MAX;
     }
 
-    /// Makes the verdict valid: no bundle is required now, and the verdict is about the present
-    /// bytes.
+    /// Makes the verdict valid: no bundle is required now, and the verdict is about the present bytes.
     fn makes_it_stand(&mut self) {
         let config = self.state.config;
         let path = self.path.clone();
@@ -372,8 +371,7 @@ fn an_upgraded_reporter_finishes(ends: fn(&mut Setup, SessionId, Launch) -> Vec<
     assert!(actions.iter().any(given), "{actions:?}");
 }
 
-/// Adds further judged files with these numbers of findings. The reporter does not have their
-/// results.
+/// Adds further judged files with these numbers of findings. The reporter does not have their results.
 fn more(setup: &mut Setup, findings: &[u64]) {
     for (number, count) in (8..).zip(findings) {
         let path: Arc<Path> = Path::new(&format!("/x/{number}.xodr")).into();

@@ -72,8 +72,7 @@ impl Reporter {
         self.retries.len() as u64 + self.not_withdrawn
     }
 
-    /// Returns the remark for the user: the missing reports and their reason, or the reason why it
-    /// is down.
+    /// Returns the remark for the user: the missing reports and their reason, or the reason why it is down.
     pub fn remark(&self, now: Duration) -> String {
         let missing = self.unreported();
         if missing == 0 {
@@ -151,9 +150,8 @@ impl State {
         self.deliver(index, actions);
     }
 
-    /// Lets a newer process of the same name take over. The older process finishes its work. Until
-    /// it has ended, no newer results of its files are sent, because it could overwrite their
-    /// reports.
+    /// Lets a newer process of the same name take over. The older process finishes its work. Until it has ended, no
+    /// newer results of its files are sent, because it could overwrite their reports.
     fn reporter_is_replaced(
         &mut self,
         index: u32,

@@ -86,8 +86,7 @@ pub struct RequiredBundle {
     pub version_digest: Option<VersionDigest>,
 }
 
-/// The required bundles of a file, by name. A verdict is valid as long as its required set stays
-/// the same.
+/// The required bundles of a file, by name. A verdict is valid as long as its required set stays the same.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct RequiredSet(pub Vec<RequiredBundle>);
 
@@ -120,8 +119,7 @@ pub(super) struct Requirement {
 pub enum Origin {
     /// It has a manifest or belongs to the program. It leaves the registry with its manifest.
     Supervised,
-    /// It was started by another process and has joined. It leaves by draining or when a user
-    /// removes it.
+    /// It was started by another process and has joined. It leaves by draining or when a user removes it.
     Joined,
 }
 

@@ -1,10 +1,9 @@
 //! Files that a file rests on: its map, its catalogs and the scenarios that it consists of.
 //!
-//! An accepted file can be run. Therefore its verdict is the worst of its own verdict and the
-//! verdicts of the files that it rests on. Those verdicts may come earlier or later. A job with the
-//! answers of all bundles waits for them. It moves these files to the front of the queue. If a
-//! verdict was given without one of them, or one has changed, the verdict is given again. Thus it
-//! does not depend on the order of the files.
+//! An accepted file can be run. Therefore its verdict is the worst of its own verdict and the verdicts of the files
+//! that it rests on. Those verdicts may come earlier or later. A job with the answers of all bundles waits for them.
+//! It moves these files to the front of the queue. If a verdict was given without one of them, or one has changed,
+//! the verdict is given again. Thus it does not depend on the order of the files.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -22,14 +21,12 @@ use super::{Actions, State};
 /// such as a hanging bundle, must not block the places of other jobs. After this time the verdict
 /// is undetermined until the missing verdict comes.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// The same limit in a run. A run reports each verdict once, so a later verdict would be lost. No
-/// job takes longer.
+/// The same limit in a run. A run reports each verdict once, so a later verdict would be lost. No job takes longer.
 const PATIENCE_OF_A_RUN: Duration = Duration::from_secs(600);
 
 impl State {
-    /// Returns when a job with the answers of all bundles may be stored. This is at once, unless it
-    /// waits for the verdict on a file that it rests on. Moves such files to the front of the
-    /// queue.
+    /// Returns when a job with the answers of all bundles may be stored. This is at once, unless it waits for the
+    /// verdict on a file that it rests on. Moves such files to the front of the queue.
     pub(super) fn storable_at(&mut self, id: JobId) -> Duration {
         let waited: Vec<Referenced> = self.awaited_by(id);
         for file in &waited {
@@ -64,8 +61,7 @@ impl State {
     /// Checks whether a verdict on these bytes is still expected.
     fn may_come(&self, file: &Referenced, prepared: &PreparedJob) -> bool {
         let Some(entry) = self.entry_of(&file.path) else {
-            // The file exists, but the watcher has not reported it yet. A run knows all its files
-            // after its scan.
+            // The file exists, but the watcher has not reported it yet. A run knows all its files after its scan.
             return !(self.settings.once && self.scanned);
         };
         let judged = entry.judged.as_ref();
@@ -188,8 +184,7 @@ impl State {
         self.files.get(self.files.id(path)?)
     }
 
-    /// Handles the end of the scan: all files are known, so no job waits for an unknown file any
-    /// more.
+    /// Handles the end of the scan: all files are known, so no job waits for an unknown file any more.
     pub(super) fn all_are_known(&mut self) {
         let waiting: Vec<JobId> = self.jobs.keys().copied().collect();
         for id in waiting {
@@ -197,9 +192,8 @@ impl State {
         }
     }
 
-    /// Judges files again that have used an outdated verdict on another file. This happens if a
-    /// broker was killed between the two verdicts. Files that rest on a file without verdicts are
-    /// judged again as well.
+    /// Judges files again that have used an outdated verdict on another file. This happens if a broker was killed
+    /// between the two verdicts. Files that rest on a file without verdicts are judged again as well.
     pub(super) fn count_again(&mut self) {
         let files = self.files.iter().filter(|(_, entry)| entry.present);
         let outdated = files.filter(|(_, entry)| {
@@ -245,8 +239,7 @@ impl State {
         self.files.enqueue(id, priority, self.now);
     }
 
-    /// Handles a confirmed verdict or the end of a job. The jobs and clients that waited for it are
-    /// checked again.
+    /// Handles a confirmed verdict or the end of a job. The jobs and clients that waited for it are checked again.
     pub(super) fn verdict_has_come(&mut self, file: FileId, actions: &mut Actions) {
         for dependent in self.dependents_of(file) {
             match self.files.get(dependent).map(FileEntry::stage) {
@@ -274,8 +267,7 @@ impl State {
         }
     }
 
-    /// Checks whether a job has the answers of all bundles and waits for verdicts that its own
-    /// rests on.
+    /// Checks whether a job has the answers of all bundles and waits for verdicts that its own rests on.
     pub(super) fn is_held_up(&self, id: JobId) -> bool {
         let job = self.jobs.get(&id);
         job.is_some_and(|job| matches!(job.stage, JobStage::Finished(at) if at > self.now))
@@ -290,8 +282,7 @@ impl State {
         }
     }
 
-    /// Handles a new verdict on a file. Files that rest on it and have used another verdict are
-    /// judged again.
+    /// Handles a new verdict on a file. Files that rest on it and have used another verdict are judged again.
     pub(super) fn counts_for_others(&mut self, file: FileId, now: &Judged) {
         let Some(path) = self.files.get(file).map(|entry| entry.path.clone()) else {
             return;

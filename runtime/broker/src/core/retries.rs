@@ -13,8 +13,7 @@ const PROBES: usize = 16;
 /// Longest pause between two tries.
 const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 
-/// Failed reports of one reporter. Some are retried after a pause, and all as soon as one retry
-/// succeeds.
+/// Failed reports of one reporter. Some are retried after a pause, and all as soon as one retry succeeds.
 #[derive(Debug, Default)]
 pub(super) struct Retries {
     waiting: BTreeSet<FileId>,

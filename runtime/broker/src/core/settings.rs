@@ -33,8 +33,7 @@ pub struct Settings {
     pub backoff_max: Duration,
     /// A child that has run this long counts as healthy, and its pauses start again.
     pub healthy_after: Duration,
-    /// Maximum number of restarts within `restart_window`. Beyond it the broker gives up on a
-    /// child.
+    /// Maximum number of restarts within `restart_window`. Beyond it the broker gives up on a child.
     pub max_restarts: u32,
     /// See `max_restarts`.
     pub restart_window: Duration,
@@ -62,8 +61,7 @@ pub struct Settings {
     /// Maximum time that a file waits for room while no job progresses. After that its verdict is
     /// undetermined, and it is retried like an unreadable file.
     pub room_limit: Duration,
-    /// Pause before a file without a place on the bus is retried, unless a place becomes free
-    /// earlier.
+    /// Pause before a file without a place on the bus is retried, unless a place becomes free earlier.
     pub busy_pause: Duration,
     /// First pause before a file is read again after a temporary failure. It doubles up to the
     /// maximum, after which a verdict states the failure.

@@ -244,8 +244,7 @@ impl State {
         }
     }
 
-    /// Checks whether a bundle is shown as slow. This is so if jobs accumulate at it and at no
-    /// other bundle.
+    /// Checks whether a bundle is shown as slow. This is so if jobs accumulate at it and at no other bundle.
     fn is_slowest(&self, name: &str, waiting: usize) -> bool {
         let others = self.bundles.iter().filter(|(other, _)| *other != name);
         waiting >= 4 && others.map(|(_, it)| it.queue.len()).max().unwrap_or(0) * 4 <= waiting

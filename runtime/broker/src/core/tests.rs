@@ -236,8 +236,7 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(worlds() / 4))]
 
-    /// Checks that a broker always stops once after it is told to, and that every waiting client
-    /// gets an answer.
+    /// Checks that a broker always stops once after it is told to, and that every waiting client gets an answer.
     #[test]
     fn every_broker_stops_after_random_steps(steps in steps()) {
         let mut world = World::with_a_reporter();
@@ -347,8 +346,7 @@ fn file_that_kills_bundle_twice_alone_is_not_retried() {
         rounds += 1;
         assert!(rounds < 100, "the attempts with a deadly file must end");
     }
-    // It dies once together with other jobs (this does not count), then twice alone in a fresh
-    // process.
+    // It dies once together with other jobs (this does not count), then twice alone in a fresh process.
     assert_eq!(deaths, 3);
     assert_eq!(world.judged[&1].1, Verdict::Undetermined);
     world.settle();
@@ -409,8 +407,7 @@ fn files_are_judged_again_without_bundle_that_left() {
     assert_eq!(world.stored.len(), stored + 1);
 }
 
-/// Returns a world with a bundle that a former broker started (it has a launch) and that no
-/// manifest names any more.
+/// Returns a world with a bundle that a former broker started (it has a launch) and that no manifest names any more.
 fn world_with_an_unwanted_bundle() -> (World, SessionId) {
     let mut world = World::new();
     world.join("First");

@@ -65,8 +65,7 @@ pub struct Stamp {
     pub size: u64,
     /// Modification time in nanoseconds since 1970, negative for earlier times.
     pub mtime_ns: i128,
-    /// Time of the last change of content or metadata. It is needed because the modification time
-    /// can be set freely.
+    /// Time of the last change of content or metadata. It is needed because the modification time can be set freely.
     pub ctime_ns: i128,
     /// Inode. It is needed because a rename can keep size and time.
     pub inode: u64,
@@ -154,15 +153,13 @@ pub struct PreparedJob {
     pub missing: Vec<MissingDocument>,
     /// Documents that the root rests on and that get their own verdicts.
     pub rests_on: Vec<Referenced>,
-    /// Files that the root rests on and that get no verdict, because they are outside all watched
-    /// directories.
+    /// Files that the root rests on and that get no verdict, because they are outside all watched directories.
     pub unwatched: Vec<Referenced>,
     /// Source bytes in total.
     pub bytes: u64,
 }
 
-/// A file with its own verdict that another file rests on: its map, a used catalog, or a scenario
-/// in it.
+/// A file with its own verdict that another file rests on: its map, a used catalog, or a scenario in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Referenced {
     /// Absolute path, under which it is judged.

@@ -79,16 +79,14 @@ impl Broker {
         true
     }
 
-    /// Answers a request. The error is ignored, because a client that has disconnected needs no
-    /// answer.
+    /// Answers a request. The error is ignored, because a client that has disconnected needs no answer.
     fn answer(&mut self, request_id: RequestId, response: Response) {
         if let Some(answer) = self.request_ids.remove(&request_id) {
             let _ = answer.send(response);
         }
     }
 
-    /// Hands an action about one file on the disk or in the journal to its writer. The writer keeps
-    /// the order.
+    /// Hands an action about one file on the disk or in the journal to its writer. The writer keeps the order.
     fn order(&mut self, action: Action) {
         let (path, order) = match action {
             Action::Withdraw { path, reporters } => {
@@ -130,8 +128,7 @@ impl Broker {
             .order(&path, Order::Store { job, config, root });
     }
 
-    /// Pools an on-demand check outside the writers, so that the client does not wait for other
-    /// results.
+    /// Pools an on-demand check outside the writers, so that the client does not wait for other results.
     fn pool_on_demand(&mut self, mut job: Box<FinishedJob>) {
         let root = self.intake.root(job.job);
         let config = self.in_force.config.clone();
@@ -207,9 +204,8 @@ impl Broker {
         }));
     }
 
-    /// Records a registry change in the journal before any bundle judges under it. This is rare, so
-    /// the loop can wait for it. If the journal cannot be written now, a writer retries until it
-    /// can.
+    /// Records a registry change in the journal before any bundle judges under it. This is rare, so the loop can wait
+    /// for it. If the journal cannot be written now, a writer retries until it can.
     fn remember_at_once(&mut self, entry: Entry) {
         if !self.journal_is_behind {
             let Err(why) = self.store.record(std::slice::from_ref(&entry)) else {
@@ -252,8 +248,7 @@ impl Broker {
                 // The job has ended meanwhile.
                 return intake.release(job);
             }
-            // This overrides any result, because a disk that does not respond must not count as a
-            // missing file.
+            // This overrides any result, because a disk that does not respond must not count as a missing file.
             if let Some((at, why)) = attendance.moment() {
                 let reason = format!("read {}: {why}", to_text(&at));
                 result = Err(PrepareFailure::Moment(reason));

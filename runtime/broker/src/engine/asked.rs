@@ -231,8 +231,7 @@ impl Broker {
                     path: path.clone(),
                     stamp,
                 },
-                // The watcher decides whether the file was removed or its whole watched directory
-                // is missing.
+                // The watcher decides whether the file was removed or its whole watched directory is missing.
                 (None, Some(_)) => Event::Unfinished {
                     path: path.clone(),
                     stamp,
@@ -284,8 +283,7 @@ impl Broker {
         Ok(changes)
     }
 
-    /// Removes the notices about former configurations and manifests. The notices about the current
-    /// ones remain.
+    /// Removes the notices about former configurations and manifests. The notices about the current ones remain.
     fn forget_older_attempts(&mut self) {
         self.state.is_over(|it| matches!(it, Notice::Loading(_)));
         for notice in &self.loaded.notices {
@@ -342,8 +340,7 @@ impl Broker {
         self.reload_and_say();
     }
 
-    /// Reads configuration and manifests again for a service manager. A stopping broker does not
-    /// need them.
+    /// Reads configuration and manifests again for a service manager. A stopping broker does not need them.
     pub(super) fn reload_on_signal(&mut self) {
         if !self.state.draining() {
             tracing::info!("SIGHUP: reloading configuration and manifests");
@@ -351,8 +348,7 @@ impl Broker {
         }
     }
 
-    /// Reloads and reports the outcome in the log and in the status, because no client waits for an
-    /// answer.
+    /// Reloads and reports the outcome in the log and in the status, because no client waits for an answer.
     fn reload_and_say(&mut self) {
         match self.reload() {
             Ok(changes) if changes.is_empty() => {}

@@ -12,10 +12,9 @@ use crate::reload::Loaded;
 /// The first generation of an unused instance.
 const FIRST_GENERATION: u64 = 1;
 
-/// Starts the children early. This is possible if the broker is the only one of its instance,
-/// because its children are then known beforehand. Otherwise, and if the early start fails, they
-/// are started later. If the bus has no room, no child is started early. The broker then retries
-/// until room is free.
+/// Starts the children early. This is possible if the broker is the only one of its instance, because its children
+/// are then known beforehand. Otherwise, and if the early start fails, they are started later. If the bus has no
+/// room, no child is started early. The broker then retries until room is free.
 pub(super) fn early_children(
     options: &mut Options,
     loaded: &Loaded,

@@ -190,8 +190,7 @@ impl Broker {
         let inbox = self.inbox.looked_in.clone();
         let sent = self.looks.probes.send(move || {
             let seen = see();
-            // The number follows right after the start. A failed send is ignored, because the loop
-            // has ended.
+            // The number follows right after the start. A failed send is ignored, because the loop has ended.
             if let Ok(probe) = told.recv() {
                 let _ = inbox.send(Looked { probe, seen });
             }
@@ -280,8 +279,7 @@ impl Broker {
         let (path, seconds) = (to_text(&overdue.path), overdue.waited.as_secs());
         let reason = format!("read {path}: the system has not responded for {seconds} s");
         if let Some(look) = self.looks.pending.remove(&owner) {
-            // The answer is the same as after a timeout: there is no verdict, but the request is
-            // valid.
+            // The answer is the same as after a timeout: there is no verdict, but the request is valid.
             let _ = look.answer.send(Response::Unanswered { reason });
             return;
         }

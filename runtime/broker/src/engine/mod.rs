@@ -141,13 +141,11 @@ pub struct Broker {
     request_ids: HashMap<RequestId, oneshot::Sender<Response>>,
     downs: Vec<oneshot::Sender<Response>>,
     next_request_id: u64,
-    /// Paths of withdrawn results, by reporter and file. They are kept until the reporter has
-    /// withdrawn its report.
+    /// Paths of withdrawn results, by reporter and file. They are kept until the reporter has withdrawn its report.
     left: HashMap<(String, Arc<Path>), PathBuf>,
     /// Results were stored or delivered since free memory was last returned.
     untrimmed: bool,
-    /// A registry change could not be recorded at once. From then on a writer records the changes,
-    /// in order.
+    /// A registry change could not be recorded at once. From then on a writer records the changes, in order.
     journal_is_behind: bool,
     inbox: Inbox,
     tell: Box<dyn FnMut(Told) + Send>,

@@ -26,8 +26,7 @@ pub fn simulate(options: &Options, tell: impl FnMut(Told) + Clone + Send + 'stat
     loop {
         match Broker::start(options.clone(), tell.clone()) {
             Ok(broker) => return broker.run_simulated(),
-            // Another test of this process may be starting a program, which briefly inherits the
-            // open descriptors.
+            // Another test of this process may be starting a program, which briefly inherits the open descriptors.
             Err(error) if is_held(&error) => std::thread::yield_now(),
             Err(error) => panic!("cannot start a simulated broker: {error}"),
         }

@@ -1,5 +1,4 @@
-//! Stores of a starting broker: opens the journal, the results directory and the gate, and reads
-//! their content.
+//! Stores of a starting broker: opens the journal, the results directory and the gate, and reads their content.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -49,8 +48,7 @@ pub(super) fn journal_of(options: &Options) -> Result<Option<Journal>, JournalEr
     opened.transpose()
 }
 
-/// Returns the first new number and the registry from the journal. Both are empty without a
-/// journal.
+/// Returns the first new number and the registry from the journal. Both are empty without a journal.
 pub(super) fn remembered_by(journal: Option<&Journal>) -> Result<(u64, Vec<Member>), JournalError> {
     let Some(journal) = journal else {
         return Ok((0, Vec::new()));

@@ -1,8 +1,7 @@
 //! Watcher of the loop, and its replacement when it waits for a file that does not respond.
 //!
-//! A thread that waits for a disk in vain cannot be ended, but another one can take over its work.
-//! The I/O watchdog keeps the new thread away from that disk. Messages of the old thread are
-//! ignored if it ever returns.
+//! A thread that waits for a disk in vain cannot be ended, but another one can take over its work. The I/O watchdog
+//! keeps the new thread away from that disk. Messages of the old thread are ignored if it ever returns.
 
 use std::path::PathBuf;
 use std::sync::Arc;

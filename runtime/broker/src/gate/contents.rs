@@ -56,9 +56,8 @@ pub(super) fn refuse_foreign(directory: &Path) -> Result<(), GateError> {
     })
 }
 
-/// Returns everything below the directory except directories and the gate's own file, with sizes in
-/// bytes. Unreadable directories, such as `lost+found`, are skipped because they contain no
-/// published files.
+/// Returns everything below the directory except directories and the gate's own file, with sizes in bytes. Unreadable
+/// directories, such as `lost+found`, are skipped because they contain no published files.
 pub(super) fn files(directory: &Path) -> io::Result<HashMap<PathBuf, u64>> {
     let mut found = HashMap::new();
     let mut open = vec![directory.to_path_buf()];
@@ -75,8 +74,7 @@ pub(super) fn files(directory: &Path) -> io::Result<HashMap<PathBuf, u64>> {
             if data.is_dir() {
                 open.push(entry.path());
             } else if entry.file_name() != GATE_FILE || next != *directory {
-                // Another program can change an entry that is no regular file, or has another hard
-                // link, at any time.
+                // Another program can change an entry that is no regular file, or has another hard link, at any time.
                 let is_ours = data.is_file() && data.nlink() == 1;
                 let size = if is_ours { data.len() } else { u64::MAX };
                 found.insert(entry.path(), size);

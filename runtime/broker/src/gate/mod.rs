@@ -1,12 +1,11 @@
-//! The gate: a directory that contains accepted files only. Each file in it is complete and was
-//! judged with exactly these bytes.
+//! The gate: a directory that contains accepted files only. Each file in it is complete and was judged with exactly
+//! these bytes.
 //!
-//! A *publication* is an acceptance with the digests of all files that it depends on. A file is
-//! published if it has a publication and its judged dependencies are published with the same bytes,
-//! too. A judged dependency lies below the watched directories and gets its own verdict. Other
-//! dependencies (an included file, an ignored file) are published with the file. The accepted file
-//! gets its name last and loses it first, so it is never there without its dependencies. Only files
-//! that refer to each other appear one after the other.
+//! A *publication* is an acceptance with the digests of all files that it depends on. A file is published if it has a
+//! publication and its judged dependencies are published with the same bytes, too. A judged dependency lies below the
+//! watched directories and gets its own verdict. Other dependencies (an included file, an ignored file) are published
+//! with the file. The accepted file gets its name last and loses it first, so it is never there without its
+//! dependencies. Only files that refer to each other appear one after the other.
 
 mod contents;
 mod publications;
@@ -119,8 +118,7 @@ impl Gate {
         self.lock.hold().map_err(io::Error::other)
     }
 
-    /// Restores the marker file, by which a start recognises the gate, if only this file was
-    /// removed.
+    /// Restores the marker file, by which a start recognises the gate, if only this file was removed.
     pub fn keep_its_file(&self) {
         if self.lock.has_lost_its_file() {
             // The next write into the directory reports the error.
@@ -293,8 +291,7 @@ impl Gate {
         failed.map_or(Ok(()), Err)
     }
 
-    /// Records a failed publication. A permanent error, such as an obstacle at the place, is not
-    /// retried.
+    /// Records a failed publication. A permanent error, such as an obstacle at the place, is not retried.
     fn not_published(
         &self,
         path: &Arc<Path>,
@@ -313,8 +310,7 @@ impl Gate {
         (self.options.say)(held(path, &why));
     }
 
-    /// Returns the number of published files, and examples of accepted files that are not
-    /// published.
+    /// Returns the number of published files, and examples of accepted files that are not published.
     pub fn status(&self) -> GateStatus {
         let publications = self.publications();
         let mut status = GateStatus {
@@ -382,8 +378,7 @@ impl Gate {
         }
     }
 
-    /// Copies the accepted bytes. Returns `None` if a file has other bytes by now and gets its own
-    /// verdict.
+    /// Copies the accepted bytes. Returns `None` if a file has other bytes by now and gets its own verdict.
     fn copy(&self, plan: &Plan) -> io::Result<Option<Copies>> {
         let mut copies = Copies::new();
         for (path, digest) in &plan.lacking {

@@ -20,8 +20,7 @@ pub(super) struct Need {
     pub(super) digest: Digest,
     /// Size in bytes.
     pub(super) size: u64,
-    /// Whether the file gets a verdict of its own. Otherwise it lies behind the gate for the files
-    /// that need it.
+    /// Whether the file gets a verdict of its own. Otherwise it lies behind the gate for the files that need it.
     pub(super) judged: bool,
 }
 
@@ -60,8 +59,7 @@ struct Lying {
 /// Files that are published in one step.
 #[derive(Debug)]
 pub(super) struct Plan {
-    /// Accepted files with the serial numbers of their publications. Each comes after those that it
-    /// depends on.
+    /// Accepted files with the serial numbers of their publications. Each comes after those that it depends on.
     roots: Vec<(Arc<Path>, u64)>,
     /// Files that do not lie behind the gate yet.
     pub(super) lacking: Vec<(Arc<Path>, Digest)>,
@@ -234,8 +232,7 @@ impl Publications {
         PublicationState::Ready(plan)
     }
 
-    /// Returns the reason why a file is not published: it is refused, or a need was not accepted
-    /// with these bytes.
+    /// Returns the reason why a file is not published: it is refused, or a need was not accepted with these bytes.
     fn held(&self, publication: &Publication) -> Option<PublicationState> {
         if let Some(why) = &publication.refused {
             return Some(PublicationState::HeldBack {
@@ -268,8 +265,7 @@ impl Publications {
             || self.refused.contains(&need.path)
     }
 
-    /// Returns the files that lie behind the gate for one publication. The accepted file is the
-    /// last.
+    /// Returns the files that lie behind the gate for one publication. The accepted file is the last.
     fn files_of(&self, path: &Arc<Path>, publication: &Publication) -> Vec<(Arc<Path>, Digest)> {
         let fragments = publication
             .needs
@@ -334,8 +330,7 @@ impl Publications {
         })
     }
 
-    /// Gives the files of one publication their names. The accepted file is the last, which
-    /// publishes it.
+    /// Gives the files of one publication their names. The accepted file is the last, which publishes it.
     fn put(&mut self, root: &Arc<Path>, copies: &mut Copies) -> io::Result<()> {
         let Some(publication) = self.get(root) else {
             return Ok(());
@@ -450,9 +445,8 @@ impl Publications {
         Ok(())
     }
 
-    /// Marks every publication as published if its files are completely behind the gate. `lies`
-    /// checks whether a file with these bytes is in its place. Drops the other publications and
-    /// returns their files.
+    /// Marks every publication as published if its files are completely behind the gate. `lies` checks whether a file
+    /// with these bytes is in its place. Drops the other publications and returns their files.
     pub(super) fn take_over(
         &mut self,
         mut lies: impl FnMut(&Path, u64, Digest) -> bool,
@@ -510,8 +504,7 @@ fn name(copy: Temporary, place: &Path) -> io::Result<()> {
     }
 }
 
-/// Returns all paths reachable through `before`. Each comes after the paths that `before` returns
-/// for it.
+/// Returns all paths reachable through `before`. Each comes after the paths that `before` returns for it.
 fn each_after(start: Vec<Arc<Path>>, before: impl Fn(&Path) -> Vec<Arc<Path>>) -> Vec<Arc<Path>> {
     let mut order = Vec::new();
     let mut seen: HashSet<Arc<Path>> = HashSet::new();

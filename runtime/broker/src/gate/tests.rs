@@ -1,5 +1,4 @@
-//! Tests of the gate: a few files in a temporary directory with a gate beside it, and calls in any
-//! order.
+//! Tests of the gate: a few files in a temporary directory with a gate beside it, and calls in any order.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,8 +10,7 @@ use super::*;
 use crate::core::{Epoch, Reading, RequiredSet};
 use crate::stamp::stamp_through_links;
 
-/// Files with the inputs of each. Maps include fragments, scenarios have maps and scenarios; two
-/// refer to each other.
+/// Files with the inputs of each. Maps include fragments, scenarios have maps and scenarios; two refer to each other.
 const FARM: [(&str, &[&str]); 7] = [
     ("part.xml", &[]),
     ("a.xodr", &["part.xml"]),
@@ -497,8 +495,7 @@ fn publications_of_different_bytes_wait_for_verdict() {
     let stale = bench.judged("s.xosc");
     let path = bench.path("s.xosc");
     bench.gate.accept(&path, &stale).unwrap();
-    // The bytes that the map was accepted with are back. Those that the scenario was accepted with
-    // are not.
+    // The bytes that the map was accepted with are back. Those that the scenario was accepted with are not.
     bench.write("part.xml", "1");
     bench.gate.accept(&path, &stale).unwrap();
     assert!(!bench.behind().contains("s.xosc"));

@@ -80,8 +80,7 @@ pub(super) fn explained(failure: Failure, path: &Path) -> PrepareFailure {
             unreadable(path, format!("{} is too large for the bus", to_text(path)))
         }
         Failure::Loan(LoanError::Busy) => PrepareFailure::Busy,
-        // Waiting does not help until the shared memory is enlarged. The file is tried again like
-        // an unreadable file.
+        // Waiting does not help until the shared memory is enlarged. The file is tried again like an unreadable file.
         Failure::Loan(error @ (LoanError::NeverFits { .. } | LoanError::AddressSpace { .. })) => {
             unreadable(path, format!("cannot publish {}: {error}", to_text(path)))
         }
@@ -90,8 +89,7 @@ pub(super) fn explained(failure: Failure, path: &Path) -> PrepareFailure {
     }
 }
 
-/// Returns a temporary failure: the bus has no room or could not accept the image. The file is not
-/// the cause.
+/// Returns a temporary failure: the bus has no room or could not accept the image. The file is not the cause.
 fn unpublished(path: &Path, error: &dyn std::fmt::Display) -> PrepareFailure {
     PrepareFailure::NoRoom(format!("cannot publish {}: {error}", to_text(path)))
 }

@@ -1,5 +1,4 @@
-//! Dependencies of one job: the documents that it publishes on the bus, and every file that was
-//! looked up.
+//! Dependencies of one job: the documents that it publishes on the bus, and every file that was looked up.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -73,8 +72,7 @@ impl Gathered {
         }
     }
 
-    /// Records an input that exists but could not be read. When it changes, the verdict becomes
-    /// invalid.
+    /// Records an input that exists but could not be read. When it changes, the verdict becomes invalid.
     fn unread(&mut self, path: &Path, stamp: Option<Stamp>) {
         if let Some(stamp) = stamp {
             self.inputs
@@ -96,8 +94,7 @@ impl Gathered {
             });
     }
 
-    /// Records a directory listing. When a file appears or disappears in it, the verdict becomes
-    /// invalid.
+    /// Records a directory listing. When a file appears or disappears in it, the verdict becomes invalid.
     fn listing(&mut self, directory: &Path) {
         let stamp = stamp_through_links(directory);
         let content = stamp.map_or(Reading::Absent, |stamp| {
@@ -114,9 +111,8 @@ impl Gathered {
         );
     }
 
-    /// Returns the documents that the root depends on: those with a verdict of their own, and those
-    /// that could have one. `judged_as` returns the path for a verdict. A member of an archive is
-    /// judged with its archive.
+    /// Returns the documents that the root depends on: those with a verdict of their own, and those that could have
+    /// one. `judged_as` returns the path for a verdict. A member of an archive is judged with its archive.
     fn rests_on(&self, judged_as: &JudgedAs) -> (Vec<Referenced>, Vec<Referenced>) {
         let root = self.root.first().map(|input| &*input.path);
         let documents = self.documents.iter().zip(&self.rests_on);
@@ -202,12 +198,10 @@ impl Source for Links<'_> {
     type Halt = PrepareFailure;
 
     fn fetch(&mut self, path: &Path) -> Result<Result<Published, Absence>, PrepareFailure> {
-        // The stamp is taken first: if the file changes during the attempt, the stamp no longer
-        // matches.
+        // The stamp is taken first: if the file changes during the attempt, the stamp no longer matches.
         let before = stamp_through_links(path);
         let published = match is_member(path) {
-            // A member comes from an archive that belongs to this job alone, or that was just read
-            // for it.
+            // A member comes from an archive that belongs to this job alone, or that was just read for it.
             true => self.intake.publish_fresh(&self.manner, path),
             false => self.intake.publish_shared(&self.manner, path, self.asked),
         };
@@ -299,8 +293,7 @@ fn unreadable_now(path: &Path, limits: &Limits) -> Option<Stamp> {
     (!is_readable).then_some(stamp)
 }
 
-/// Checks whether a file changed so recently that its stamp proves nothing. Call this when the file
-/// is read.
+/// Checks whether a file changed so recently that its stamp proves nothing. Call this when the file is read.
 pub(super) fn was_racy(input: &Input) -> bool {
     input.content.stamp().is_some_and(is_racy)
 }
@@ -315,8 +308,7 @@ pub(super) fn has_its_stamps(input: &Input) -> bool {
     stamp_through_links(&input.path) == input.content.stamp()
 }
 
-/// Checks whether two readings give the same image: the same files with the same bytes, and all
-/// files could be read.
+/// Checks whether two readings give the same image: the same files with the same bytes, and all files could be read.
 pub(super) fn same_bytes(one: &[Input], other: &[Input]) -> bool {
     let same = |(one, other): (&Input, &Input)| {
         one.path == other.path && one.digest().is_some() && one.digest() == other.digest()

@@ -1,5 +1,4 @@
-//! Turns a path into published document images. Only this module reads the files that the broker
-//! checks.
+//! Turns a path into published document images. Only this module reads the files that the broker checks.
 
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet, VecDeque};
@@ -52,8 +51,7 @@ impl std::fmt::Debug for Intake {
 /// Function that returns the path under which a file gets a verdict of its own, or `None`.
 pub type JudgedAs = dyn Fn(&Path) -> Option<Arc<Path>> + Send + Sync;
 
-/// Returns the same in a run. A run judges all files that its files depend on, except excluded
-/// ones.
+/// Returns the same in a run. A run judges all files that its files depend on, except excluded ones.
 pub fn judged_in_a_run(path: &Path) -> Option<Arc<Path>> {
     let is_judged = |path: &Path| FileKind::of_path(path).is_some() && !is_excluded(path);
     if is_judged(path) {
@@ -66,8 +64,7 @@ pub fn judged_in_a_run(path: &Path) -> Option<Arc<Path>> {
 /// Boundary for the includes of a job's files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Within {
-    /// Files in the watched directory of the including file. Outside of all watched directories:
-    /// files next to it.
+    /// Files in the watched directory of the including file. Outside of all watched directories: files next to it.
     Watched,
     /// Files next to the including file, as if no directory were watched.
     Beside,
@@ -180,8 +177,7 @@ impl Intake {
         lock(&self.held).get(&job).cloned().unwrap_or_default()
     }
 
-    /// Returns the root document of a job that is being stored or ended recently. It may still be
-    /// on the bus.
+    /// Returns the root document of a job that is being stored or ended recently. It may still be on the bus.
     pub fn recent_root(&self, job: JobId) -> Option<DocId> {
         let held = lock(&self.held)
             .get(&job)
@@ -292,8 +288,7 @@ impl Intake {
         self.publish(archive, &prepared).map(Some)
     }
 
-    /// Publishes the expansion of a modular scenario. It has the same dependencies as its
-    /// documents.
+    /// Publishes the expansion of a modular scenario. It has the same dependencies as its documents.
     fn publish_expanded(&self, expanded: &ExpandedImage<'_, '_>) -> Result<Published, Failure> {
         let mut loan = self.loan(expanded.upper_bound())?;
         let used = expanded
@@ -348,9 +343,8 @@ impl Intake {
         })
     }
 
-    /// Parses directly into shared memory. The upper bound is an estimate. It is often too large,
-    /// which matters only when there is little room. Many resolved entities can exceed it; then the
-    /// builder returns the exact size.
+    /// Parses directly into shared memory. The upper bound is an estimate. It is often too large, which matters only
+    /// when there is little room. Many resolved entities can exceed it; then the builder returns the exact size.
     fn build(&self, prepared: &Prepared) -> Result<(Loan, usize), Failure> {
         let mut room = prepared.upper_bound();
         loop {
@@ -372,8 +366,7 @@ impl Intake {
         }
     }
 
-    /// Reserves room for an image. Cached images that no job uses are released if the room is
-    /// needed.
+    /// Reserves room for an image. Cached images that no job uses are released if the room is needed.
     fn loan(&self, room: usize) -> Result<Loan, LoanError> {
         loop {
             match self.documents.loan(room) {

@@ -18,8 +18,7 @@ use super::{Published, lock};
 /// because a scenario may have a dozen catalogs, which must not evict its map.
 const KEPT: [usize; 2] = [24, 8];
 
-/// Size in bytes above which an image counts as large. A large image takes a slot of the bus's
-/// large class.
+/// Size in bytes above which an image counts as large. A large image takes a slot of the bus's large class.
 const LARGE: usize = 512 << 10;
 
 /// Cache of shared documents.
@@ -99,14 +98,12 @@ impl Shared {
         published
     }
 
-    /// Releases the least recently used document among the unused ones. Returns `false` if there is
-    /// none.
+    /// Releases the least recently used document among the unused ones. Returns `false` if there is none.
     pub(super) fn make_room(&self, is_used: impl Fn(DocId) -> bool) -> bool {
         let mut slots = lock(&self.0);
         let unused = slots.order.iter().flatten().find(|key| {
-            // A locked slot is being read, possibly by the caller. Waiting here could deadlock,
-            // because the owner of the lock may wait for `slots`. The next request after this reads
-            // the document again.
+            // A locked slot is being read, possibly by the caller. Waiting here could deadlock, because the owner of
+            // the lock may wait for `slots`. The next request after this reads the document again.
             let slot = slots.by_path.get(*key);
             let Some(mut kept) = slot.and_then(|slot| slot.try_lock().ok()) else {
                 return false;

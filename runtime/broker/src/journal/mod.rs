@@ -147,8 +147,7 @@ impl Journal {
     pub fn open(state: &Path, instance: &str) -> Result<Journal, JournalError> {
         trust::make_directory(state)?;
         let path = state.join("journal.sqlite");
-        // Another user may have created these files while the directory was still writable for
-        // others.
+        // Another user may have created these files while the directory was still writable for others.
         for name in [
             "lock",
             "journal.sqlite",
@@ -339,8 +338,7 @@ impl Journal {
     /// Makes changes in one transaction: all of them or none.
     fn make(&mut self, changes: &[&[Change]]) -> Result<(), JournalError> {
         let made = self.try_to_make(changes);
-        // Earlier changes take up to twice their room until a checkpoint moves them from the WAL
-        // into the database.
+        // Earlier changes take up to twice their room until a checkpoint moves them from the WAL into the database.
         let full = |error: &rusqlite::Error| {
             error.sqlite_error_code() == Some(rusqlite::ErrorCode::DiskFull)
         };

@@ -43,8 +43,7 @@ fn required_set_from_text(text: &str) -> RequiredSet {
     read().map_or_else(RequiredSet::unknown, RequiredSet)
 }
 
-/// Path and, if the file exists: size, time of modification, inode, digest if it was read, time of
-/// change.
+/// Path and, if the file exists: size, time of modification, inode, digest if it was read, time of change.
 type InputRow = (String, Option<(u64, i128, u64, Option<String>, i128)>);
 
 /// The same row in schema 1, which had no time of change.
@@ -100,8 +99,7 @@ fn inputs_from_text(text: &str) -> Option<Vec<Input>> {
     rows.into_iter().map(input).collect()
 }
 
-/// Reads rows of schema 1. A stamp without a time of change matches no file, so each file is read
-/// again and compared.
+/// Reads rows of schema 1. A stamp without a time of change matches no file, so each file is read again and compared.
 fn rows_of_schema_1(text: &str) -> Option<Vec<InputRow>> {
     let rows: Vec<InputRowOfSchema1> = serde_json::from_str(text).ok()?;
     let row = |(path, content): InputRowOfSchema1| {

@@ -9,8 +9,7 @@ use super::{JournalError, SCHEMA_VERSION};
 
 const SCHEMA: &str = include_str!("journal.sql");
 
-/// Capacity of the cache for prepared statements. It is as large as the number of statements for
-/// entries.
+/// Capacity of the cache for prepared statements. It is as large as the number of statements for entries.
 const STATEMENTS: usize = 24;
 
 /// Creates the schema in a database, or migrates an earlier schema to the current one.

@@ -1,6 +1,5 @@
-//! The journal as shared by the writer threads. The writing thread also writes all entries of
-//! others, in one transaction. Many verdicts cost little more than one, and a single verdict does
-//! not wait.
+//! The journal as shared by the writer threads. The writing thread also writes all entries of others, in one
+//! transaction. Many verdicts cost little more than one, and a single verdict does not wait.
 
 use std::path::Path;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -35,8 +34,7 @@ struct Note {
     answer: Arc<OnceLock<Answer>>,
 }
 
-/// Handle of waiting entries. They are written by the thread that added them, or by one that writes
-/// earlier.
+/// Handle of waiting entries. They are written by the thread that added them, or by one that writes earlier.
 #[derive(Debug)]
 #[must_use = "entries are not written until they are settled"]
 pub struct Noted(Arc<OnceLock<Answer>>);
@@ -99,8 +97,7 @@ impl SharedJournal {
     }
 }
 
-/// Leadership of the writing thread. When it is dropped, also by a panic, the next thread may
-/// write.
+/// Leadership of the writing thread. When it is dropped, also by a panic, the next thread may write.
 struct Lead<'a>(&'a SharedJournal);
 
 impl Drop for Lead<'_> {
@@ -110,8 +107,7 @@ impl Drop for Lead<'_> {
     }
 }
 
-/// Writes all notes at once. If that fails, writes each note separately, so that failures stay
-/// separate.
+/// Writes all notes at once. If that fails, writes each note separately, so that failures stay separate.
 fn write(journal: &mut Journal, notes: &[Note]) {
     let all: Vec<&[Change]> = notes.iter().map(|it| &it.changes[..]).collect();
     let together = journal.make(&all);

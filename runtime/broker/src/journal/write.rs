@@ -90,8 +90,7 @@ fn count(number: u64) -> Value {
     Value::Integer(signed(number))
 }
 
-/// Removes a file from the journal. The path of its result stays for the reporters that reported
-/// about it.
+/// Removes a file from the journal. The path of its result stays for the reporters that reported about it.
 fn withdraw(changes: &mut Vec<Change>, path: &str, reporters: &[String]) {
     let mut of_path = |sql| changes.push(Change::new(sql, [word(path)]));
     if !reporters.is_empty() {
@@ -107,8 +106,7 @@ fn withdraw(changes: &mut Vec<Change>, path: &str, reporters: &[String]) {
     }
 }
 
-/// Records that a reporter has withdrawn its report. After the last one, the path of the result is
-/// deleted.
+/// Records that a reporter has withdrawn its report. After the last one, the path of the result is deleted.
 fn voided(changes: &mut Vec<Change>, path: &str, reporter: &str) {
     changes.push(Change::new(
         "DELETE FROM deliveries WHERE path = ?1 AND reporter = ?2 AND job IS NULL",

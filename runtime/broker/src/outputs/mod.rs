@@ -21,8 +21,7 @@ use crate::environment::{Bell, thread};
 /// Callback for lost outputs. The scanner thread calls it.
 pub type TellLost = Box<dyn FnMut(Vec<LostOutput>) + Send>;
 
-/// Registry of existing outputs. Clones share it. The default registers no outputs, for a single
-/// run.
+/// Registry of existing outputs. Clones share it. The default registers no outputs, for a single run.
 #[derive(Debug, Clone, Default)]
 pub struct Outputs(Option<Arc<Shared>>);
 
@@ -121,8 +120,7 @@ impl Outputs {
         }
     }
 
-    /// Checks whether the loss of an output was reported and the output was not written again since
-    /// then.
+    /// Checks whether the loss of an output was reported and the output was not written again since then.
     pub fn is_told(&self, output: &Path) -> bool {
         let shared = self.0.as_ref();
         shared.is_some_and(|it| it.book().written.get(output).is_some_and(|it| it.is_told))
@@ -140,9 +138,8 @@ impl Shared {
         self.book.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns an output that is lost and `wanted`. The comparison with the written file runs
-    /// without the lock, so writers do not wait for the disk. If the output is written meanwhile,
-    /// the comparison is repeated.
+    /// Returns an output that is lost and `wanted`. The comparison with the written file runs without the lock, so
+    /// writers do not wait for the disk. If the output is written meanwhile, the comparison is repeated.
     fn look(&self, output: &Path, wanted: impl Fn(&mut Written) -> bool) -> Option<LostOutput> {
         loop {
             let known = self.book().written.get(output)?.fingerprint;

@@ -39,8 +39,7 @@ impl Adapter {
         !self.command.is_empty()
     }
 
-    /// Returns the parent of the private directories, and why none can be created now. Waits for
-    /// the disk.
+    /// Returns the parent of the private directories, and why none can be created now. Waits for the disk.
     pub(crate) fn scratch_status(&self) -> Option<ScratchStatus> {
         self.is_there().then(|| ScratchStatus {
             directory: self.scratch.clone(),
@@ -48,8 +47,7 @@ impl Adapter {
         })
     }
 
-    /// Returns the name of a module: its own, unless a bundle that comes with the program has this
-    /// name.
+    /// Returns the name of a module: its own, unless a bundle that comes with the program has this name.
     pub(super) fn name_of(&self, module: &Module, loaded: &mut Loaded) -> String {
         let name = &module.name;
         let is_taken = self.reserved.iter().any(|it| same_bundle(name, it, ""))
@@ -112,16 +110,14 @@ impl Adapter {
         words
     }
 
-    /// Returns the permissions of the adapter in the sandbox: those of its module, and its private
-    /// directories.
+    /// Returns the permissions of the adapter in the sandbox: those of its module, and its private directories.
     pub(super) fn may(&self, name: &str, module: &May) -> May {
         let mut may = module.clone();
         may.write.push(self.scratch_of(name));
         may
     }
 
-    /// Returns the parent of the private directories of one module. It has no access to those of
-    /// other modules.
+    /// Returns the parent of the private directories of one module. It has no access to those of other modules.
     fn scratch_of(&self, name: &str) -> PathBuf {
         self.scratch.join(format!("of-{name}"))
     }
@@ -168,8 +164,7 @@ impl Adapter {
     }
 }
 
-/// Returns why a directory cannot be written to, for the user. A missing directory is created
-/// later.
+/// Returns why a directory cannot be written to, for the user. A missing directory is created later.
 pub fn unwritable(directory: &Path) -> Option<String> {
     let absent = |place: &&Path| {
         let found = foreign::metadata(place);
@@ -220,8 +215,7 @@ pub(super) fn ready(words: &[String]) -> Result<(), String> {
         programs::look_at(command)?;
     }
     if let Some(scratch) = value_of(words, SCRATCH) {
-        // The directory must exist before the process enters the sandbox, which allows writes to
-        // it.
+        // The directory must exist before the process enters the sandbox, which allows writes to it.
         trust::make_private_directory(Path::new(scratch)).map_err(|error| error.to_string())?;
     }
     Ok(())

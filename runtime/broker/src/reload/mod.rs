@@ -42,8 +42,7 @@ pub struct Sources {
     pub bundles_d: Option<PathBuf>,
     /// Selection among the required checkers.
     pub choice: Choice,
-    /// Whether the verdict on a file is independent of the verdicts on the files that it depends
-    /// on.
+    /// Whether the verdict on a file is independent of the verdicts on the files that it depends on.
     pub own_verdicts: bool,
     /// The children that come with the program.
     pub standard: Vec<ChildSpec>,
@@ -89,8 +88,7 @@ pub enum LoadError {
 }
 
 impl Loaded {
-    /// Checks whether a child of this name comes with the program, which means that no manifest
-    /// added it.
+    /// Checks whether a child of this name comes with the program, which means that no manifest added it.
     fn comes_with_the_program(&self, name: &str) -> bool {
         let mut children = self.children.iter();
         children.any(|it| it.name == name) && !self.brought.contains_key(name)
@@ -212,8 +210,7 @@ impl Sources {
         }
     }
 
-    /// Returns the manifests, sorted by name. Adds a notice for each other file that looks like a
-    /// manifest.
+    /// Returns the manifests, sorted by name. Adds a notice for each other file that looks like a manifest.
     fn manifests(&self, notices: &mut Vec<String>) -> Result<Vec<PathBuf>, LoadError> {
         let Some(directory) = &self.bundles_d else {
             return Ok(Vec::new());
@@ -266,8 +263,7 @@ impl Sources {
         Some((data.dev(), data.ino()))
     }
 
-    /// Returns the current stamps of all relevant files. `read` contains the files that manifests
-    /// list.
+    /// Returns the current stamps of all relevant files. `read` contains the files that manifests list.
     pub fn fingerprint(&self, read: &Fingerprint) -> Fingerprint {
         let manifests = self.manifests(&mut Vec::new()).unwrap_or_default();
         let paths = self.config.iter().cloned().chain(manifests);
@@ -312,8 +308,7 @@ fn no_shadow_in_a_run(module: &Module) -> String {
     )
 }
 
-/// Returns notices about bundles that the configuration names although they are shadows without
-/// weight.
+/// Returns notices about bundles that the configuration names although they are shadows without weight.
 fn named_shadows(path: &Path, config: &Config, loaded: &Loaded) -> Vec<String> {
     let named = |name: &str| {
         let mut bundles = config.bundles.iter();

@@ -1,5 +1,4 @@
-//! Programs of manifests. Only the broker's user may be able to change the files that a command
-//! runs.
+//! Programs of manifests. Only the broker's user may be able to change the files that a command runs.
 
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -41,8 +40,7 @@ pub fn command_of(words: &[String]) -> Option<&str> {
     line.strip_prefix(BEFORE)?.strip_suffix(BEHIND)
 }
 
-/// Returns the files that a child runs: the program of its manifest, even if missing, and its
-/// script argument.
+/// Returns the files that a child runs: the program of its manifest, even if missing, and its script argument.
 pub(super) fn files_of(words: &[String]) -> Vec<PathBuf> {
     let mut words = Words {
         rest: command_of(words).unwrap_or_default(),
@@ -143,8 +141,7 @@ fn is_executable(path: &Path) -> bool {
     rustix::fs::access(path, rustix::fs::Access::EXEC_OK).is_ok()
 }
 
-/// Returns the path at which the shell finds a program. The broker starts the shell with the same
-/// `PATH`.
+/// Returns the path at which the shell finds a program. The broker starts the shell with the same `PATH`.
 pub(super) fn find(program: &str) -> Option<PathBuf> {
     let is_program = |path: &PathBuf| path.is_file() && is_executable(path);
     if program.contains('/') {
@@ -215,8 +212,7 @@ fn variable(letters: &mut CharIndices<'_>) -> Option<String> {
     value.chars().all(plain).then_some(value)
 }
 
-/// Reads a quoted text. Returns `None` if the quote is not closed, or if the shell would expand
-/// something.
+/// Reads a quoted text. Returns `None` if the quote is not closed, or if the shell would expand something.
 fn quote(letters: &mut CharIndices<'_>, word: &mut String, mark: char) -> Option<()> {
     loop {
         match letters.next()?.1 {

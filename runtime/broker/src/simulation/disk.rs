@@ -121,8 +121,7 @@ impl Disk {
         lying[file].and_then(|digest| self.meant.get(&digest).copied())
     }
 
-    /// Checks whether a file must be accepted in this state. `maps`: the bundle that checks maps
-    /// must judge, too.
+    /// Checks whether a file must be accepted in this state. `maps`: the bundle that checks maps must judge, too.
     pub fn is_sound(&self, lying: &Lying, file: usize, maps: bool) -> bool {
         let sound = |it: Meant| it.whole && it.mark != Mark::Bad;
         let part = self.meant_at(lying, PART);

@@ -1,8 +1,7 @@
-//! The broker in a simulated world: its loop, watcher, writers, readers, journal and start are
-//! real, on threads of which one runs at a time. A seed determines the next thread, the clock,
-//! changes of files, answers of bundles, events of the kernel and kills of the broker. The files
-//! are real, too, in a directory in memory. Time, the bus, processes and the delivery of kernel
-//! events are not real.
+//! The broker in a simulated world: its loop, watcher, writers, readers, journal and start are real, on threads of
+//! which one runs at a time. A seed determines the next thread, the clock, changes of files, answers of bundles,
+//! events of the kernel and kills of the broker. The files are real, too, in a directory in memory. Time, the bus,
+//! processes and the delivery of kernel events are not real.
 //!
 //! `QCBUS_SIM_SEED=7` plays one schedule and prints it, `QCBUS_SIM_SCHEDULES=10000` plays as many,
 //! `QCBUS_SIM_FROM=1000000` begins with that seed.

@@ -205,8 +205,7 @@ impl Peers {
         }
     }
 
-    /// Cancels a job. `heard`: the process hears of it before it has sent all its findings on the
-    /// job.
+    /// Cancels a job. `heard`: the process hears of it before it has sent all its findings on the job.
     pub fn cancelled(&mut self, peer: PeerId, job: JobId, heard: bool) {
         if let Some(process) = self.of(peer).filter(|_| heard) {
             process.works.retain(|it| it.job != job);

@@ -87,8 +87,7 @@ pub fn play(stage: &Stage, seed: u64, verbose: bool) -> Result<(Figures, Vec<Str
     };
     drop(world);
     enter(None);
-    // The directory is in memory. If it cannot be removed now, it is removed with all others at the
-    // end.
+    // The directory is in memory. If it cannot be removed now, it is removed with all others at the end.
     let _ = std::fs::remove_dir_all(&dir);
     match ended {
         Ok(()) => Ok((figures, lines)),
@@ -276,8 +275,7 @@ impl Play {
         world.tasks.iter().filter(can).cloned().collect()
     }
 
-    /// Lets one of the threads run to its next stop. Returns its name, or `None` if no thread can
-    /// run.
+    /// Lets one of the threads run to its next stop. Returns its name, or `None` if no thread can run.
     fn run_one(&mut self) -> Result<Option<String>, String> {
         let runnable = self.runnable();
         if runnable.is_empty() {
@@ -360,8 +358,7 @@ impl Play {
         });
     }
 
-    /// Simulates a failure: the clock is set, the kernel loses events, or hanging processes
-    /// continue.
+    /// Simulates a failure: the clock is set, the kernel loses events, or hanging processes continue.
     fn failure(&self) {
         self.with(|world| match world.rng.u32(0..6) {
             0 => {
@@ -411,8 +408,7 @@ impl Play {
         });
     }
 
-    /// Connects all processes, stops all disturbances and lets time pass until every invariant
-    /// holds.
+    /// Connects all processes, stops all disturbances and lets time pass until every invariant holds.
     fn settle(&mut self) -> Ended {
         self.with(|world| {
             world.meddles = false;

@@ -80,8 +80,7 @@ fn is_json_of(report: &[u8], xqar: &Path) -> bool {
     report.is_some_and(|it| from_text(&it.qcbus.result_file) == xqar)
 }
 
-/// Checks whether a text report belongs to a result. The report has the verdict in a line of its
-/// own.
+/// Checks whether a text report belongs to a result. The report has the verdict in a line of its own.
 fn is_text_of(report: &[u8], xqar: &Path) -> bool {
     let Ok(report) = std::str::from_utf8(report) else {
         return false;

@@ -6,8 +6,7 @@ use qcbus_formats::xqar::Status;
 use crate::core::FinishedJob;
 use crate::journal::History;
 
-/// Returns the statistics of each bundle, and the checkers that failed, have findings or were
-/// skipped.
+/// Returns the statistics of each bundle, and the checkers that failed, have findings or were skipped.
 pub(super) fn history(job: &FinishedJob, pooled: &Pooled) -> History {
     let bundles = job.bundles.iter().map(|it| {
         (

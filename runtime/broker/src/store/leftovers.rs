@@ -47,8 +47,7 @@ pub(super) fn leftovers(out: &Path, owned: &HashSet<PathBuf>) -> Vec<Leftover> {
 
 const VERDICT: &str = ".verdict.json";
 
-/// Visits every file below a directory of results. Skips other brokers' directories, which have a
-/// state.
+/// Visits every file below a directory of results. Skips other brokers' directories, which have a state.
 pub(super) fn walk(out: &Path, found: &mut dyn FnMut(PathBuf)) {
     let mut open = vec![out.to_path_buf()];
     while let Some(next) = open.pop() {
@@ -102,8 +101,7 @@ pub(super) fn input_of(xqar: &Path) -> Option<PathBuf> {
     qcbus_formats::xqar::input_file(&head).map(|it| from_text(&it))
 }
 
-/// Maximum size of a verdict file in bytes. Its only long part is the list of the verdict's
-/// dependencies.
+/// Maximum size of a verdict file in bytes. Its only long part is the list of the verdict's dependencies.
 const MOST_OF_A_VERDICT: u64 = 64 << 20;
 
 /// Number of bytes that contain the beginning of a result.

@@ -105,8 +105,7 @@ impl Store {
             return self.not_written(job, judged, failed);
         }
         step("recorded", &job.path);
-        // The file may have been removed between the check and the rename. In that case no result
-        // may stay.
+        // The file may have been removed between the check and the rename. In that case no result may stay.
         if self.has_gone(&job.path) {
             let _ = self.withdraw_files(&job.path);
             return StoreOutcome::Stale;
@@ -114,9 +113,8 @@ impl Store {
         StoreOutcome::Stored(Box::new(judged))
     }
 
-    /// Returns the outcome of a failed write. If the result can never be written, the file becomes
-    /// undetermined: a missing result must not count as an acceptance, and no process should wait
-    /// for it.
+    /// Returns the outcome of a failed write. If the result can never be written, the file becomes undetermined: a
+    /// missing result must not count as an acceptance, and no process should wait for it.
     fn not_written(
         &self,
         job: &mut FinishedJob,

@@ -84,8 +84,7 @@ impl Store {
     }
 }
 
-/// Returns a finding if no bundle could check the file: it cannot be read, or no bundle checks its
-/// kind.
+/// Returns a finding if no bundle could check the file: it cannot be read, or no bundle checks its kind.
 fn unanswered(job: &FinishedJob) -> Option<Remark> {
     let takes = |it: &TaskOutcome| {
         let catalogue = it.catalogue.as_ref();
@@ -115,8 +114,7 @@ fn unanswered(job: &FinishedJob) -> Option<Remark> {
     })
 }
 
-/// Returns a finding for a missing image. Without the diagnostics of the reader the file is not
-/// accepted.
+/// Returns a finding for a missing image. Without the diagnostics of the reader the file is not accepted.
 fn unseen_root() -> Remark {
     Remark {
         checker: "qcbus_file".to_owned(),
@@ -129,9 +127,8 @@ fn unseen_root() -> Remark {
 /// Maximum number of reasons shown to the user. Further ones are only counted.
 const REASONS: usize = 20;
 
-/// Returns the reasons of a verdict for the user: open points, and errors taken over from other
-/// files. If the verdict is rejected, only failures are listed. Checkers that were skipped because
-/// of the error are left out.
+/// Returns the reasons of a verdict for the user: open points, and errors taken over from other files. If the verdict
+/// is rejected, only failures are listed. Checkers that were skipped because of the error are left out.
 pub(super) fn reasons(job: &FinishedJob, pooled: &Pooled, verdict: Verdict) -> Vec<String> {
     if let Some(open) = unanswered(job).and_then(|remark| remark.open) {
         return vec![open];

@@ -288,8 +288,7 @@ fn directory_of(xqar: &Path) -> PathBuf {
     xqar.parent().unwrap_or(xqar).to_path_buf()
 }
 
-/// Returns the message about results that the journal names outside of this broker's directory of
-/// results.
+/// Returns the message about results that the journal names outside of this broker's directory of results.
 fn left_alone(directories: &BTreeSet<PathBuf>, out: &Path) -> String {
     let directories: Vec<Arc<Path>> = directories.iter().map(|it| it.as_path().into()).collect();
     format!(

@@ -28,8 +28,7 @@ const MOST_OF_A_NAME: usize = 128;
 pub struct TrialResults(PathBuf);
 
 impl TrialResults {
-    /// Creates an empty directory for a broker with this state directory. Every file is tried
-    /// again.
+    /// Creates an empty directory for a broker with this state directory. Every file is tried again.
     pub fn anew(state: &Path) -> TrialResults {
         let directory = state.join(DIRECTORY);
         // A result that cannot be removed is overwritten, or no longer referenced.
@@ -37,8 +36,7 @@ impl TrialResults {
         TrialResults(directory)
     }
 
-    /// Returns the path of the result for one file. It contains the file's name and a digest of its
-    /// path.
+    /// Returns the path of the result for one file. It contains the file's name and a digest of its path.
     fn of(&self, shadow: &str, file: &Path) -> PathBuf {
         let digest = Sha256::digest(file.as_os_str().as_encoded_bytes());
         let number = digest.iter().take(4).map(|byte| format!("{byte:02x}"));
@@ -54,8 +52,7 @@ impl TrialResults {
 
     /// Removes the results of a shadow for one file, or for all files.
     pub fn forget(&self, shadow: &str, file: Option<&Path>) {
-        // A missing result need not be removed, and one that cannot be removed is overwritten
-        // later.
+        // A missing result need not be removed, and one that cannot be removed is overwritten later.
         let _ = match file {
             Some(file) => std::fs::remove_file(self.of(shadow, file)),
             None => std::fs::remove_dir_all(self.0.join(shadow)),

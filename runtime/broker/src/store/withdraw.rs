@@ -30,8 +30,7 @@ impl Store {
         self.record(&[entry]).map_err(StoreFailure::of_all)
     }
 
-    /// Removes the published copy first. Removes the verdict file last, because it shows that a
-    /// result existed.
+    /// Removes the published copy first. Removes the verdict file last, because it shows that a result existed.
     pub(super) fn withdraw_files(&self, path: &Arc<Path>) -> io::Result<()> {
         if let Some(gate) = &self.gate {
             gate.forget(path)?;
@@ -50,8 +49,7 @@ impl Store {
         Ok(())
     }
 
-    /// Removes directories of results that became empty when a result, or a report next to it, was
-    /// removed.
+    /// Removes directories of results that became empty when a result, or a report next to it, was removed.
     pub fn tidy_above(&self, path: &Path) {
         remove_empty_above(&self.places.xqar(path), &self.places.out);
     }

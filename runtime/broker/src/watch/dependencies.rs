@@ -1,6 +1,5 @@
-//! Dependencies of verdicts, wherever they are. Files with kernel events are only scanned from time
-//! to time, because kernels and file systems lose events. Files without events must be scanned
-//! often.
+//! Dependencies of verdicts, wherever they are. Files with kernel events are only scanned from time to time, because
+//! kernels and file systems lose events. Files without events must be scanned often.
 
 use std::collections::BTreeMap;
 use std::ops::Bound;
@@ -43,10 +42,9 @@ struct Polled {
 pub type Changed = (Arc<Path>, Option<Stamp>);
 
 impl Dependencies {
-    /// Adds files with the stamps at which they were read; later changes are reported. Returns the
-    /// changes of known files that were read with another stamp than the last one seen. Such a file
-    /// may have appeared and disappeared since then. A scan would find no change, and earlier
-    /// readers may not have been informed.
+    /// Adds files with the stamps at which they were read; later changes are reported. Returns the changes of known
+    /// files that were read with another stamp than the last one seen. Such a file may have appeared and disappeared
+    /// since then. A scan would find no change, and earlier readers may not have been informed.
     pub fn add(&mut self, files: Vec<(Arc<Path>, Option<Stamp>)>) -> Vec<Changed> {
         let mut changed = Vec::new();
         for (path, stamp) in files {
@@ -83,8 +81,7 @@ impl Dependencies {
         self.seen(path).is_some()
     }
 
-    /// Scans a file immediately because of an event. Returns `None` if it is unchanged or no
-    /// verdict depends on it.
+    /// Scans a file immediately because of an event. Returns `None` if it is unchanged or no verdict depends on it.
     pub fn look(&mut self, path: &Path) -> Option<Changed> {
         let polled = self.polled.remove_entry(path);
         let polled = polled.map(|(path, polled)| (path, polled.stamp));
@@ -113,8 +110,7 @@ impl Dependencies {
         self.polled.insert(path, Polled { stamp, asked });
     }
 
-    /// Scans the files of this interval. `tells` checks whether the kernel reports changes of a
-    /// file.
+    /// Scans the files of this interval. `tells` checks whether the kernel reports changes of a file.
     pub fn changed(&mut self, mut tells: impl FnMut(&Path) -> bool) -> Vec<Changed> {
         let mut changed = self.turn();
         let mut told = Vec::new();

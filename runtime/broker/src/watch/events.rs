@@ -262,8 +262,7 @@ impl Scanner {
     fn touched(&mut self, path: &Path, what: ReadFlags) {
         if self.cares_about(path) {
             let stamp = stamp_of(path).ok().flatten();
-            // A new hard link for a file also creates an event. Only an empty file will certainly
-            // be written.
+            // A new hard link for a file also creates an event. Only an empty file will certainly be written.
             let is_empty = stamp.is_some_and(|it| it.size == 0);
             if what.contains(ReadFlags::MODIFY) || (what.contains(ReadFlags::CREATE) && is_empty) {
                 self.settling.written(path, stamp, now());

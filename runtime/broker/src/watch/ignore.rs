@@ -82,8 +82,7 @@ impl IgnoreRules {
         said == Some(Said::Excluded)
     }
 
-    /// Returns the decision of the rule files for a path. The nearest file with a matching rule
-    /// decides.
+    /// Returns the decision of the rule files for a path. The nearest file with a matching rule decides.
     fn said_of(
         &mut self,
         path: &Path,
@@ -138,8 +137,7 @@ pub fn hidden_above(roots: &[PathBuf], directory: &Path) -> Option<PathBuf> {
     hidden
 }
 
-/// Checks whether a `.qcignore` next to a file or in any directory above excludes it. The path is
-/// absolute.
+/// Checks whether a `.qcignore` next to a file or in any directory above excludes it. The path is absolute.
 pub fn is_excluded(file: &Path) -> bool {
     IgnoreRules::new(Path::new("/")).excludes(file, false)
 }

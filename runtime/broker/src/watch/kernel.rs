@@ -17,8 +17,7 @@ const AT_ONCE: usize = 64 * 1024;
 /// Pause if `poll` fails.
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// Returns the events to watch. Opening or reading a file is not included, because the broker does
-/// this itself.
+/// Returns the events to watch. Opening or reading a file is not included, because the broker does this itself.
 fn worth() -> WatchFlags {
     WatchFlags::ONLYDIR
         | WatchFlags::DONT_FOLLOW

@@ -1,10 +1,9 @@
-//! Watches directories with kernel events where available, and by scanning at intervals elsewhere.
-//! Both have the same result.
+//! Watches directories with kernel events where available, and by scanning at intervals elsewhere. Both have the same
+//! result.
 //!
-//! One thread scans and reads the events itself. Pending events stay in the kernel, up to its
-//! limit, and not in the broker. Every directory is watched separately and scanned immediately
-//! afterwards. Therefore a new directory is seen completely, and a failed watch affects only that
-//! directory. Symbolic links to directories are never followed.
+//! One thread scans and reads the events itself. Pending events stay in the kernel, up to its limit, and not in the
+//! broker. Every directory is watched separately and scanned immediately afterwards. Therefore a new directory is
+//! seen completely, and a failed watch affects only that directory. Symbolic links to directories are never followed.
 
 mod dependencies;
 mod due;
@@ -45,8 +44,7 @@ pub(crate) use self::settle::OPEN_QUIET;
 pub use self::settle::Why;
 pub(crate) use self::tree::{Told, Tree, Unwatched, below};
 
-/// Returns every checkable file below a directory, once. `roots` are all scanned directories,
-/// without symbolic links.
+/// Returns every checkable file below a directory, once. `roots` are all scanned directories, without symbolic links.
 pub fn scan_directory(directory: &Path, roots: &[PathBuf]) -> Scan {
     scan(directory, roots, &mut IgnoreRules::new(directory))
 }
@@ -109,8 +107,7 @@ pub struct WatchOptions {
     pub settle: Option<Duration>,
 }
 
-/// State that a watcher takes over from an earlier one. The first full scan is already complete
-/// then.
+/// State that a watcher takes over from an earlier one. The first full scan is already complete then.
 #[derive(Debug)]
 pub struct Known {
     /// Files that existed.
@@ -186,8 +183,7 @@ impl Watcher {
         self.order(Order::Forget(path));
     }
 
-    /// Registers a file that the broker learned about from another source. Its removal is then
-    /// reported.
+    /// Registers a file that the broker learned about from another source. Its removal is then reported.
     pub fn learn(&self, path: Arc<Path>, stamp: Stamp) {
         self.order(Order::Learn(path, stamp));
     }

@@ -1,5 +1,4 @@
-//! Files that are open for writing, according to `/proc`. Only root can see the processes of other
-//! users.
+//! Files that are open for writing, according to `/proc`. Only root can see the processes of other users.
 
 use std::collections::HashSet;
 use std::ffi::OsStr;

@@ -25,8 +25,7 @@ pub struct Roots {
 }
 
 impl Roots {
-    /// Checks whether a path is in a missing watched directory. Its results are kept until it is
-    /// back.
+    /// Checks whether a path is in a missing watched directory. Its results are kept until it is back.
     pub fn is_away(&self, path: &Path) -> bool {
         !self.lost.is_empty() && self.lost.iter().any(|root| path.starts_with(root))
     }
@@ -56,8 +55,7 @@ impl Scanner {
         if was_lost {
             (self.tell)(Seen::SeenAgain(root.to_path_buf()));
         }
-        // A new directory may have the inode number of the previous one, so the watch is checked as
-        // well.
+        // A new directory may have the inode number of the previous one, so the watch is checked as well.
         let is_watched = self.tree.contains(root) || self.due.covers(root);
         let what = match before {
             _ if was_lost => "is back",
@@ -120,8 +118,7 @@ enum Root {
 fn look(root: &Path) -> Root {
     let how = match foreign::symlink_metadata(root) {
         Ok(data) if data.is_dir() => return Root::Here((data.dev(), data.ino())),
-        // A link would have been resolved at the start of the broker. The kernel reports no events
-        // through it.
+        // A link would have been resolved at the start of the broker. The kernel reports no events through it.
         Ok(data) if data.is_symlink() => {
             "has become a symbolic link, which is only followed after a restart of the broker"
                 .to_owned()

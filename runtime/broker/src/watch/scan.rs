@@ -71,8 +71,7 @@ pub fn scan(directory: &Path, roots: &[PathBuf], rules: &mut IgnoreRules) -> Sca
     scan
 }
 
-/// Returns why a directory exceeds the limits and is not scanned. `number` is the count including
-/// it.
+/// Returns why a directory exceeds the limits and is not scanned. `number` is the count including it.
 pub fn is_too_much(directory: &Path, roots: &[PathBuf], number: usize) -> Option<String> {
     let inside = roots
         .iter()
@@ -109,8 +108,7 @@ pub struct Listing {
     pub files: Vec<(PathBuf, Stamp)>,
     /// Symbolic links with names of checkable files, whatever their targets are.
     pub links: Vec<PathBuf>,
-    /// Directories to scan, including those that a `.qcignore` excludes: other files may depend on
-    /// files there.
+    /// Directories to scan, including those that a `.qcignore` excludes: other files may depend on files there.
     pub directories: Vec<PathBuf>,
     /// Inaccessible paths.
     pub unseen: Vec<Unseen>,

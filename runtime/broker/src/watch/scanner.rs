@@ -83,8 +83,7 @@ impl Scanner {
         }
     }
 
-    /// Continues the work of an earlier watcher. Its reported stamps are unknown, so files are
-    /// reported again.
+    /// Continues the work of an earlier watcher. Its reported stamps are unknown, so files are reported again.
     pub fn go_on_with(&mut self, known: Known) {
         let files = known.files.into_iter();
         self.known = files.map(|path| (path, Stamp::default())).collect();
@@ -210,8 +209,7 @@ impl Scanner {
         self.look_if_at_rest(path);
     }
 
-    /// Handles a file that is not checkable. It may have been before, and verdicts may depend on
-    /// it.
+    /// Handles a file that is not checkable. It may have been before, and verdicts may depend on it.
     fn no_file_to_check(&mut self, path: &Path, stamp: Stamp) {
         self.seen_again(path);
         if self.known.remove(path).is_some() {
@@ -242,8 +240,7 @@ impl Scanner {
         });
     }
 
-    /// Removes a file that the broker found missing without an event. The broker has already
-    /// removed it.
+    /// Removes a file that the broker found missing without an event. The broker has already removed it.
     pub fn forget(&mut self, path: &Path) {
         if self.known.remove(path).is_some() {
             self.look_if_at_rest(path);

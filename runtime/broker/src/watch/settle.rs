@@ -1,12 +1,10 @@
-//! Detection of finished files. A file is finished immediately after a close or a rename into
-//! place. After any other change it must be quiet for a while: same size and time, and no process
-//! has it open for writing.
+//! Detection of finished files. A file is finished immediately after a close or a rename into place. After any other
+//! change it must be quiet for a while: same size and time, and no process has it open for writing.
 //!
-//! Events report a write and the following close. For files without events, `/proc` shows the
-//! processes that have them open, as far as this user may see it. A lease would also work. While it
-//! is held, a writer that opens the file without blocking, as FTP servers do, would be refused. The
-//! maximum wait without a change is [`OPEN_QUIET`]: a process that keeps a file open for ever does
-//! not hide it.
+//! Events report a write and the following close. For files without events, `/proc` shows the processes that have
+//! them open, as far as this user may see it. A lease would also work. While it is held, a writer that opens the file
+//! without blocking, as FTP servers do, would be refused. The maximum wait without a change is [`OPEN_QUIET`]: a
+//! process that keeps a file open for ever does not hide it.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -111,8 +109,7 @@ impl Settling {
         self.put(path, stamp, true, now);
     }
 
-    /// Records the close of a file that was open for writing. Returns `false` if the file is
-    /// finished.
+    /// Records the close of a file that was open for writing. Returns `false` if the file is finished.
     pub fn closed(&mut self, path: &Path, stamp: Option<Stamp>, now: Instant) -> bool {
         if self.asked.is_none() {
             self.done(path);

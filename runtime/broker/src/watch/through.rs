@@ -1,5 +1,4 @@
-//! Scans directories one at a time: finds new and removed entries in a directory, and queues
-//! further directories.
+//! Scans directories one at a time: finds new and removed entries in a directory, and queues further directories.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};

@@ -164,8 +164,7 @@ impl Tree {
         }
     }
 
-    /// Returns the paths of the directory of an event. The last event of a removed directory ends
-    /// its watch.
+    /// Returns the paths of the directory of an event. The last event of a removed directory ends its watch.
     pub fn places(&mut self, told: &Told) -> Vec<Arc<Path>> {
         if !told.what.contains(ReadFlags::IGNORED) {
             return self.watches.get(&told.watch).cloned().unwrap_or_default();
@@ -189,8 +188,7 @@ impl Tree {
     }
 }
 
-/// Returns the entries at a path and below it. They are adjacent, because paths are sorted by
-/// components.
+/// Returns the entries at a path and below it. They are adjacent, because paths are sorted by components.
 pub fn below<'m, K: Borrow<Path> + Ord, V>(
     map: &'m BTreeMap<K, V>,
     path: &'m Path,

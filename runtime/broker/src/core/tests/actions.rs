@@ -116,8 +116,7 @@ impl World {
         self.told.push(((file, job.job), outcome));
     }
 
-    /// Returns the result of a writer for a job: the worst of the file's own verdict and of those
-    /// that it rests on.
+    /// Returns the result of a writer for a job: the worst of the file's own verdict and of those that it rests on.
     fn judged(&mut self, file: u8, job: &FinishedJob) -> Judged {
         let (inputs, digest) = {
             let prepared = job.prepared.as_ref().unwrap();

@@ -25,8 +25,7 @@ impl World {
         }
     }
 
-    /// Publishes an accepted file after its verdict was written. Any other verdict withdraws the
-    /// file.
+    /// Publishes an accepted file after its verdict was written. Any other verdict withdraws the file.
     pub fn publish(&mut self, file: u8, judged: &Judged) {
         if judged.verdict == Verdict::Accepted {
             self.gate.insert(file, judged.inputs.clone());
@@ -35,8 +34,7 @@ impl World {
         }
     }
 
-    /// Asserts that published files are the accepted ones, unless a message about a change is on
-    /// its way.
+    /// Asserts that published files are the accepted ones, unless a message about a change is on its way.
     pub fn gate_must_be_true(&self) {
         for (file, inputs) in &self.gate {
             let on_the_way = self.told.iter().any(|(it, _)| it.0 == *file);

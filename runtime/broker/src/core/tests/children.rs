@@ -284,8 +284,7 @@ fn manifest_changed_without_broker_takes_effect() {
         command: vec!["other".to_owned()],
         ..child(2)
     };
-    // Each case has the spec of the started child, its reported version, and whether it is the
-    // wanted one.
+    // Each case has the spec of the started child, its reported version, and whether it is the wanted one.
     let cases = [
         (child(1), 1, false),
         (child(2), 1, false),
@@ -463,8 +462,7 @@ fn restart_pauses_double_up_to_limit() {
     );
     for (number, pause) in (0_u32..).zip(pauses) {
         let least = (first * 2_u32.pow(number)).min(most);
-        // The pause has up to a quarter more, so that children that died together do not restart
-        // together.
+        // The pause has up to a quarter more, so that children that died together do not restart together.
         let tick = Duration::from_millis(20);
         assert!(
             least <= pause && pause <= least.mul_f64(1.25) + tick,

@@ -12,8 +12,7 @@ use qcbus_messages::{JobId, Verdict};
 /// A client that has asked and has no answer yet.
 pub struct Client {
     file: u8,
-    /// Required bundles for the file, each with the version digest of the process started under
-    /// that name.
+    /// Required bundles for the file, each with the version digest of the process started under that name.
     required_set: Vec<(String, Option<VersionDigest>)>,
     config: Digest,
     /// All inputs that were present since it asked.
@@ -126,8 +125,7 @@ impl World {
         }
     }
 
-    /// Asserts that a file of on-demand checks is only read and pooled. The same applies to a
-    /// result for a client.
+    /// Asserts that a file of on-demand checks is only read and pooled. The same applies to a result for a client.
     pub fn is_for_clients_alone(&self, action: &Action) {
         let (paths, what): (Vec<_>, _) = match action {
             Action::Depend { files } => (files.iter().map(|it| &it.0).collect(), "watched"),

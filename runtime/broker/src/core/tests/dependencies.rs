@@ -2,8 +2,7 @@
 
 use super::*;
 
-/// Returns a world with a judged file and all its dependencies. `known` is the file whose verdict
-/// is examined.
+/// Returns a world with a judged file and all its dependencies. `known` is the file whose verdict is examined.
 fn world_with_dependencies(known: u8) -> World {
     let mut world = World::new();
     world.join("First");

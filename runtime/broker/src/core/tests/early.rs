@@ -1,5 +1,4 @@
-//! Tests of a run that reads its files while its bundles start. No file is checked before all
-//! bundles are present.
+//! Tests of a run that reads its files while its bundles start. No file is checked before all bundles are present.
 
 use super::*;
 

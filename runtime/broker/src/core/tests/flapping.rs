@@ -25,8 +25,7 @@ fn world() -> (World, SessionId) {
     (world, session)
 }
 
-/// Lets time pass in small steps, as the engine does, and calls `each` at every step. No bundle
-/// answers.
+/// Lets time pass in small steps, as the engine does, and calls `each` at every step. No bundle answers.
 fn over(world: &mut World, time: Duration, step: Duration, mut each: impl FnMut(&mut World)) {
     let end = world.now + time;
     while world.now < end {

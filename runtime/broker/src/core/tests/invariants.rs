@@ -177,8 +177,7 @@ impl World {
         }
     }
 
-    /// Returns the verdict on a file, combined with the journal's verdicts on the files that it
-    /// rests on.
+    /// Returns the verdict on a file, combined with the journal's verdicts on the files that it rests on.
     pub fn verdict_with_all(&self, file: u8, own: Verdict) -> Verdict {
         let under = dependencies_of(file).iter().filter(|it| **it < 6);
         let there = under.filter(|it| self.there.contains_key(&path_of(**it)));

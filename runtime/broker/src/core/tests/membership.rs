@@ -48,8 +48,7 @@ fn file_being_written_when_bundle_joins_is_judged_again() {
     assert_eq!(world.names_that_judged(1), ["First", "Second"]);
 }
 
-/// Returns a world with six judged files. When all are checked again, only four can be active, so
-/// the others wait.
+/// Returns a world with six judged files. When all are checked again, only four can be active, so the others wait.
 fn world_that_is_busy() -> World {
     let mut world = World::new();
     world.join("First");
@@ -104,8 +103,7 @@ fn late_messages_on_cancelled_jobs_are_no_violation() {
         world.prepare(0, true);
         let jobs: Vec<JobId> = world.peers[&session].jobs.iter().copied().collect();
         assert_eq!(jobs.len(), 2);
-        // The jobs are cancelled and handed out again while the bundle's messages were on their
-        // way.
+        // The jobs are cancelled and handed out again while the bundle's messages were on their way.
         world.step(&Step::Reconfigure(round % 2));
         for job in jobs {
             world.say(session, FromPeer::JobDone { job, micros: 1 });

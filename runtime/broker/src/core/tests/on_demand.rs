@@ -6,8 +6,7 @@ use qcbus_messages::{Absence, DocumentRole, MissingDocument};
 
 use super::*;
 
-/// Returns a world in which clients can ask the child of a manifest, besides a bundle that joined
-/// by hand.
+/// Returns a world in which clients can ask the child of a manifest, besides a bundle that joined by hand.
 fn world_that_can_be_asked() -> World {
     let mut world = World::new();
     world.join("First");

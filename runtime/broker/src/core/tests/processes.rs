@@ -57,8 +57,7 @@ impl World {
         }
     }
 
-    /// Lets a process of a former broker join after it has outlived that broker. It reports this
-    /// version.
+    /// Lets a process of a former broker join after it has outlived that broker. It reports this version.
     pub fn stale_child_joins(&mut self, version: u8, spec: &ChildSpec) {
         let launch = Launch::first_of(self.generation - 1).next(spec);
         self.join_as(CHILD, version, Some(launch.0));
@@ -116,8 +115,7 @@ impl World {
         let Process { name, drained, .. } = self.peers[&session];
         // A bundle that another one has replaced does not change the required set.
         let current = self.state.sessions.contains_key(&session);
-        // A bundle that was told to leave because the broker ends is still required at the next
-        // start.
+        // A bundle that was told to leave because the broker ends is still required at the next start.
         let current = current && !matches!(self.state.phase, Phase::Leaving(_));
         if current && !(name == CHILD && self.manifest.is_some() && !drained) {
             self.demanded.remove(name);

@@ -40,8 +40,7 @@ fn rejected_map_is_named_in_any_order() {
     }
 }
 
-/// A scenario is read first and takes all document places of the bus. Its map must be read
-/// nevertheless.
+/// A scenario is read first and takes all document places of the bus. Its map must be read nevertheless.
 #[test]
 fn waiting_scenario_leaves_room_for_its_map() {
     let mut world = world();
@@ -167,8 +166,7 @@ fn client_gets_scenario_verdict_only_after_its_map() {
     world.wait(1);
     answer(&mut world);
     world.pass(Duration::from_secs(11));
-    // The scenario is stored without its map's verdict. It is undetermined, and no client gets this
-    // verdict.
+    // The scenario is stored without its map's verdict. It is undetermined, and no client gets this verdict.
     world.store(1, true);
     assert_eq!(world.judged[&1].1, Verdict::Undetermined);
     assert!(!world.waiting.is_empty(), "the map has no verdict yet");
@@ -184,8 +182,7 @@ fn outdated_verdict_of_killed_broker_is_renewed() {
     world.write(1);
     world.settle();
     assert_eq!(world.judged[&1].1, Verdict::Accepted);
-    // The map is rejected under another configuration. The broker is killed before it judges the
-    // scenario again.
+    // The map is rejected under another configuration. The broker is killed before it judges the scenario again.
     let map = world.journal.get_mut(&0).unwrap();
     (map.verdict, map.own, map.own_errors) = (Verdict::Rejected, Verdict::Rejected, 1);
     world.restart();

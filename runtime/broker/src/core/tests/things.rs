@@ -46,8 +46,7 @@ pub fn child(version: u8) -> ChildSpec {
     }
 }
 
-/// Name of the bundle that the shadow's manifest adds. It checks files but does not affect
-/// verdicts.
+/// Name of the bundle that the shadow's manifest adds. It checks files but does not affect verdicts.
 pub const SHADOW: &str = "Shadow";
 
 pub fn shadow(version: u8) -> ChildSpec {
@@ -68,8 +67,7 @@ pub fn fresh_state(generation: u64, configuration: u8) -> State {
         max_preparing: 2,
         max_storing: 2,
         max_findings_bytes: 1000,
-        // Bundles change all the time in random worlds. `flapping.rs` tests the effect of such
-        // changes.
+        // Bundles change all the time in random worlds. `flapping.rs` tests the effect of such changes.
         changes_forgiven: u32::MAX,
         ..Settings::default()
     };

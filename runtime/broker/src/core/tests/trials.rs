@@ -24,8 +24,7 @@ impl World {
         self.shadow.is_none() || rests
     }
 
-    /// Asserts that the shadow has tried every file or was killed by it. Call this when the world
-    /// is at rest.
+    /// Asserts that the shadow has tried every file or was killed by it. Call this when the world is at rest.
     pub fn all_is_tried(&self) {
         let counts = self.state.trial_counts(SHADOW);
         assert_eq!(counts.is_some(), self.shadow.is_some());

@@ -1,13 +1,13 @@
-//! Trials: the findings of shadows. A *shadow* is a bundle of a manifest that checks every file and
-//! has no weight in any verdict. It shows its effect before it counts.
+//! Trials: the findings of shadows. A *shadow* is a bundle of a manifest that checks every file and has no weight in
+//! any verdict. It shows its effect before it counts.
 //!
-//! A trial is an on-demand check of the broker itself. It begins after the verdict on its file has
-//! been stored. Each shadow has one trial at a time, and all other work takes precedence. A trial
-//! takes no job place, delays no findings, and ends if the bus has no room for other jobs. It
-//! leaves no trace in results, in the journal or behind the gate. The state of trials is in memory
-//! only. The results of trials with findings are in the state directory. A restarted broker repeats
-//! all trials.
+//! A trial is an on-demand check of the broker itself. It begins after the verdict on its file has been stored. Each
+//! shadow has one trial at a time, and all other work takes precedence. A trial takes no job place, delays no
+//! findings, and ends if the bus has no room for other jobs. It leaves no trace in results, in the journal or behind
+//! the gate. The state of trials is in memory only. The results of trials with findings are in the state directory. A
+//! restarted broker repeats all trials.
 
+mod ends;
 mod told;
 
 use std::collections::{BTreeMap, HashSet, VecDeque};
@@ -176,8 +176,7 @@ impl State {
         }
     }
 
-    /// Starts the trials of a shadow that has sent its catalogue, unless it has done them in this
-    /// version.
+    /// Starts the trials of a shadow that has sent its catalogue, unless it has done them in this version.
     pub(super) fn shadow_is_ready(
         &mut self,
         name: &str,
@@ -352,8 +351,7 @@ impl State {
         };
         shadow.deaths = 0;
         shadow.pause_until = now + PAUSE;
-        // A file with a new verdict is already queued again, and the trial of a removed file is
-        // discarded.
+        // A file with a new verdict is already queued again, and the trial of a removed file is discarded.
         if self.files.id(&path).is_some() && !shadow.waits.contains(&path) {
             shadow.tried.insert(path, end);
         }
@@ -386,30 +384,5 @@ impl State {
         self.put_trial_back(request_id);
         self.abandon(request_id, actions);
         true
-    }
-
-    /// Ends the trials if a job finds no room on the bus.
-    pub(super) fn trials_give_way(&mut self, to: JobId, actions: &mut Actions) {
-        let is_trial = self.jobs.get(&to).is_some_and(|job| job.is_trial());
-        if !is_trial {
-            self.end_trials(actions);
-        }
-    }
-
-    /// Ends all active trials. Their files are queued again.
-    pub(super) fn end_trials(&mut self, actions: &mut Actions) {
-        let names: Vec<String> = self.trials.shadows.keys().cloned().collect();
-        for name in names {
-            self.end_trial_of(&name, actions);
-        }
-    }
-
-    fn end_trial_of(&mut self, name: &str, actions: &mut Actions) {
-        let shadow = self.trials.shadows.get(name);
-        let under_way = shadow.and_then(|it| it.under_way.as_ref());
-        if let Some((request_id, _)) = under_way.cloned() {
-            self.put_trial_back(request_id);
-            self.abandon(request_id, actions);
-        }
     }
 }

@@ -64,8 +64,7 @@ fn list_of_skipped_checkers_is_stored_once() {
             .map(|(a, b, c)| (a.to_owned(), b.to_owned(), c));
         assert_eq!(checkers_of(&journal, job), expected.collect::<Vec<_>>());
     }
-    // A checker list that no job uses any more is removed with its last job. The next job writes it
-    // again.
+    // A checker list that no job uses any more is removed with its last job. The next job writes it again.
     let old = "UPDATE jobs SET at = 0 WHERE job < 3";
     journal.connection.execute(old, []).unwrap();
     assert_eq!(journal.prune(Duration::from_secs(60)).unwrap(), 2);

@@ -117,8 +117,7 @@ fn files_in_new_directories_are_all_reported() {
         let deep = root.join(at("deep")).join("1/2/3/4");
         fs::create_dir_all(&deep).unwrap();
         put(&deep.join("a.xodr"));
-        // `rsync --delay-updates` and `mv` do it like this. The directory is then renamed once more
-        // at once.
+        // `rsync --delay-updates` and `mv` do it like this. The directory is then renamed once more at once.
         fs::create_dir_all(aside.join(at("moved")).join("1/2")).unwrap();
         put(&aside.join(at("moved")).join("1/2/a.xodr"));
         fs::rename(aside.join(at("moved")), root.join(at("first"))).unwrap();
