@@ -1,5 +1,4 @@
-//! Registry of required bundles, whether or not they have joined. It survives restarts, and every
-//! change of it begins a new epoch.
+//! Registry of required bundles, joined or not. It survives restarts. Every change begins a new epoch.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -44,8 +43,7 @@ impl State {
         self.begin_epoch();
     }
 
-    /// Adds all child bundles to the registry. They stay there as long as they are children, even
-    /// if they never joined.
+    /// Adds all child bundles to the registry. They stay as long as they are children, even if they never joined.
     pub(super) fn enrol_children(&mut self, actions: &mut Actions) {
         let children = self.children.iter();
         let wanted: BTreeSet<String> = children

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use qcbus_bus::LoanError;
-use qcbus_ingest::IngestError;
+use qcbus_ingest::{BuildError, IngestError, Prepared};
 use qcbus_messages::Absence;
 use qcbus_messages::path_text::to_text;
 
@@ -99,6 +99,20 @@ fn unreadable(path: &Path, reason: String) -> PrepareFailure {
         Ok(None) => PrepareFailure::Vanished,
         // A file without a readable stamp may exist.
         _ => PrepareFailure::Unreadable(reason),
+    }
+}
+
+/// Returns the exact size of an image if it may make a difference for this error.
+pub(super) fn exact(prepared: &Prepared, error: &LoanError) -> Option<usize> {
+    if !matches!(
+        error,
+        LoanError::NoSpace { .. } | LoanError::NeverFits { .. }
+    ) {
+        return None;
+    }
+    match prepared.build_into(&mut []) {
+        Err(BuildError::SmallBuffer { needed, .. }) => Some(needed),
+        _ => None,
     }
 }
 

@@ -22,7 +22,7 @@ mod failure;
 mod gathered;
 mod shared;
 
-use failure::{Failure, explained};
+use failure::{Failure, exact, explained};
 use gathered::{Gathered, Links, inputs_of, same_bytes, was_racy};
 use shared::Shared;
 
@@ -389,20 +389,6 @@ impl Intake {
         let root = self.roots.iter().filter(counts);
         root.max_by_key(|root| root.as_os_str().len())
             .map_or_else(|| path.parent().unwrap_or(path), PathBuf::as_path)
-    }
-}
-
-/// Returns the exact size of an image if it may make a difference for this error.
-fn exact(prepared: &Prepared, error: &LoanError) -> Option<usize> {
-    if !matches!(
-        error,
-        LoanError::NoSpace { .. } | LoanError::NeverFits { .. }
-    ) {
-        return None;
-    }
-    match prepared.build_into(&mut []) {
-        Err(BuildError::SmallBuffer { needed, .. }) => Some(needed),
-        _ => None,
     }
 }
 
