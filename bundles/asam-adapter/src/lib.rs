@@ -20,7 +20,6 @@ mod host;
 mod hosted;
 mod learn;
 mod messages;
-mod pending;
 mod process;
 mod program;
 mod report;
@@ -29,6 +28,7 @@ mod runner;
 mod runners;
 mod samples;
 mod scratch;
+mod staging;
 pub mod warm;
 mod written;
 

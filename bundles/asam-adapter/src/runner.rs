@@ -15,10 +15,10 @@ use crate::family;
 use crate::fork_server::ForkServer;
 use crate::hosted::Hosted;
 use crate::messages::{Answer, MOST, Ran, Request};
-use crate::pending::Staged;
 use crate::process::{self, Broken, Run};
 use crate::program::Programs;
 use crate::scratch::{Room, Scratch};
+use crate::staging::Staged;
 use crate::written;
 
 /// Serves requests until the other end of the socket on stdin is closed.

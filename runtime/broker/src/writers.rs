@@ -216,7 +216,7 @@ impl Writer {
             if self.waiting.is_empty() {
                 retry_at = None;
                 if std::mem::take(&mut self.troubled) {
-                    self.is_failing(None);
+                    self.report_failure(None);
                 }
             } else {
                 retry_at = retry_at.or_else(|| Some(now() + RETRY));
@@ -250,7 +250,7 @@ impl Writer {
         }
     }
 
-    fn is_failing(&self, what: Option<String>) {
+    fn report_failure(&self, what: Option<String>) {
         let mut troubles = self.troubles.lock().unwrap_or_else(PoisonError::into_inner);
         match what {
             Some(what) => troubles.insert(self.number, what),
@@ -260,7 +260,7 @@ impl Writer {
 
     fn hold_up(&mut self, failure: &StoreFailure) {
         self.troubled = true;
-        self.is_failing(Some(failure.what.clone()));
+        self.report_failure(Some(failure.what.clone()));
         self.stopped |= failure.concerns_all;
         if !self.told {
             self.told = true;

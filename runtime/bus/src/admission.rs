@@ -118,7 +118,7 @@ impl Admission {
     }
 
     /// Accepts new connections and reads new statements.
-    pub(crate) fn receive_budget(&mut self, now: Instant) {
+    pub(crate) fn exchange(&mut self, now: Instant) {
         for _ in 0..TAKEN {
             // This also covers a lack of file descriptors, because peers connect again.
             let Ok((stream, _)) = self.listener.accept() else {
@@ -424,7 +424,7 @@ mod tests {
                 ..key(1, 1)
             },
         );
-        admission.receive_budget(Instant::now());
+        admission.exchange(Instant::now());
         let known = admission.take(&key(1, 1)).unwrap();
         assert_eq!(known.process.as_ref().unwrap().id(), std::process::id());
         assert!(known.is_there());
@@ -452,7 +452,7 @@ mod tests {
             return;
         };
         while admission.known.len() < 2 {
-            admission.receive_budget(Instant::now());
+            admission.exchange(Instant::now());
             std::thread::yield_now();
         }
         let own = admission.take(&key(1, 1)).unwrap();
@@ -487,24 +487,24 @@ mod tests {
         not_text[STATEMENT - MAX_LAUNCH] = 0xff;
         let mut stream = UnixStream::connect(&path).unwrap();
         stream.write_all(&not_text).unwrap();
-        admission.receive_budget(Instant::now());
+        admission.exchange(Instant::now());
         assert!(admission.known.is_empty() && admission.silent.is_empty());
         // The number of silent connections and of unused statements is limited.
         for _ in 0..3 {
             for number in 0..TAKEN as u64 {
                 kept.push(introduce(&instance, key(number, 1)).unwrap());
             }
-            admission.receive_budget(Instant::now());
+            admission.exchange(Instant::now());
             for _ in 0..TAKEN {
                 kept.push(UnixStream::connect(&path).unwrap());
             }
-            admission.receive_budget(Instant::now());
+            admission.exchange(Instant::now());
         }
         assert_eq!(
             (admission.known.len(), admission.silent.len()),
             (MAX_KNOWN, MAX_SILENT)
         );
-        admission.receive_budget(Instant::now() + FRESH);
+        admission.exchange(Instant::now() + FRESH);
         assert!(admission.known.is_empty() && admission.silent.is_empty());
     }
 
@@ -514,9 +514,9 @@ mod tests {
         let (instance, mut admission) = admission(dir.path());
         std::fs::remove_file(dir.path().join(SOCKET)).unwrap();
         assert!(introduce(&instance, key(1, 1)).is_err());
-        admission.receive_budget(Instant::now() + LOOK);
+        admission.exchange(Instant::now() + LOOK);
         let _peer = introduce(&instance, key(1, 1)).unwrap();
-        admission.receive_budget(Instant::now());
+        admission.exchange(Instant::now());
         assert!(admission.take(&key(1, 1)).is_some());
         drop(admission);
         assert!(!dir.path().join(SOCKET).exists());

@@ -198,7 +198,7 @@ impl Host {
             services.config.growth = Growth::Fixed;
         }
         let room_locks = RoomLocks::new();
-        let receive_budget = room_locks.take();
+        let room_lock = room_locks.take();
         let expected = options.expected_peers.min(limits.peers) as u64;
         let room = expected * services.peer_bytes();
         let own = services.broker_bytes();
@@ -252,7 +252,7 @@ impl Host {
             limits,
             services,
         };
-        drop(receive_budget);
+        drop(room_lock);
         host.runtime_files.announce()?;
         Ok(host)
     }
@@ -291,19 +291,19 @@ impl Host {
     /// future loses nothing. Nothing moves on the bus unless this is awaited. Reading is split into
     /// intervals of a few milliseconds, so other tasks run however much peers send.
     pub async fn next(&mut self) -> HostEvent {
-        let mut room_locks = 0;
+        let mut intervals = 0;
         loop {
             // This also runs while events wait, or nothing would be sent until the last is fetched.
             let more = if self.waiting.is_empty() || self.last_turn.elapsed() >= TICK {
-                self.receive_budget()
+                self.exchange()
             } else {
                 false
             };
             if let Some(event) = self.waiting.pop() {
                 return event;
             }
-            room_locks += 1;
-            if more || room_locks % TURNS_IN_A_ROW == 0 {
+            intervals += 1;
+            if more || intervals % TURNS_IN_A_ROW == 0 {
                 tokio::task::yield_now().await;
             }
             if more {
@@ -394,7 +394,7 @@ impl Host {
 
     /// Sends the queued data and reads as much as one receive budget allows, without waiting.
     /// Returns `true` if there may be more to read.
-    fn receive_budget(&mut self) -> bool {
+    fn exchange(&mut self) -> bool {
         let now = Instant::now();
         self.greet(now, &Budget::new(now));
         // Reading has its own budget, so repeated introductions cannot delay other messages.
@@ -402,7 +402,7 @@ impl Host {
         let ticked = now.duration_since(self.last_tick) >= TICK;
         if ticked {
             self.last_tick = now;
-            self.admission.receive_budget(now);
+            self.admission.exchange(now);
         }
         for session in self.sessions.values_mut() {
             if ticked {
@@ -493,7 +493,7 @@ impl Host {
     /// Opens a session for a peer that has proven its identity.
     fn meet(&mut self, key: SessionKey, hello: Hello, now: Instant) {
         // The peer states its identity before it introduces itself.
-        self.admission.receive_budget(now);
+        self.admission.exchange(now);
         let Some(known) = self.admission.take(&key) else {
             return self.is_strange(key, &hello, now);
         };

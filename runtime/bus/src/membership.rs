@@ -220,7 +220,7 @@ impl Membership {
     }
 
     /// Does everything that is possible without waiting.
-    pub(crate) fn receive_budget(
+    pub(crate) fn exchange(
         &mut self,
         now: Instant,
         max_events: usize,

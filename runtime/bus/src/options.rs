@@ -99,16 +99,16 @@ impl HostOptions {
     }
 
     fn limits(&self) -> Limits {
-        let mapped_image = |active: usize| active + active.div_ceil(2) + 2;
+        let most_held = |active: usize| active + active.div_ceil(2) + 2;
         let small_active = self.active_documents.max(1);
         let large_active = self.large_active_documents.max(1);
         Limits {
             peers: self.max_peers.max(1),
             small_active,
-            small_held: mapped_image(small_active),
+            small_held: most_held(small_active),
             small_bytes: self.small_class_bytes.max(4 << 10),
             large_active,
-            large_held: mapped_image(large_active),
+            large_held: most_held(large_active),
             ..Limits::default()
         }
     }

@@ -218,7 +218,7 @@ impl Peer {
         // An existing broker gets more time, because it may be busy starting.
         let answer_until = until.max(Instant::now() + options.grace);
         loop {
-            peer.receive_budget()?;
+            peer.exchange()?;
             if peer.joined_before {
                 send_side::joined();
                 return Ok(peer);
@@ -260,7 +260,7 @@ impl Peer {
                     reason: reason.clone(),
                 };
             }
-            if let Err(error) = self.receive_budget() {
+            if let Err(error) = self.exchange() {
                 self.close(error.to_string());
             }
             if self.events.is_empty() && !matches!(self.state, State::Closed(_)) {
@@ -395,14 +395,14 @@ impl Peer {
     }
 
     /// Does everything that is possible without waiting.
-    fn receive_budget(&mut self) -> Result<(), JoinError> {
+    fn exchange(&mut self) -> Result<(), JoinError> {
         let now = Instant::now();
         if matches!(self.state, State::Seeking) && now >= self.seek_at {
             self.seek()?;
         }
         if let State::Member(membership) = &mut self.state {
             let membership_state =
-                membership.receive_budget(now, MAX_WAITING, &mut self.events, &mut self.config);
+                membership.exchange(now, MAX_WAITING, &mut self.events, &mut self.config);
             self.take_note(membership_state, now);
         }
         if now.duration_since(self.last_watch) >= WATCH_EVERY {

@@ -2,8 +2,8 @@
 //!
 //! Checkers of one model form a *checker group*. The model is built when the first of them passes
 //! its gates. Groups without mutual preconditions run in parallel (`Plan::batches`). Within a
-//! group, each part of the model is a task, and so is each checker of the whole model. As many
-//! threads as there are free permits run the tasks (`spread.rs`). The findings do not depend on the
+//! group, each part of the model is a chunk, and so is each checker of the whole model. As many
+//! threads as there are free permits run the chunks (`spread.rs`). The findings do not depend on the
 //! number of threads.
 
 mod checker_group;
@@ -38,7 +38,7 @@ pub struct Outcome {
 
 /// Observer of a check. Checkers are identified by their index in [`Plan::checkers`].
 pub trait Listener: Sync {
-    /// Returns whether to stop. Every thread asks this between two tasks.
+    /// Returns whether to stop. Every thread asks this between two chunks.
     fn is_cancelled(&self) -> bool {
         false
     }

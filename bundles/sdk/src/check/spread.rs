@@ -1,7 +1,7 @@
-//! Tasks of a checker group, and the threads that run them.
+//! Chunks of a checker group, and the threads that run them.
 //!
-//! A task is either a part of the model for all checkers that work by parts, or the whole for one
-//! checker. Every thread has its own sinks for the findings of its tasks. They are merged into the
+//! A chunk is either a part of the model for all checkers that work by parts, or the whole for one
+//! checker. Every thread has its own sinks for the findings of its chunks. They are merged into the
 //! list that a single thread would produce: findings in the order of their parts. In some cases the
 //! sinks are not sufficient for this: a checker found more than it lists, or counts references.
 //! Then it runs once more in one thread, because rules are deterministic.
@@ -39,8 +39,8 @@ struct Had<'r> {
     ended: Option<(u32, Ending)>,
 }
 
-/// The tasks and the number of the next one.
-struct Tasks<'t, 'r> {
+/// The chunks and the number of the next one.
+struct Chunks<'t, 'r> {
     work: Work<'r>,
     schedule: &'t [ScheduledRule<'r>],
     /// Indices in `schedule` of the checkers that work by parts.
@@ -52,7 +52,7 @@ struct Tasks<'t, 'r> {
     next: AtomicUsize,
 }
 
-/// Time that a thread works on tasks before it starts others. A few short tasks are not worth a
+/// Time that a thread works on chunks before it starts others. A few short chunks are not worth a
 /// thread: a start takes a tenth of a millisecond.
 const WORTH_A_THREAD: Duration = Duration::from_micros(100);
 
@@ -72,7 +72,7 @@ impl<'r> Work<'r> {
             let asked = all.filter(|(_, scheduled)| asked(scheduled.rule));
             asked.map(|(place, _)| place).collect::<Vec<usize>>()
         };
-        let tasks = Tasks {
+        let chunks = Chunks {
             work: self,
             schedule,
             by_parts: places(|rule| rule.goes_by_parts()),
@@ -81,10 +81,10 @@ impl<'r> Work<'r> {
             next: AtomicUsize::new(0),
         };
         let mut piles = if self.spreads {
-            tasks.by_many()
+            chunks.by_many()
         } else {
-            let mut own = tasks.empty_pile();
-            while tasks.one(&mut own) {}
+            let mut own = chunks.empty_pile();
+            while chunks.one(&mut own) {}
             vec![own]
         };
         if self.stops() {
@@ -93,14 +93,14 @@ impl<'r> Work<'r> {
         let of = |place: usize| {
             let of_all = piles.iter_mut();
             let found = of_all.filter_map(|it| it.get_mut(place)?.take()).collect();
-            tasks.together(&schedule[place], found)
+            chunks.together(&schedule[place], found)
         };
         Some((0..schedule.len()).map(of).collect())
     }
 }
 
-impl<'r> Tasks<'_, 'r> {
-    /// Runs tasks in this thread, and starts other threads as long as permits are free.
+impl<'r> Chunks<'_, 'r> {
+    /// Runs chunks in this thread, and starts other threads as long as permits are free.
     fn by_many(&self) -> Vec<Pile<'r>> {
         let begun = Instant::now();
         std::thread::scope(|scope| {
@@ -124,7 +124,7 @@ impl<'r> Tasks<'_, 'r> {
         })
     }
 
-    /// Runs tasks with a borrowed permit until a job needs it.
+    /// Runs chunks with a borrowed permit until a job needs it.
     fn lend(&self, permit: Permit<'_>) -> Pile<'r> {
         let mut own = self.empty_pile();
         while !self.work.permits.are_wanted() && self.one(&mut own) {}
@@ -140,30 +140,30 @@ impl<'r> Tasks<'_, 'r> {
         self.built.parts() + self.wholes.len()
     }
 
-    /// Returns the number of tasks that no thread has taken.
+    /// Returns the number of chunks that no thread has taken.
     fn left(&self) -> usize {
         self.count()
             .saturating_sub(self.next.load(Ordering::Relaxed))
     }
 
-    /// Runs one task. Returns `false` if there is none.
+    /// Runs one chunk. Returns `false` if there is none.
     fn one(&self, own: &mut Pile<'r>) -> bool {
         if self.work.stops() {
             return false;
         }
-        let task = self.next.fetch_add(1, Ordering::Relaxed);
+        let chunk = self.next.fetch_add(1, Ordering::Relaxed);
         let parts = self.built.parts();
-        if task < parts {
+        if chunk < parts {
             let mut clock = Instant::now();
             for &place in &self.by_parts {
                 let (scheduled, had) = self.in_pile(own, place);
-                self.look(scheduled, had, Some(task), &mut clock);
+                self.look(scheduled, had, Some(chunk), &mut clock);
             }
-        } else if let Some(&place) = self.wholes.get(task - parts) {
+        } else if let Some(&place) = self.wholes.get(chunk - parts) {
             let (scheduled, had) = self.in_pile(own, place);
             self.look(scheduled, had, None, &mut Instant::now());
         }
-        task < self.count()
+        chunk < self.count()
     }
 
     /// Returns a checker and its findings in this thread.

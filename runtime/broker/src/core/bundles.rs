@@ -26,7 +26,7 @@ pub(super) struct Bundle {
     pub launch: Option<Launch>,
     pub catalogue: Option<Arc<Catalogue>>,
     /// Its registration while that is distrusted.
-    pub registered: Option<Registration>,
+    pub pending_registration: Option<Registration>,
     /// Digest of the started program at the last accepted registration.
     pub accepted_spec: Option<u64>,
     /// Documents that it was missing, each with the time of its last report.
@@ -154,7 +154,7 @@ impl State {
             actions.push(Action::Refuse { session, reason });
             return;
         }
-        if let Some(reason) = self.refuse(hello) {
+        if let Some(reason) = self.refusal(hello) {
             self.notice(Notice::TurnedAway(reason.clone()), actions);
             actions.push(Action::Refuse { session, reason });
             return;
@@ -165,7 +165,7 @@ impl State {
         }
     }
 
-    fn refuse(&self, hello: &Hello) -> Option<String> {
+    fn refusal(&self, hello: &Hello) -> Option<String> {
         let ours = qcbus_messages::PROTOCOL_VERSION;
         let good = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
         let known = || match hello.role {
@@ -254,7 +254,7 @@ impl State {
         bundle.pid = hello.pid;
         bundle.launch = launch;
         bundle.ready = false;
-        bundle.registered = None;
+        bundle.pending_registration = None;
         bundle.lacks.clear();
         bundle.capacity = usize::from(hello.capacity).clamp(1, 64);
         bundle.threads = hello.threads;
@@ -437,21 +437,21 @@ impl State {
     /// Looks for bundles that hang, are silent, forget a job or never get ready.
     pub(super) fn watch_bundles(&mut self, actions: &mut Actions) {
         let there = self.bundles.iter().filter(|(_, it)| it.session.is_some());
-        let failing = there.filter_map(|(name, it)| Some((name.clone(), self.is_failing(it)?)));
+        let failing = there.filter_map(|(name, it)| Some((name.clone(), self.fault_of(it)?)));
         for (name, why) in failing.collect::<Vec<_>>() {
             self.bundle_fails(&name, &why, actions);
         }
     }
 
     /// Returns the fault of a joined bundle, or `None`.
-    fn is_failing(&self, bundle: &Bundle) -> Option<String> {
+    fn fault_of(&self, bundle: &Bundle) -> Option<String> {
         let since = |then: Duration| self.now.saturating_sub(then);
         let (deadline, silence) = (self.settings.job_deadline, self.settings.silence_limit);
         let still = since(bundle.moved);
         if bundle.draining && bundle.active.is_empty() && still > LEAVE_LIMIT {
             return Some("it was asked to leave but did not".to_owned());
         }
-        if bundle.registered.is_some() {
+        if bundle.pending_registration.is_some() {
             return None;
         }
         if !bundle.ready {

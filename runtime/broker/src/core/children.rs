@@ -195,8 +195,8 @@ impl State {
             child.upgrade = None;
         } else if child.state != ChildState::Joined {
             let as_wanted = child.spec.version.as_deref().is_none_or(|it| it == version);
-            let stale_children = |it: Launch| it < first && it.is_of(&child.spec) && as_wanted;
-            let goes_on = launch.is_some_and(stale_children);
+            let is_stale = |it: Launch| it < first && it.is_of(&child.spec) && as_wanted;
+            let goes_on = launch.is_some_and(is_stale);
             if goes_on {
                 actions.extend(starting.map(|(launch, _)| Action::kill_unjoined(launch)));
             }

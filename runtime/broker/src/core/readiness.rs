@@ -55,7 +55,7 @@ impl State {
     }
 
     fn hindrance(&self, child: Option<&Child>, bundle: Option<&Bundle>) -> Option<String> {
-        let flapping = bundle.filter(|it| it.registered.is_some());
+        let flapping = bundle.filter(|it| it.pending_registration.is_some());
         let flapping = flapping.map(|it| it.note.clone());
         child.and_then(|it| it.failure.clone()).or(flapping)
     }

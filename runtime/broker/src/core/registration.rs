@@ -72,7 +72,7 @@ impl State {
             return;
         }
         let catalogue = Arc::new(catalogue);
-        let waits_until = bundle.registered.as_ref().map(|it| it.at);
+        let waits_until = bundle.pending_registration.as_ref().map(|it| it.at);
         let version_digest = self.version_digest_of(name, bundle, &catalogue);
         let is_new = bundle.origin.is_none() && !self.is_shadow(name);
         let changes = bundle.version_digest != Some(version_digest) || is_new;
@@ -87,7 +87,7 @@ impl State {
     pub(super) fn accept_registrations(&mut self, actions: &mut Actions) {
         let now = self.now;
         let due = self.bundles.iter_mut().filter_map(|(name, bundle)| {
-            let said = bundle.registered.take_if(|it| it.at <= now)?;
+            let said = bundle.pending_registration.take_if(|it| it.at <= now)?;
             bundle.session?;
             Some((name.clone(), said.catalogue))
         });
@@ -108,7 +108,7 @@ impl State {
         if let Some(bundle) = self.bundles.get_mut(name) {
             bundle.catalogue = Some(catalogue);
             bundle.ready = true;
-            bundle.registered = None;
+            bundle.pending_registration = None;
             bundle.note.clear();
             bundle.accepted_spec = bundle.launch.map(Launch::started);
             self.is_ready(name);
@@ -136,7 +136,7 @@ impl State {
             return;
         };
         bundle.ready = false;
-        let is_news = bundle.registered.replace(said).is_none();
+        let is_news = bundle.pending_registration.replace(said).is_none();
         if is_news {
             bundle.note.clone_from(&why);
             let name = name.to_owned();
@@ -199,7 +199,7 @@ impl State {
     /// Returns the reason why a joined bundle gets no tasks: it is distrusted for the time being.
     /// `None` if it gets tasks.
     pub(super) fn is_flapping(&self, name: &str, bundle: &Bundle) -> Option<String> {
-        bundle.registered.as_ref()?;
+        bundle.pending_registration.as_ref()?;
         let in_the_registry = bundle.session.is_some() && bundle.origin.is_some();
         in_the_registry.then(|| format!("{name} gets no tasks for now: {}", bundle.note))
     }

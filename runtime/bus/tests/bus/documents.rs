@@ -166,12 +166,12 @@ fn late_reader_gets_the_published_documents() {
         let site = Site::new();
         let mut host = site.host();
         let documents = host.documents();
-        let mapped_image: Vec<MappedImage> = (1..=20)
+        let images: Vec<MappedImage> = (1..=20)
             .map(|doc| publish(&documents, doc, 10_000 * doc as usize))
             .collect();
         let large = publish(&documents, 21, 3_000_000);
         let (_, mut peer) = join(&mut host, &site, "late").await;
-        for ours in mapped_image.iter().chain([&large]) {
+        for ours in images.iter().chain([&large]) {
             let doc = ours.doc().0;
             check(&arrival(&mut host, &mut peer, doc).await, doc, ours.len());
         }
@@ -255,18 +255,18 @@ fn held_documents_are_bounded_by_the_slowest_reader() {
         let documents = host.documents();
         // The documents are large, because the bus carries the fewest of these at once.
         let len = 600_000;
-        let mut mapped_image = Vec::new();
+        let mut images = Vec::new();
         while let Ok(loan) = documents.loan(len) {
             drop(loan);
-            mapped_image.push(publish(&documents, mapped_image.len() as u64 + 1, len));
+            images.push(publish(&documents, images.len() as u64 + 1, len));
         }
         assert_eq!(documents.loan(len).err(), Some(LoanError::Busy));
-        assert!(mapped_image.len() > 1);
-        for doc in &mapped_image {
+        assert!(images.len() > 1);
+        for doc in &images {
             arrival(&mut host, &mut peer, doc.doc().0).await;
         }
         // A place is left for publishing a document again, in case the reader has lost one.
-        documents.publish_again(&mapped_image[0]).unwrap();
+        documents.publish_again(&images[0]).unwrap();
     });
 }
 

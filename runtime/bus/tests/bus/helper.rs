@@ -152,13 +152,13 @@ async fn member(instance: &Instance, name: &str) -> Result<Peer, JoinError> {
 /// Holds every document that arrives for ever, and reports it to the broker.
 async fn holds_documents(instance: &Instance) {
     let mut peer = member(instance, "holder").await.unwrap();
-    let mut mapped_image = Vec::new();
+    let mut images = Vec::new();
     loop {
         if let PeerEvent::Document(doc) = peer.next().await {
-            mapped_image.extend(peer.document(doc));
+            images.extend(peer.document(doc));
             peer.send(&FromPeer::JobDone {
                 job: JobId(doc.0),
-                micros: mapped_image.len() as u64,
+                micros: images.len() as u64,
             });
         }
     }
