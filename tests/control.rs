@@ -16,7 +16,7 @@ use std::process::Command;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use qcbus_broker::control::ask_broker;
+use qcbus_control::ask_broker;
 use qcbus_messages::Verdict;
 use qcbus_messages::control::{Request, Response};
 use support::broker::Broker;

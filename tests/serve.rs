@@ -13,8 +13,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use qcbus_broker::control::ask_broker;
 use qcbus_bus::Instance;
+use qcbus_control::ask_broker;
 use qcbus_document::FileKind;
 use qcbus_formats::xqar::Results;
 use qcbus_messages::Verdict;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use qcbus_broker::control::ask_broker;
+use qcbus_control::ask_broker;
 use qcbus_messages::control::Request;
 
 use super::driver::Driver;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-use qcbus_broker::control::ask_broker;
+use qcbus_control::ask_broker;
 use qcbus_formats::xqar::{self, Results};
 use qcbus_messages::control::{FileVerdict, Request, Response, Status};
 use rustix::process::Signal;

@@ -3,14 +3,14 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use qcbus_broker::reload::Adapter;
-use qcbus_broker::{ChildSpec, Restart};
+use qcbus_configuration::Adapter;
 use qcbus_document::FileKind;
 use qcbus_formats::Text;
 use qcbus_formats::config::{Known, KnownBundle, KnownChecker, KnownParam, Names};
 use qcbus_messages::Role;
 use qcbus_reporter_sdk::{Registration, RulePage, rule_name};
 use qcbus_sdk::{Bundle, Checker, MAX_ISSUES, UserFiles};
+use qcbus_types::{ChildSpec, Restart};
 
 /// The standard bundles.
 pub static BUNDLES: [&Bundle; 3] = [

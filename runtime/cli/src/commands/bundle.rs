@@ -2,7 +2,7 @@
 
 use std::os::unix::process::CommandExt;
 
-use qcbus_broker::control::{AskError, ask_broker};
+use qcbus_control::{AskError, ask_broker};
 use qcbus_messages::control::{Request, Response};
 use qcbus_messages::{Exit, shown};
 use qcbus_sdk::run::Mode;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use qcbus_broker::reload::{Loaded, Sources};
+use qcbus_configuration::{Loaded, Sources};
 use qcbus_formats::config::Oddity;
 use qcbus_formats::xqar::Level;
 use qcbus_messages::path_text::to_text;

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use qcbus_broker::control::{AskError, ask_broker};
-use qcbus_broker::journal::Journal;
-use qcbus_broker::reload::unwritable;
 use qcbus_bus::{HostOptions, SharedMemory};
+use qcbus_configuration::unwritable;
+use qcbus_control::{AskError, ask_broker};
 use qcbus_messages::control::{Request, Response, ScratchStatus, Status};
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Exit, PROTOCOL_VERSION, shown};
+use qcbus_publish::journal::Journal;
 
 use super::health;
 use super::settings::{absolute, instance};

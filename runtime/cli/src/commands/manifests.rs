@@ -6,8 +6,8 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use qcbus_broker::control::{AskError, ask_broker};
 use qcbus_bus::Instance;
+use qcbus_control::{AskError, ask_broker};
 use qcbus_disk::write_whole;
 use qcbus_messages::Exit;
 use qcbus_messages::control::{Request, Response};

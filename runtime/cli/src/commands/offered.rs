@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use qcbus_broker::control::ask_broker;
+use qcbus_control::ask_broker;
 use qcbus_messages::CheckerInfo;
 use qcbus_messages::control::{Offer, Request, Response};
 use qcbus_messages::shown;

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use qcbus_broker::OwnProgram;
+use qcbus_configuration::OwnProgram;
 use qcbus_messages::path_text::to_text;
 use rustix::fs::{Access, access};
 

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use qcbus_broker::control::ask_broker;
+use qcbus_control::ask_broker;
 use qcbus_messages::control::{BundleReadiness, Readiness, Request, Response, Runs};
 use qcbus_messages::{Exit, shown};
 

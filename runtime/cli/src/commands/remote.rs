@@ -1,6 +1,6 @@
 //! Commands that ask a running broker: `down`, `wait`, `reload`.
 
-use qcbus_broker::control::{AskError, ask_broker};
+use qcbus_control::{AskError, ask_broker};
 use qcbus_messages::Exit;
 use qcbus_messages::control::{FileVerdict, Request, Response};
 use qcbus_messages::path_text::to_text;

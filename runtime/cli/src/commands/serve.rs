@@ -3,11 +3,13 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use qcbus_broker::journal::JournalError;
-use qcbus_broker::{Broker, GateError, LockError, Options, Outside, StartError, Told};
+use qcbus_broker::{Broker, Options, StartError, Told};
 use qcbus_bus::{HostOptions, StartError as BusError};
 use qcbus_messages::Exit;
 use qcbus_messages::path_text::to_text;
+use qcbus_publish::directory_lock::LockError;
+use qcbus_publish::gate::{GateError, Outside};
+use qcbus_publish::journal::JournalError;
 
 use super::settings::{
     absolute, dialect, instance, limits, manifest_directory, memory_limit, outermost, program,
@@ -240,7 +242,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         memory_limit: memory_limit(&args.limits),
         limits: limits(&args.limits),
         host: HostOptions::default(),
-        settings: qcbus_broker::Settings {
+        settings: qcbus_types::Settings {
             drain_limit: args.drain_limit,
             own_verdicts: args.own_verdict,
             ..settings(&args.limits)

@@ -3,13 +3,14 @@
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 
-use qcbus_broker::watch::hidden_above;
-use qcbus_broker::{OwnProgram, Settings};
 use qcbus_bus::Instance;
+use qcbus_configuration::OwnProgram;
 use qcbus_formats::xqar::Dialect;
 use qcbus_ingest::Limits;
 use qcbus_messages::path_text::to_text;
 use qcbus_sdk::Permits;
+use qcbus_types::Settings;
+use qcbus_watch::hidden_above;
 
 use crate::args::{DialectArg, InstanceArgs, LimitArgs};
 

@@ -12,12 +12,15 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
-use qcbus_broker::{Broker, OperatorSignal, Options, Outside, ResultPaths, Settings, StartError};
+use qcbus_broker::{Broker, OperatorSignal, Options, StartError};
 use qcbus_bus::{HostOptions, Instance, SharedMemory, StartError as BusError};
 use qcbus_document::FileKind;
 use qcbus_formats::config::{Choice, Config, Known};
 use qcbus_messages::Exit;
 use qcbus_messages::path_text::to_text;
+use qcbus_publish::gate::Outside;
+use qcbus_publish::result_paths::ResultPaths;
+use qcbus_types::Settings;
 use tokio::sync::mpsc;
 
 use super::settings::{
@@ -104,7 +107,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
     let config = args.config.as_deref().map(absolute);
     let parsed = match &config {
         Some(path) => Some(
-            qcbus_broker::reload::read_config(path)
+            qcbus_configuration::read_config(path)
                 .map_err(|error| usage(error.to_string()))?
                 .config,
         ),
@@ -250,9 +253,9 @@ fn writable(out: &Path) -> Result<(), Refusal> {
 
 /// Returns the bundles to run. With a configuration, these are only the bundles that it names.
 fn wanted_bundles(
-    specs: Vec<qcbus_broker::ChildSpec>,
+    specs: Vec<qcbus_types::ChildSpec>,
     config: Option<&Config>,
-) -> Vec<qcbus_broker::ChildSpec> {
+) -> Vec<qcbus_types::ChildSpec> {
     let Some(config) = config else { return specs };
     let named = |name: &str| {
         let alias = standard::bundle(name).map_or("", |bundle| bundle.alias);

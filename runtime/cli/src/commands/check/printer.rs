@@ -4,15 +4,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use qcbus_broker::{Delivery, Judged, Notice, ResultPaths, Told};
+use qcbus_broker::Told;
 use qcbus_document::Suffix;
 use qcbus_formats::config::Config;
 use qcbus_formats::pool::{CHOICE_CHECKER, OWN_BUNDLE};
 use qcbus_formats::xqar::{Issue, Level};
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Exit, ResultMessage, Verdict, shown};
+use qcbus_publish::result_paths::ResultPaths;
 use qcbus_report_text::{Folding, Options};
 use qcbus_reporter_sdk::{FileSources, meaning};
+use qcbus_types::{Delivery, Judged, Notice};
 
 use super::outputs::{Outputs, Terminal};
 use super::tally::Tally;
@@ -172,7 +174,7 @@ impl Printer {
             judged,
         };
         let (places, config) = (&self.places, self.config.as_ref());
-        let message = qcbus_broker::deliveries::message("stdout", &delivery, None, places, config);
+        let message = qcbus_publish::deliveries::message("stdout", &delivery, None, places, config);
         match message {
             Ok(mut message) => self.report(&mut message),
             Err(why) => {

@@ -3,10 +3,10 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use qcbus_broker::watch::is_excluded;
 use qcbus_document::{FileKind, Suffix};
 use qcbus_formats::config::Config;
 use qcbus_messages::path_text::{from_text, to_text};
+use qcbus_watch::is_excluded;
 
 use super::{Refusal, usage};
 use crate::args::CheckArgs;

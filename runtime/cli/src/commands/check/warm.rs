@@ -10,13 +10,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use qcbus_broker::control::Line;
-use qcbus_broker::{Announcement, GivenResults, InForce, Notice, Options, Told, check_context};
+use qcbus_broker::{Announcement, Options, Told, check_context};
+use qcbus_configuration::InForce;
+use qcbus_control::Line;
 use qcbus_document::FileKind;
 use qcbus_ingest::modular::SearchPath;
 use qcbus_messages::control::{CheckContext, Checked, Referenced, Request, Response};
 use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Digest, Exit, Verdict};
+use qcbus_publish::store::GivenResults;
+use qcbus_types::Notice;
 
 use super::printer::{News, Printer};
 use super::run::Run;
