@@ -28,7 +28,25 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-confine", Some(&[])),
     ("qcbus-disk", Some(&[])),
     ("qcbus-ingest", Some(&["qcbus-disk"])),
-    ("qcbus-broker", Some(PROCESS)),
+    ("qcbus-types", Some(&[])),
+    ("qcbus-environment", Some(&["qcbus-ingest"])),
+    // Its tests need a configuration, because that demands checkers.
+    ("qcbus-state", Some(&["qcbus-types", "qcbus-configuration"])),
+    ("qcbus-watch", Some(FILES)),
+    ("qcbus-publish", Some(PUBLISH)),
+    ("qcbus-configuration", Some(PUBLISH)),
+    (
+        "qcbus-supervise",
+        Some(&[
+            "qcbus-types",
+            "qcbus-configuration",
+            "qcbus-bus",
+            "qcbus-confine",
+            "qcbus-disk",
+        ]),
+    ),
+    ("qcbus-control", Some(&["qcbus-bus", "qcbus-disk"])),
+    ("qcbus-broker", Some(BROKER)),
     ("qcbus-sdk", Some(PROCESS)),
     // This crate has the tests of all bundles: edits, damage and comparison of findings.
     ("qcbus-rule-tests", Some(&["qcbus-sdk", "qcbus-ingest"])),
@@ -55,6 +73,39 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus", None),
     ("qcbus-zoo", None),
     ("qcbus-benches", None),
+];
+
+/// Crates that a part of the broker may link if it looks at files.
+const FILES: &[&str] = &[
+    "qcbus-types",
+    "qcbus-environment",
+    "qcbus-disk",
+    "qcbus-ingest",
+];
+
+/// Crates that a part of the broker may link if it reads or writes for others.
+const PUBLISH: &[&str] = &[
+    "qcbus-types",
+    "qcbus-environment",
+    "qcbus-watch",
+    "qcbus-bus",
+    "qcbus-disk",
+    "qcbus-ingest",
+];
+
+/// Crates that the broker joins.
+const BROKER: &[&str] = &[
+    "qcbus-types",
+    "qcbus-environment",
+    "qcbus-state",
+    "qcbus-watch",
+    "qcbus-publish",
+    "qcbus-configuration",
+    "qcbus-supervise",
+    "qcbus-control",
+    "qcbus-bus",
+    "qcbus-disk",
+    "qcbus-ingest",
 ];
 
 /// Parts of every kind of process.
