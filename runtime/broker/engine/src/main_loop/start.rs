@@ -67,12 +67,9 @@ impl Broker {
         let (numbers, members) = remembered_by(journal.as_ref())?;
         options.settings.numbers = numbers.max(host.generation());
         let (state_directory, lock) = (StateDirectory::of(journal.as_ref()), results_of(&options)?);
-        let in_force = Arc::new(InForce::of(&sources, &loaded)?);
-        host.set_config(in_force.digest, &in_force.encoded);
-        let (control, looks) = (
-            control_of(backend, &options, senders.asked)?,
-            Looks::default(),
-        );
+        let in_force = put_in_force(&mut *host, &sources, &loaded)?;
+        let looks = Looks::default();
+        let control = control_of(backend, &options, senders.asked)?;
         let store = Arc::new(store(&options, (journal, lock), &looks, &senders.notices)?);
         let reconciled = reconcile(&options, &loaded, &store)?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
@@ -112,8 +109,7 @@ impl Broker {
         };
         broker.take_up(members, broker.store.voids()?);
         tell_at_the_start(&reconciled, &broker.options, limited, &senders.notices);
-        broker.look(reconciled, senders.seen)?;
-        Ok(broker)
+        broker.look(reconciled, senders.seen).map(|()| broker)
     }
 
     /// Restores the registry and the pending withdrawals of reports from the journal.
@@ -187,6 +183,17 @@ impl Broker {
         });
         Ok(())
     }
+}
+
+/// Publishes the configuration that is now in force.
+fn put_in_force(
+    host: &mut dyn Bus,
+    sources: &Sources,
+    loaded: &Loaded,
+) -> Result<Arc<InForce>, StartError> {
+    let in_force = Arc::new(InForce::of(sources, loaded)?);
+    host.set_config(in_force.digest, &in_force.encoded);
+    Ok(in_force)
 }
 
 fn control_of(
