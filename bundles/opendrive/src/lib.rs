@@ -10,67 +10,40 @@
 
 pub mod geometry;
 
-mod index;
-mod joints;
-mod junction;
-mod lane;
-mod lane_ref;
-mod lanes;
-mod lateral;
-mod map;
-mod names;
-mod objects;
-mod outlines;
-mod owned;
-mod part;
-mod plan_view;
-mod profile;
-mod railroad;
-mod road;
-mod section_ref;
-mod signals;
-mod station;
-mod steps;
-mod strips;
-mod surface;
-mod touching;
-mod traffic;
-mod value;
-mod view;
+mod queries;
+mod types;
 
-pub use joints::{LaneEnd, LaneJoint, RoadContact, RoadEnd};
-pub use junction::{
-    Boundary, BoundarySegment, Connection, CrossPath, CrossPathLaneLink, ElevationGrid, GridRow,
-    Junction, JunctionController, JunctionLaneLink, JunctionType, Priority, RoadSection,
-    SegmentStation,
+pub use queries::lane_ref::{Edge, LaneRef};
+pub use queries::map::{RoadMap, SignalKey, Version};
+pub use queries::owned::OwnedMap;
+pub use queries::part::MapPart;
+pub use queries::section_ref::SectionRef;
+pub use queries::spans::LaneSpan;
+pub use queries::traffic::Traffic;
+pub use types::contacts::{LaneEnd, LaneJoint, LaneKey, RoadContact, RoadEnd, TouchingLanes};
+pub use types::crg::Crg;
+pub use types::frame::{BorderPoint, Frame};
+pub use types::junction::{
+    Connection, CrossPath, CrossPathLaneLink, Junction, JunctionController, JunctionGroup,
+    JunctionLaneLink, JunctionReference, JunctionType, Priority, RoadSection,
 };
-pub use lane::{Lane, LaneGroup, LaneHeight, LaneLink, LaneRecord};
-pub use lane_ref::{Edge, LaneKey, LaneRef};
-pub use lanes::{LaneLayer, LaneSection};
-pub use lateral::{LateralProfile, Shape, ShapeRow};
-pub use map::{RoadMap, SignalKey, Version};
-pub use objects::{
+pub use types::junction_area::{Boundary, BoundarySegment, ElevationGrid, GridRow, SegmentStation};
+pub use types::lane::{Lane, LaneGroup, LaneHeight, LaneLink, LaneRecord};
+pub use types::lane_section::{LaneLayer, LaneSection};
+pub use types::lateral::{LateralProfile, Shape, ShapeRow};
+pub use types::objects::{
     CornerReference, Marking, Object, ObjectBorder, ObjectMaterial, ObjectReference, Repeat,
     Structure, Validity,
 };
-pub use outlines::{Corner, CornerKind, CurveLocal, ObjectPoint, Outline, Polyline};
-pub use owned::OwnedMap;
-pub use part::MapPart;
-pub use plan_view::{Geometry, Located, PlanView, ShapeKind};
-pub use profile::{Profile, Record, Stretch, Valid};
-pub use railroad::{
-    Crg, JunctionGroup, JunctionReference, Platform, PlatformSegment, RailroadStation, Switch,
-    Track,
-};
-pub use road::{Road, RoadLink, RoadType, TrafficRule};
-pub use section_ref::{LaneSpan, SectionRef};
-pub use signals::{
+pub use types::outlines::{Corner, CornerKind, CurveLocal, ObjectPoint, Outline, Polyline};
+pub use types::plan_view::{Geometry, Located, PlanView, ShapeKind};
+pub use types::profile::{Profile, Record, Stretch, Valid};
+pub use types::railroad::{Platform, PlatformSegment, RailroadStation, Switch, Track};
+pub use types::road::{Road, RoadLink, RoadType, TrafficRule};
+pub use types::signals::{
     Control, Controller, DisplayArea, ElementReference, Signal, SignalBoard, SignalDependency,
     SignalReference, VmsBoardReference, VmsGroup,
 };
-pub use station::Station;
-pub use strips::{CrossSectionSurface, Strip, StripMode};
-pub use surface::{BorderPoint, Frame};
-pub use touching::TouchingLanes;
-pub use traffic::Traffic;
-pub use value::{ContactPoint, Direction, LayerKind, Side, is_user_data};
+pub use types::station::Station;
+pub use types::strips::{CrossSectionSurface, Strip, StripMode};
+pub use types::value::{ContactPoint, Direction, LayerKind, Side, is_user_data};

@@ -1,6 +1,8 @@
 //! Direction of traffic on a lane (OpenDRIVE 1.9, 11.3.1).
 
-use crate::{ContactPoint, LaneRef, Side, TrafficRule};
+use crate::queries::lane_ref::LaneRef;
+use crate::types::road::TrafficRule;
+use crate::types::value::{ContactPoint, Side};
 
 /// The directions in which traffic may run on a lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,27 +1,14 @@
-//! A lane within its road: its borders and widths (OpenDRIVE 1.9, 11.7).
+//! A lane within its section and road: its borders and widths (OpenDRIVE 1.9, 11.7).
 
 use std::ops::Deref;
 
 use crate::geometry::finite;
-use crate::lane::Lane;
-use crate::profile::Profile;
-use crate::section_ref::SectionRef;
-use crate::station::Station;
-use crate::value::{ContactPoint, Side};
-
-/// Key of a lane in the map: the places of road, layer, section and lane in document order.
-/// [`RoadMap::lane`](crate::RoadMap::lane) returns the lane.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct LaneKey {
-    /// Place of the road in the map.
-    pub road: u32,
-    /// Place of the layer in the road.
-    pub layer: u32,
-    /// Place of the section in the layer.
-    pub section: u32,
-    /// Place of the lane in the section.
-    pub lane: u32,
-}
+use crate::queries::section_ref::SectionRef;
+use crate::types::contacts::{LaneEnd, LaneKey};
+use crate::types::lane::{Lane, LaneGroup};
+use crate::types::profile::Profile;
+use crate::types::station::Station;
+use crate::types::value::{ContactPoint, Side};
 
 /// One of the two borders of a lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -225,5 +212,65 @@ impl<'m, 'a> LaneRef<'m, 'a> {
     pub fn outer_neighbour(self) -> Option<LaneRef<'m, 'a>> {
         self.at
             .side_lane(self.side()?, self.lane.rank().checked_add(1)?)
+    }
+}
+
+impl LaneEnd {
+    /// Returns an end of a lane.
+    pub fn of(lane: LaneRef<'_, '_>, end: ContactPoint) -> LaneEnd {
+        LaneEnd {
+            lane: lane.key(),
+            end,
+        }
+    }
+}
+
+impl<'m, 'a> SectionRef<'m, 'a> {
+    /// Returns the lanes in document order.
+    #[inline]
+    pub fn lanes(self) -> impl Iterator<Item = LaneRef<'m, 'a>> {
+        (0..self.section().own_lanes().len()).filter_map(move |at| self.lane_at(at))
+    }
+
+    /// Returns the lane at a place in document order.
+    #[inline]
+    pub fn lane_at(self, index: usize) -> Option<LaneRef<'m, 'a>> {
+        LaneRef::new(self, index)
+    }
+
+    /// Returns the first lane with this id, in any group.
+    pub fn lane(self, id: i64) -> Option<LaneRef<'m, 'a>> {
+        let lanes = self.section().own_lanes();
+        let distance = id.unsigned_abs();
+        let of_side = Side::BOTH.into_iter().flat_map(|side| {
+            let outward = self.section().outward(side);
+            let from = outward.partition_point(|at| lanes[*at as usize].distance() < distance);
+            let rest = outward.get(from..).unwrap_or(&[]).iter();
+            rest.take_while(move |at| lanes[**at as usize].distance() == distance)
+                .copied()
+        });
+        let found = of_side
+            .filter(|at| lanes[*at as usize].id() == Some(id))
+            .min();
+        let center = self.center().filter(|lane| lane.id() == Some(id));
+        found.and_then(|at| self.lane_at(at as usize)).or(center)
+    }
+
+    /// Returns the lanes of a side, from the center outward.
+    #[inline]
+    pub fn side(self, side: Side) -> impl DoubleEndedIterator<Item = LaneRef<'m, 'a>> {
+        let places = self.section().outward(side).iter();
+        places.filter_map(move |at| self.lane_at(*at as usize))
+    }
+
+    /// Returns the lane of a side with this rank, counted from the center outward from zero.
+    pub(crate) fn side_lane(self, side: Side, rank: u32) -> Option<LaneRef<'m, 'a>> {
+        let place = self.section().outward(side).get(rank as usize)?;
+        self.lane_at(*place as usize)
+    }
+
+    /// Returns the center lane.
+    pub fn center(self) -> Option<LaneRef<'m, 'a>> {
+        self.lanes().find(|lane| lane.group() == LaneGroup::Center)
     }
 }

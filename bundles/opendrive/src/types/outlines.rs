@@ -3,8 +3,8 @@
 use qcbus_document::Node;
 
 use crate::geometry::Curve;
-use crate::plan_view::{ShapeKind, read_curve};
-use crate::view::{children, view};
+use crate::types::plan_view::{ShapeKind, read_curve};
+use crate::types::view::{children, view};
 
 view! {
     /// An `<outline>` (13.2).

@@ -2,9 +2,10 @@
 
 use qcbus_document::Node;
 
-use crate::outlines::{Outline, Polyline};
-use crate::road::Road;
-use crate::view::{children, view};
+use crate::types::crg::Crg;
+use crate::types::outlines::{Outline, Polyline};
+use crate::types::road::Road;
+use crate::types::view::{children, listed, view};
 
 impl<'a> Road<'a> {
     /// Returns the objects of the road (13.1).
@@ -26,15 +27,6 @@ impl<'a> Road<'a> {
     pub fn bridges(&self) -> impl Iterator<Item = Structure<'a>> + use<'a> {
         listed(self.objects_node(), "bridge").map(Structure::of)
     }
-}
-
-/// Returns the children with a name of a list element, if the list exists.
-pub(crate) fn listed<'a>(
-    list: Option<Node<'a>>,
-    name: &'static str,
-) -> impl Iterator<Item = Node<'a>> + use<'a> {
-    list.into_iter()
-        .flat_map(move |list| list.children_named(name))
 }
 
 view! {
@@ -111,8 +103,8 @@ impl<'a> Object<'a> {
     }
 
     /// Returns the CRG records of the object's surface (13.13).
-    pub fn crgs(&self) -> impl Iterator<Item = crate::Crg<'a>> + use<'a> {
-        listed(self.node.child("surface"), "CRG").map(crate::Crg::of)
+    pub fn crgs(&self) -> impl Iterator<Item = Crg<'a>> + use<'a> {
+        listed(self.node.child("surface"), "CRG").map(Crg::of)
     }
 
     /// Returns the `<parkingSpace>` (13.7).

@@ -2,35 +2,11 @@
 
 use foldhash::HashSet;
 
-use crate::joints::{LaneEnd, LaneJoint};
-use crate::map::RoadMap;
-use crate::road::Road;
-use crate::surface::BorderPoint;
-use crate::value::Side;
-
-/// Two linked lanes with the ends of their edges, as seen along s of the road of `joint.from`.
-#[derive(Debug, Clone, Copy)]
-pub struct TouchingLanes<'a> {
-    /// The statement that the lanes touch. The first of two equal statements counts.
-    pub joint: LaneJoint<'a>,
-    /// The left edge: of the lane of `joint.from`, then of the lane of `joint.to`.
-    pub left: [BorderPoint; 2],
-    /// The right edge, in the same order.
-    pub right: [BorderPoint; 2],
-}
-
-impl TouchingLanes<'_> {
-    /// Returns both edges, the left one first.
-    pub fn edges(&self) -> [[BorderPoint; 2]; 2] {
-        [self.left, self.right]
-    }
-
-    /// Returns the width of the narrower lane at the touching point, in metres.
-    pub fn narrower(&self) -> f64 {
-        let width = |side: usize| (self.left[side].t - self.right[side].t).abs();
-        width(0).min(width(1))
-    }
-}
+use crate::queries::map::RoadMap;
+use crate::types::contacts::{LaneEnd, LaneJoint, TouchingLanes};
+use crate::types::frame::BorderPoint;
+use crate::types::road::Road;
+use crate::types::value::Side;
 
 /// Maximum number of links of one lane end that are searched for the same statement. No real lane
 /// has that many. With more links, a pair may be found twice.

@@ -5,18 +5,16 @@ use std::sync::{Arc, OnceLock};
 use qcbus_document::Node;
 
 use crate::geometry::Pose;
-use crate::joints::LaneJoint;
-use crate::lanes::LaneLayer;
-use crate::lateral::LateralProfile;
-use crate::names::Names;
-use crate::plan_view::{END_TOLERANCE, PlanView};
-use crate::profile::Profile;
-use crate::section_ref::SectionRef;
-use crate::station::Station;
-use crate::surface::Frame;
-use crate::touching::TouchingLanes;
-use crate::value::{ContactPoint, LayerKind, known, number};
-use crate::view::view;
+use crate::types::contacts::{LaneJoint, RoadEnd, TouchingLanes};
+use crate::types::frame::Frame;
+use crate::types::lane_section::LaneLayer;
+use crate::types::lateral::LateralProfile;
+use crate::types::names::Names;
+use crate::types::plan_view::{END_TOLERANCE, PlanView};
+use crate::types::profile::Profile;
+use crate::types::station::Station;
+use crate::types::value::{ContactPoint, LayerKind, known, number};
+use crate::types::view::view;
 
 /// Side of the road for traffic (`road@rule`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -244,12 +242,6 @@ impl<'a> Road<'a> {
         self.layer(LayerKind::Permanent)
     }
 
-    /// Returns all lane sections of all layers, in document order.
-    #[inline]
-    pub fn sections(&self) -> impl Iterator<Item = SectionRef<'_, 'a>> {
-        self.layers().iter().flat_map(|layer| layer.sections(self))
-    }
-
     /// Returns the pose of the reference line at `s`. Returns `None` outside of the road: more than
     /// 1 µm before the start, or beyond both `@length` and the last geometry's end.
     pub fn pose(&self, s: impl Into<Station>) -> Option<Pose> {
@@ -292,6 +284,16 @@ impl<'a> Road<'a> {
         match end {
             ContactPoint::Start => Some(0.0),
             ContactPoint::End => self.length(),
+        }
+    }
+}
+
+impl RoadEnd {
+    /// Returns an end of a road.
+    pub fn of(road: &Road<'_>, end: ContactPoint) -> RoadEnd {
+        RoadEnd {
+            road: road.index(),
+            end,
         }
     }
 }

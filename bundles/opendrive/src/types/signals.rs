@@ -2,9 +2,9 @@
 
 use qcbus_document::Node;
 
-use crate::objects::{Validity, listed};
-use crate::road::Road;
-use crate::view::{children, view};
+use crate::types::objects::Validity;
+use crate::types::road::Road;
+use crate::types::view::{children, listed, view};
 
 impl<'a> Road<'a> {
     /// Returns the signals of the road (14.1).

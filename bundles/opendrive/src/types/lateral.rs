@@ -4,10 +4,10 @@
 use qcbus_document::Node;
 
 use crate::geometry::finite;
-use crate::profile::Profile;
-use crate::station::Station;
-use crate::strips::CrossSectionSurface;
-use crate::value::number;
+use crate::types::profile::Profile;
+use crate::types::station::Station;
+use crate::types::strips::CrossSectionSurface;
+use crate::types::value::number;
 
 /// Content of `<lateralProfile>`.
 #[derive(Debug, Default)]

@@ -3,9 +3,9 @@
 use qcbus_document::Node;
 
 use crate::geometry::{Cubic, Curve, ParamPoly3, ParamRange, Placed, Point, Poly3, Pose, Spiral};
-use crate::station::Station;
-use crate::steps::{Starts, Steps};
-use crate::value::{known, numbers};
+use crate::types::station::Station;
+use crate::types::steps::{Starts, Steps};
+use crate::types::value::{known, numbers};
 
 /// Maximum distance beyond the ends, in metres, at which a place still counts as on the road.
 pub(crate) const END_TOLERANCE: f64 = 1e-6;

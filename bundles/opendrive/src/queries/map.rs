@@ -4,16 +4,18 @@ use std::sync::{Arc, OnceLock};
 
 use qcbus_document::{Document, Node};
 
-use crate::index::IdIndex;
-use crate::junction::Junction;
-use crate::lane_ref::{LaneKey, LaneRef};
-use crate::names::Names;
-use crate::objects::{Object, listed};
-use crate::railroad::{JunctionGroup, RailroadStation};
-use crate::road::Road;
-use crate::section_ref::SectionRef;
-use crate::signals::{Controller, Signal, VmsGroup};
-use crate::value::{integer, is_user_data};
+use crate::queries::index::IdIndex;
+use crate::queries::lane_ref::LaneRef;
+use crate::queries::section_ref::SectionRef;
+use crate::types::contacts::{LaneJoint, LaneKey, RoadContact, RoadEnd, TouchingLanes};
+use crate::types::junction::{Connection, Junction, JunctionGroup};
+use crate::types::names::Names;
+use crate::types::objects::Object;
+use crate::types::railroad::RailroadStation;
+use crate::types::road::Road;
+use crate::types::signals::{Controller, Signal, VmsGroup};
+use crate::types::value::{integer, is_user_data};
+use crate::types::view::listed;
 
 /// The version of a file (`header@revMajor`, `@revMinor`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -64,6 +66,22 @@ impl<'a> SignalKey<'a> {
     }
 }
 
+/// Statements about links, computed on first use by the queries of `joints` and `touching`.
+#[derive(Debug, Default)]
+pub(crate) struct Caches<'a> {
+    /// Joints of junctions. Joints of lanes are cached in their roads.
+    pub(crate) joints: OnceLock<Box<[LaneJoint<'a>]>>,
+    pub(crate) touching: OnceLock<Box<[TouchingLanes<'a>]>>,
+    /// Contacts from the links of each road, for its start and its end.
+    pub(crate) linked: OnceLock<Vec<[Option<RoadContact<'a>>; 2]>>,
+    pub(crate) connections: OnceLock<Vec<(usize, Connection<'a>)>>,
+    /// Contact of each connection.
+    pub(crate) connected: OnceLock<Vec<Option<RoadContact<'a>>>>,
+    pub(crate) contacts: OnceLock<Vec<RoadContact<'a>>>,
+    /// Both ends of every contact, sorted, with the place of the contact.
+    pub(crate) by_end: OnceLock<Vec<(RoadEnd, u32)>>,
+}
+
 /// An OpenDRIVE file with roads and junctions, built once and shared by all rules.
 #[derive(Debug)]
 pub struct RoadMap<'a> {
@@ -78,7 +96,7 @@ pub struct RoadMap<'a> {
     signal_ids: OnceLock<IdIndex<'a>>,
     controller_ids: OnceLock<IdIndex<'a>>,
     signals: OnceLock<Vec<SignalKey<'a>>>,
-    pub(crate) caches: crate::joints::Caches<'a>,
+    pub(crate) caches: Caches<'a>,
 }
 
 impl<'a> RoadMap<'a> {
@@ -111,7 +129,7 @@ impl<'a> RoadMap<'a> {
             signal_ids: OnceLock::new(),
             controller_ids: OnceLock::new(),
             signals: OnceLock::new(),
-            caches: crate::joints::Caches::default(),
+            caches: Caches::default(),
         }
     }
 

@@ -3,9 +3,9 @@
 use qcbus_document::Node;
 
 use crate::geometry::finite;
-use crate::profile::Profile;
-use crate::station::Station;
-use crate::value::integer;
+use crate::types::profile::Profile;
+use crate::types::station::Station;
+use crate::types::value::integer;
 
 /// A `<crossSectionSurface>`.
 #[derive(Debug)]

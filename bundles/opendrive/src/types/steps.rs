@@ -1,6 +1,6 @@
 //! Items that are valid from their start to the start of the next item.
 
-use crate::station::Station;
+use crate::types::station::Station;
 
 /// An item with a start. A missing start is NaN.
 pub(crate) trait Starts {

@@ -1,53 +1,14 @@
 //! Points in space: the s/t/h system of a road and the surface of its lanes (OpenDRIVE 1.9, 8.3,
 //! 10.5, 11.7.3, 11.7.4).
 
-use crate::geometry::{Point, Point3, Pose, finite};
-use crate::lane::Borders;
-use crate::lane_ref::{Edge, LaneRef};
-use crate::plan_view::END_TOLERANCE;
-use crate::road::Road;
-use crate::station::Station;
-use crate::value::ContactPoint;
-
-/// The cross section of a road at a given s, with its place and tilt.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
-    /// Pose of the reference line in the plan view.
-    pub pose: Pose,
-    /// Elevation in metres.
-    pub z: f64,
-    /// Superelevation in radians, positive if the road falls to the right.
-    pub roll: f64,
-    /// Slope of the elevation, dz/ds.
-    pub slope: f64,
-    /// Slope of the superelevation in rad/m.
-    pub roll_slope: f64,
-}
-
-impl Frame {
-    /// Returns the position of a point with these t and h, in metres: left of the reference line in
-    /// the plan view, and above it. Superelevation rotates t and h (8.3).
-    pub fn tilted(&self, t: f64, h: f64) -> (f64, f64) {
-        let (sin, cos) = self.tilt();
-        (t * cos - h * sin, t * sin + h * cos)
-    }
-
-    /// Returns sine and cosine of the superelevation. Most roads have no superelevation.
-    fn tilt(&self) -> (f64, f64) {
-        if self.roll == 0.0 {
-            (0.0, 1.0)
-        } else {
-            self.roll.sin_cos()
-        }
-    }
-
-    /// Returns the point `lateral` metres to the left in the plan view and `up` metres above the
-    /// reference line.
-    pub fn place(&self, lateral: f64, up: f64) -> Option<Point3> {
-        let Point { x, y } = self.pose.beside(lateral)?;
-        Point3::finite(x, y, self.z + up)
-    }
-}
+use crate::geometry::{Point3, Pose, finite};
+use crate::queries::lane_ref::{Edge, LaneRef};
+use crate::types::frame::{BorderPoint, Frame};
+use crate::types::lane::Borders;
+use crate::types::plan_view::END_TOLERANCE;
+use crate::types::road::Road;
+use crate::types::station::Station;
+use crate::types::value::{ContactPoint, Side};
 
 impl<'a> Road<'a> {
     /// Returns the cross section at `s`.
@@ -93,25 +54,6 @@ impl<'a> Road<'a> {
         let s = s.into();
         self.point(s, t, self.lateral().height(s, t)?)
     }
-}
-
-/// A place on the border of a lane.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BorderPoint {
-    /// t of the border in road coordinates, in metres.
-    pub t: f64,
-    /// Point in space, on the surface of the lane.
-    pub point: Point3,
-    /// Heading of the border in the plan view with ascending s, in radians, not wrapped. It differs
-    /// from the heading of the reference line where the border approaches or leaves that line.
-    /// `None` where the border turns back (t reaches the center of the curve).
-    pub hdg: Option<f64>,
-    /// Slope dz/ds of the border along the reference line. Shape, cross section surface and lane
-    /// height are not included.
-    pub slope: f64,
-    /// The same slope per metre of the border itself in the plan view. `None` where the border
-    /// turns back.
-    pub grade: Option<f64>,
 }
 
 /// Position of a lane's border in its cross section: to the left and up, in metres, with the change
@@ -169,7 +111,7 @@ impl<'m, 'a> LaneRef<'m, 'a> {
 
     /// Checks whether an end of the section is an end of the road.
     pub fn is_at_road_end(self, end: ContactPoint) -> bool {
-        let side = self.side().unwrap_or(crate::value::Side::Right);
+        let side = self.side().unwrap_or(Side::Right);
         let beside = self.at.neighbour(side, end).is_none();
         let place = match end {
             ContactPoint::Start => self.at.s().map(|s| s <= 1e-9),

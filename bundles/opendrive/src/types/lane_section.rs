@@ -5,14 +5,11 @@ use std::sync::OnceLock;
 use qcbus_document::Node;
 
 use crate::geometry::finite;
-use crate::lane::{Lane, LaneGroup};
-use crate::names::{Name, Names};
-use crate::profile::Profile;
-use crate::road::Road;
-use crate::section_ref::SectionRef;
-use crate::station::Station;
-use crate::steps::{Starts, Steps};
-use crate::value::{ContactPoint, LayerKind, Side, flag, known, layer, number};
+use crate::types::lane::{Lane, LaneGroup};
+use crate::types::names::{Name, Names};
+use crate::types::profile::Profile;
+use crate::types::steps::{Starts, Steps};
+use crate::types::value::{ContactPoint, LayerKind, Side, flag, known, layer, number};
 
 /// One `<lanes>` element. Until 1.8 a road has one; since 1.9 a temporary one may lie over it.
 #[derive(Debug)]
@@ -21,7 +18,7 @@ pub struct LaneLayer<'a> {
     index: u32,
     kind: LayerKind,
     offset: Profile<'a>,
-    steps: Steps<LaneSection<'a>>,
+    pub(crate) steps: Steps<LaneSection<'a>>,
     /// The first and the last section, each for the left and right side.
     terminal: [[Option<u32>; 2]; 2],
 }
@@ -77,66 +74,13 @@ impl<'a> LaneLayer<'a> {
         self.steps.items().len()
     }
 
-    /// Returns the sections in document order. `road` is the road of the layer.
-    #[inline]
-    pub fn sections<'m>(
-        &'m self,
-        road: &'m Road<'a>,
-    ) -> impl DoubleEndedIterator<Item = SectionRef<'m, 'a>> {
-        self.steps
-            .items()
-            .iter()
-            .map(move |section| SectionRef::new(road, self, section))
-    }
-
-    /// Returns the section at a place in document order.
-    #[inline]
-    pub fn section<'m>(&'m self, road: &'m Road<'a>, index: usize) -> Option<SectionRef<'m, 'a>> {
-        let section = self.steps.items().get(index)?;
-        Some(SectionRef::new(road, self, section))
-    }
-
-    /// Returns the sections in ascending order of `@s`. Returns none if a section has no `@s`.
-    pub fn in_order<'m>(
-        &'m self,
-        road: &'m Road<'a>,
-    ) -> impl DoubleEndedIterator<Item = SectionRef<'m, 'a>> {
-        self.steps
-            .in_order()
-            .map(move |section| SectionRef::new(road, self, section))
-    }
-
-    /// Returns the section that is valid for a side at `s`. This is the last section of the side
-    /// that starts at or before `s`, unless it has ended.
-    pub fn section_at<'m>(
-        &'m self,
-        road: &'m Road<'a>,
-        side: Side,
-        s: impl Into<Station>,
-    ) -> Option<SectionRef<'m, 'a>> {
-        let station = s.into();
-        let last = self.steps.index(self.steps.rank_at(station)?)?;
-        let mut section = self.section(road, last)?;
-        if !section.covers(side) {
-            section = section.previous(side)?;
-        }
-        let over = section.end(side).is_some_and(|end| station.is_after(end));
-        let at_very_end = section.next(side).is_none() && section.end(side) == Some(station.x());
-        (!over || at_very_end).then_some(section)
-    }
-
-    /// Returns the first or last section that is valid for a side.
-    pub fn end_section<'m>(
-        &'m self,
-        road: &'m Road<'a>,
-        side: Side,
-        end: ContactPoint,
-    ) -> Option<SectionRef<'m, 'a>> {
+    /// Returns the place of the first or last section that is valid for a side.
+    pub(crate) fn terminal(&self, side: Side, end: ContactPoint) -> Option<usize> {
         let at = match end {
             ContactPoint::Start => self.terminal[0],
             ContactPoint::End => self.terminal[1],
         };
-        self.section(road, at[slot(side)]? as usize)
+        Some(at[slot(side)]? as usize)
     }
 }
 
@@ -314,9 +258,12 @@ impl<'a> LaneSection<'a> {
         }
     }
 
-    /// Checks whether a side has widths. On first use, `any` computes the answer.
+    /// Checks whether a lane of the side has `<width>` records. If so, `<border>` records of the
+    /// side do not count (11.7.2).
     #[inline]
-    pub(crate) fn widths_or(&self, side: Side, any: impl Fn(Side) -> bool) -> bool {
+    pub fn has_widths(&self, side: Side) -> bool {
+        let has = |at: &u32| !self.lanes[*at as usize].widths().is_empty();
+        let any = |side| self.outward(side).iter().any(has);
         self.widths.get_or_init(|| Side::BOTH.map(any))[slot(side)]
     }
 

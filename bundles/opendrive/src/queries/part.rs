@@ -2,13 +2,12 @@
 
 use std::ops::Range;
 
-use crate::joints::LaneJoint;
-use crate::lane_ref::LaneRef;
-use crate::map::RoadMap;
-use crate::objects::Object;
-use crate::road::Road;
-use crate::section_ref::SectionRef;
-use crate::touching::TouchingLanes;
+use crate::queries::lane_ref::LaneRef;
+use crate::queries::map::RoadMap;
+use crate::queries::section_ref::SectionRef;
+use crate::types::contacts::{LaneJoint, TouchingLanes};
+use crate::types::objects::Object;
+use crate::types::road::Road;
 
 /// Minimum size of a part in bytes of the file, if roads remain. Image and model of a part stay in
 /// the second-level cache (1 MiB and less) while several rules read them. Of 32 KiB to 1 MiB, this

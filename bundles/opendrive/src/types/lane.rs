@@ -4,13 +4,13 @@ use std::sync::OnceLock;
 
 use qcbus_document::Node;
 
-use crate::names::{Name, Names};
-use crate::profile::Profile;
-use crate::station::Station;
-use crate::steps::{Starts, Steps};
-use crate::surface::BorderPoint;
-use crate::value::{ContactPoint, Side, flag, known, numbers, parse_flag, parse_integer};
-use crate::view::view;
+use crate::types::frame::BorderPoint;
+use crate::types::names::{Name, Names};
+use crate::types::profile::Profile;
+use crate::types::station::Station;
+use crate::types::steps::{Starts, Steps};
+use crate::types::value::{ContactPoint, Side, flag, known, numbers, parse_flag, parse_integer};
+use crate::types::view::view;
 
 /// The part of a lane section that contains a lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

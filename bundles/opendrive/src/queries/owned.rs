@@ -5,7 +5,7 @@ use std::fmt;
 use qcbus_document::{Image, ImageError};
 use self_cell::self_cell;
 
-use crate::RoadMap;
+use crate::queries::map::RoadMap;
 
 self_cell!(
     struct Cell {

@@ -1,5 +1,7 @@
 //! The macro behind the thin views: a node with one accessor per attribute.
 
+use qcbus_document::Node;
+
 /// Declares a view over an element. The view is a `Copy` struct around the node. It has one
 /// documented accessor per attribute, which reads the attribute on each call. The reader (see the
 /// `value` module) follows the colon, then the attribute's name.
@@ -29,8 +31,8 @@ macro_rules! view {
 
             $(
                 $(#[$doc])*
-                pub fn $method(&self) -> $crate::view::reading!($reader) {
-                    $crate::value::$reader(self.node, $attribute)
+                pub fn $method(&self) -> $crate::types::view::reading!($reader) {
+                    $crate::types::value::$reader(self.node, $attribute)
                 }
             )*
         }
@@ -43,9 +45,9 @@ macro_rules! reading {
     (number) => { Option<f64> };
     (integer) => { Option<i64> };
     (flag) => { Option<bool> };
-    (contact) => { Option<$crate::value::ContactPoint> };
-    (direction) => { Option<$crate::value::Direction> };
-    (layer) => { $crate::value::LayerKind };
+    (contact) => { Option<$crate::types::value::ContactPoint> };
+    (direction) => { Option<$crate::types::value::Direction> };
+    (layer) => { $crate::types::value::LayerKind };
 }
 
 /// Declares a method that returns the children with one name as views.
@@ -58,6 +60,15 @@ macro_rules! children {
             }
         )*
     };
+}
+
+/// Returns the children with a name of a list element, if the list exists.
+pub(crate) fn listed<'a>(
+    list: Option<Node<'a>>,
+    name: &'static str,
+) -> impl Iterator<Item = Node<'a>> + use<'a> {
+    list.into_iter()
+        .flat_map(move |list| list.children_named(name))
 }
 
 pub(crate) use {children, reading, view};

@@ -2,90 +2,15 @@
 //! 12.4, 12.6, 12.7).
 
 use std::collections::BTreeSet;
-use std::sync::OnceLock;
 
-use qcbus_document::Node;
-
-use crate::junction::{Connection, Junction, JunctionLaneLink};
-use crate::lane_ref::{LaneKey, LaneRef};
-use crate::map::RoadMap;
-use crate::road::Road;
-use crate::section_ref::SectionRef;
-use crate::value::{ContactPoint, LayerKind, Side};
-
-/// Data about links, computed on first use.
-#[derive(Debug, Default)]
-pub(crate) struct Caches<'a> {
-    /// Joints of junctions. Joints of lanes are cached in their roads.
-    joints: OnceLock<Box<[LaneJoint<'a>]>>,
-    pub(crate) touching: OnceLock<Box<[crate::TouchingLanes<'a>]>>,
-    /// Contacts from the links of each road, for its start and its end.
-    linked: OnceLock<Vec<[Option<RoadContact<'a>>; 2]>>,
-    connections: OnceLock<Vec<(usize, Connection<'a>)>>,
-    /// Contact of each connection.
-    connected: OnceLock<Vec<Option<RoadContact<'a>>>>,
-    contacts: OnceLock<Vec<RoadContact<'a>>>,
-    /// Both ends of every contact, sorted, with the place of the contact.
-    by_end: OnceLock<Vec<(RoadEnd, u32)>>,
-}
-
-/// An end of a road.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct RoadEnd {
-    /// Place of the road in the map.
-    pub road: usize,
-    /// The end of the road.
-    pub end: ContactPoint,
-}
-
-/// A statement of the file that two road ends touch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RoadContact<'a> {
-    /// One end: the end of the road with the link, or of the incoming road.
-    pub from: RoadEnd,
-    /// The other end: of the linked or connecting road.
-    pub to: RoadEnd,
-    /// Element with the statement: `<predecessor>` or `<successor>` of a road, or `<connection>`.
-    pub node: Node<'a>,
-    /// Place of the junction if the statement is a `<connection>`.
-    pub junction: Option<usize>,
-}
-
-/// A statement of the file that two lane ends touch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LaneJoint<'a> {
-    /// The lane with the link, or the lane on the incoming road.
-    pub from: LaneEnd,
-    /// The linked lane.
-    pub to: LaneEnd,
-    /// Element with the statement: `<predecessor>` or `<successor>` of a lane, or `<laneLink>`.
-    pub node: Node<'a>,
-    /// Place of the junction if the statement is a `<laneLink>`.
-    pub junction: Option<usize>,
-}
-
-impl LaneJoint<'_> {
-    /// Checks whether s runs in opposite directions on both sides: end touches end or start touches
-    /// start.
-    pub fn is_reversed(&self) -> bool {
-        self.from.end == self.to.end
-    }
-
-    /// Checks whether both lanes belong to the same road.
-    pub fn is_within_road(&self) -> bool {
-        let (from, to) = (self.from.lane, self.to.lane);
-        from.road == to.road && (from.layer, from.section) != (to.layer, to.section)
-    }
-}
-
-/// An end of a lane within its section.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct LaneEnd {
-    /// The lane.
-    pub lane: LaneKey,
-    /// The start or the end of its section.
-    pub end: ContactPoint,
-}
+use crate::queries::lane_ref::LaneRef;
+use crate::queries::map::RoadMap;
+use crate::queries::section_ref::SectionRef;
+use crate::types::contacts::{LaneEnd, LaneJoint, RoadContact, RoadEnd};
+use crate::types::junction::{Connection, Junction, JunctionLaneLink};
+use crate::types::road::Road;
+use crate::types::station::Station;
+use crate::types::value::{ContactPoint, LayerKind, Side};
 
 impl<'a> RoadMap<'a> {
     /// Returns the road at a place of [`RoadMap::roads`].
@@ -146,14 +71,8 @@ impl<'a> RoadMap<'a> {
         let link = road.link(end)?;
         let linked = self.road(link.road_id()?)?;
         Some(RoadContact {
-            from: RoadEnd {
-                road: road.index(),
-                end,
-            },
-            to: RoadEnd {
-                road: linked.index(),
-                end: link.contact_point()?,
-            },
+            from: RoadEnd::of(road, end),
+            to: RoadEnd::of(linked, link.contact_point()?),
             node: link.node(),
             junction: None,
         })
@@ -192,14 +111,8 @@ impl<'a> RoadMap<'a> {
         let incoming = self.road(connection.incoming_road()?)?;
         let end = self.incoming_end(junction, incoming, target, contact)?;
         Some(RoadContact {
-            from: RoadEnd {
-                road: incoming.index(),
-                end,
-            },
-            to: RoadEnd {
-                road: target.index(),
-                end: contact,
-            },
+            from: RoadEnd::of(incoming, end),
+            to: RoadEnd::of(target, contact),
             node: connection.node(),
             junction: Some(junction.index()),
         })
@@ -245,10 +158,7 @@ impl<'a> RoadMap<'a> {
     /// Returns the road ends that touch an end of a road, without repetition, in document order of
     /// the statements. Both directions of each statement count.
     pub fn neighbours(&self, road: &Road<'a>, end: ContactPoint) -> Vec<RoadEnd> {
-        let own = RoadEnd {
-            road: road.index(),
-            end,
-        };
+        let own = RoadEnd::of(road, end);
         let mut seen = BTreeSet::new();
         let contacts = self.contacts_of(own);
         let others = contacts.map(|contact| {
@@ -332,12 +242,8 @@ impl<'a> RoadMap<'a> {
                 .id()
                 .and_then(|id| self.linked_lane(lane, end, id, link.layer()));
             if let Some(to) = to {
-                let from = LaneEnd {
-                    lane: lane.key(),
-                    end,
-                };
                 joints.push(LaneJoint {
-                    from,
+                    from: LaneEnd::of(lane, end),
                     to,
                     node: link.node(),
                     junction: None,
@@ -356,10 +262,7 @@ impl<'a> RoadMap<'a> {
         layer: LayerKind,
     ) -> Option<LaneEnd> {
         let (section, end) = self.linked_section(lane, end, Some(id), layer)?;
-        Some(LaneEnd {
-            lane: section.lane(id)?.key(),
-            end,
-        })
+        Some(LaneEnd::of(section.lane(id)?, end))
     }
 
     /// Returns the section that a link of `lane` at `end` with this layer leads to, and its
@@ -400,10 +303,7 @@ impl<'a> RoadMap<'a> {
         let road = self.road_at(at.road)?;
         let side = Side::of_lane_id(id).unwrap_or(Side::Right);
         let section = road.layer(layer)?.end_section(road, side, at.end)?;
-        Some(LaneEnd {
-            lane: section.lane(id)?.key(),
-            end: at.end,
-        })
+        Some(LaneEnd::of(section.lane(id)?, at.end))
     }
 
     fn collect_lane_links(
@@ -447,8 +347,8 @@ fn other_layer<'m, 'a>(
 ) -> Option<SectionRef<'m, 'a>> {
     let road = lane.at.road;
     let station = match end {
-        ContactPoint::Start => crate::Station::before(lane.at.s()?),
-        ContactPoint::End => crate::Station::at(lane.at.end(side)?),
+        ContactPoint::Start => Station::before(lane.at.s()?),
+        ContactPoint::End => Station::at(lane.at.end(side)?),
     };
     road.layer(layer)?.section_at(road, side, station)
 }

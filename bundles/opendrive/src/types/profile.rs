@@ -4,9 +4,9 @@
 use qcbus_document::Node;
 
 use crate::geometry::{Cubic, finite};
-use crate::station::Station;
-use crate::steps::{Starts, Steps};
-use crate::value::{known, numbers};
+use crate::types::station::Station;
+use crate::types::steps::{Starts, Steps};
+use crate::types::value::{known, numbers};
 
 /// One record of a profile: `a + b·ds + c·ds² + d·ds³`, valid from its start to the next record.
 #[derive(Debug, Clone, Copy)]
