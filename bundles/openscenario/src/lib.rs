@@ -9,42 +9,28 @@
 
 pub mod expr;
 
-mod actors;
-mod catalogs;
-mod data_type;
-mod date_time;
-mod element;
-mod entities;
-mod faults;
-mod form;
-mod inputs;
-mod network;
-mod reading;
-mod roads_nearby;
-mod scenario;
-mod scope;
-mod storyboard;
-mod text;
-mod ways;
+mod queries;
+mod types;
 
-pub use actors::Actors;
-pub use catalogs::{CatalogKind, Entry, Resolution};
-pub use data_type::{DataType, Value, parse_double};
-pub use date_time::{DateTime, DateTimeError};
-pub use element::Element;
-pub use entities::{Entities, Entity, EntityKind, Selection};
-pub use faults::{Dialect, ValueFault, ValueFaultKind};
-pub use form::Form;
-pub use inputs::{Inputs, LinkedCatalog, LinkedMap};
-pub use network::{LaneAt, Network, RoadNetwork};
 pub use qcbus_schema::closest;
-pub use reading::Reading;
-pub use roads_nearby::RoadsNearby;
-pub use scenario::Scenario;
-pub use scope::{Declaration, Declared, Declares};
-pub use storyboard::{StoryElement, StoryKind, Storyboard};
-pub use text::{identifier, is_identifier};
-pub use ways::{Stop, Way, Ways};
+pub use queries::actors::Actors;
+pub use queries::element::Element;
+pub use queries::network::Network;
+pub use queries::scenario::Scenario;
+pub use types::catalogs::{CatalogKind, Entry, Resolution};
+pub use types::data_type::{DataType, Value, parse_double};
+pub use types::date_time::{DateTime, DateTimeError};
+pub use types::declaration::{Declaration, Declared, Declares};
+pub use types::entities::{Entities, Entity, EntityKind, Selection};
+pub use types::faults::{Dialect, ValueFault, ValueFaultKind};
+pub use types::form::Form;
+pub use types::inputs::{Inputs, LinkedCatalog, LinkedMap};
+pub use types::reading::Reading;
+pub use types::road_network::{LaneAt, RoadNetwork};
+pub use types::roads_nearby::RoadsNearby;
+pub use types::storyboard::{StoryElement, StoryKind, Storyboard};
+pub use types::text::{identifier, is_identifier};
+pub use types::ways::{Stop, Way, Ways};
 
 /// The version in a file header: major and minor.
 pub type Version = (u16, u16);

@@ -2,7 +2,7 @@
 
 use super::words::FOREIGN;
 use super::{Fault, FaultKind, OPENING, is_blank, quoted};
-use crate::text::identifier;
+use crate::types::text::identifier;
 
 /// The signs of the language.
 const SIGNS: [char; 8] = ['+', '-', '*', '/', '%', '(', ')', ','];

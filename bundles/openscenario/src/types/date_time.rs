@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::text::trim;
+use crate::types::text::trim;
 
 /// A point in time. Points with and without a time zone do not compare.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use crate::element::Element;
+use crate::queries::element::Element;
 
 /// The actors of an action.
 #[derive(Debug, Clone)]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use qcbus_document::{Document, FileKind};
 
 use crate::Version;
-use crate::network::RoadNetwork;
+use crate::types::road_network::RoadNetwork;
 
 /// The documents of one check.
 #[derive(Debug, Clone)]

@@ -5,9 +5,7 @@ use std::borrow::Cow;
 use foldhash::HashMap;
 use qcbus_document::Node;
 
-use crate::element::Element;
-use crate::scenario::Scenario;
-use crate::scope::ContextId;
+use crate::types::scope::ContextId;
 
 /// Kind of a storyboard element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -66,11 +64,11 @@ impl StoryKind {
 /// An element of the storyboard.
 #[derive(Debug, Clone)]
 pub struct StoryElement<'d> {
-    node: Node<'d>,
-    context: ContextId,
-    kind: StoryKind,
-    name: Option<Cow<'d, str>>,
-    parent: Option<u32>,
+    pub(crate) node: Node<'d>,
+    pub(crate) context: ContextId,
+    pub(crate) kind: StoryKind,
+    pub(crate) name: Option<Cow<'d, str>>,
+    pub(crate) parent: Option<u32>,
 }
 
 impl<'d> StoryElement<'d> {
@@ -88,15 +86,6 @@ impl<'d> StoryElement<'d> {
     pub fn parent(&self) -> Option<usize> {
         self.parent.map(|parent| parent as usize)
     }
-
-    /// Returns the element in the document or in a catalog.
-    pub fn element<'m>(&self, scenario: &'m Scenario<'d>) -> Element<'m, 'd> {
-        Element {
-            scenario,
-            node: self.node,
-            context: self.context,
-        }
-    }
 }
 
 /// All elements of the storyboard.
@@ -104,65 +93,19 @@ impl<'d> StoryElement<'d> {
 pub struct Storyboard<'d> {
     elements: Vec<StoryElement<'d>>,
     by_name: HashMap<String, Vec<u32>>,
-    /// Whether the name of every element is known.
-    complete: bool,
+    /// Whether the name of an element is unknown.
+    pub(crate) incomplete: bool,
 }
 
 impl<'d> Storyboard<'d> {
-    pub(crate) fn of(scenario: &Scenario<'d>) -> Storyboard<'d> {
-        let mut storyboard = Storyboard {
-            complete: true,
-            ..Storyboard::default()
-        };
-        if let Some(root) = scenario.root().child("Storyboard") {
-            storyboard.add_within(root, None);
-        }
-        storyboard
-    }
-
-    fn add_within(&mut self, around: Element<'_, 'd>, parent: Option<u32>) {
-        for child in around.children() {
-            let child = if child.is("CatalogReference") && around.is("ManeuverGroup") {
-                match child.scenario().entry(child) {
-                    Some(entry) => entry,
-                    None => {
-                        self.complete = false;
-                        continue;
-                    }
-                }
-            } else {
-                child
-            };
-            if let Some(kind) = StoryKind::of_element(child.name()) {
-                let place = self.add(child, kind, parent);
-                if kind != StoryKind::Action {
-                    self.add_within(child, Some(place));
-                }
-            } else if child.class().is_none() && around.class().is_some() {
-                // A misspelt element may contain the target of a reference.
-                self.complete = false;
-            }
-        }
-    }
-
-    fn add(&mut self, element: Element<'_, 'd>, kind: StoryKind, parent: Option<u32>) -> u32 {
+    /// Adds an element and returns its place.
+    pub(crate) fn add(&mut self, element: StoryElement<'d>) -> u32 {
         let place = u32::try_from(self.elements.len()).unwrap_or(u32::MAX);
-        let name = element.text("name");
-        match &name {
-            Some(name) => self
-                .by_name
-                .entry(name.to_string())
-                .or_default()
-                .push(place),
-            None => self.complete = false,
+        match element.name() {
+            Some(name) => self.by_name.entry(name.to_owned()).or_default().push(place),
+            None => self.incomplete = true,
         }
-        self.elements.push(StoryElement {
-            node: element.node,
-            context: element.context,
-            kind,
-            name,
-            parent,
-        });
+        self.elements.push(element);
         place
     }
 
@@ -174,7 +117,7 @@ impl<'d> Storyboard<'d> {
     /// Checks whether every name is known. A reference may mean a maneuver that was not found in a
     /// catalog, an element that the schema does not know, or a name that cannot be resolved.
     pub fn is_complete(&self) -> bool {
-        self.complete
+        !self.incomplete
     }
 
     /// Returns the elements that a reference may mean. `leaf` means any element of this name.
@@ -183,13 +126,17 @@ impl<'d> Storyboard<'d> {
         let mut path = reference.rsplit("::");
         let leaf = path.next().unwrap_or("");
         let outward: Vec<&str> = path.collect();
-        let places = self.by_name.get(leaf).map_or(&[][..], Vec::as_slice);
-        let elements = places
-            .iter()
-            .filter_map(|place| self.elements.get(*place as usize));
-        elements
+        self.named(leaf)
             .filter(|element| self.lies_in(element, &outward))
             .collect()
+    }
+
+    /// Returns the elements of a name.
+    pub(crate) fn named(&self, name: &str) -> impl Iterator<Item = &StoryElement<'d>> {
+        let places = self.by_name.get(name).map_or(&[][..], Vec::as_slice);
+        places
+            .iter()
+            .filter_map(|place| self.elements.get(*place as usize))
     }
 
     fn lies_in(&self, element: &StoryElement<'d>, outward: &[&str]) -> bool {
@@ -209,19 +156,5 @@ impl<'d> Storyboard<'d> {
     /// Returns the names of all elements, for suggestions.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.elements.iter().filter_map(StoryElement::name)
-    }
-
-    /// Returns the entry for an element of the storyboard.
-    pub fn entry(&self, element: Element<'_, 'd>) -> Option<&StoryElement<'d>> {
-        let of =
-            |one: &&StoryElement<'d>| one.node == element.node && one.context == element.context;
-        let name = element.text("name");
-        match name.and_then(|name| self.by_name.get(&*name)) {
-            Some(places) => places
-                .iter()
-                .filter_map(|place| self.elements.get(*place as usize))
-                .find(of),
-            None => self.elements.iter().find(of),
-        }
     }
 }

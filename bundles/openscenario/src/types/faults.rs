@@ -2,7 +2,7 @@
 
 use qcbus_document::Attribute;
 
-use crate::data_type::Value;
+use crate::types::data_type::Value;
 
 /// A value of the document that cannot be resolved as written, or only against the standard.
 #[derive(Debug, Clone)]

@@ -3,12 +3,12 @@
 use std::borrow::Cow;
 
 use crate::Version;
-use crate::data_type::{DataType, Value, integral};
-use crate::date_time::DateTime;
 use crate::expr::{self, Evaluated, FaultKind};
-use crate::faults::{Dialect, Problem, ValueFaultKind};
-use crate::scope::{Declaration, Declared, operand};
-use crate::text::{identifier, trim};
+use crate::types::data_type::{DataType, Value, integral};
+use crate::types::date_time::DateTime;
+use crate::types::declaration::{Declaration, Declared, operand};
+use crate::types::faults::{Dialect, Problem, ValueFaultKind};
+use crate::types::text::{identifier, trim};
 
 /// An attribute as it is understood.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,4 +1,4 @@
-//! Road network of a scenario.
+//! A map with data that scenarios need of it.
 
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
@@ -6,35 +6,8 @@ use std::sync::OnceLock;
 use qcbus_document::{Image, ImageError};
 use qcbus_opendrive::{LaneRef, OwnedMap, Road, RoadMap, SectionRef, Side};
 
-use crate::inputs::LinkedMap;
-use crate::roads_nearby::RoadsNearby;
-use crate::scenario::Scenario;
-use crate::ways::Ways;
-
-/// State of the road network.
-#[derive(Debug, Clone, Copy)]
-pub enum Network<'m> {
-    /// The scenario names no road network.
-    Unnamed,
-    /// A map that only the simulator knows.
-    Simulator,
-    /// The map is named but could not be read. This is reported elsewhere.
-    NotHad,
-    /// The file is no OpenDRIVE map.
-    Foreign,
-    /// The roads of the map.
-    Map(&'m RoadNetwork),
-}
-
-impl<'m> Network<'m> {
-    /// Returns the roads, if they are known.
-    pub fn map(self) -> Option<&'m RoadNetwork> {
-        match self {
-            Network::Map(network) => Some(network),
-            Network::Unnamed | Network::Simulator | Network::NotHad | Network::Foreign => None,
-        }
-    }
-}
+use crate::types::roads_nearby::RoadsNearby;
+use crate::types::ways::Ways;
 
 /// A map with data that is derived from it for scenarios. It may be cached for all scenarios on
 /// this map, so that the data is computed only once.
@@ -132,23 +105,5 @@ impl<'m, 'r> LaneAt<'m, 'r> {
         section
             .lane(lane)
             .map_or(LaneAt::None(section), LaneAt::Lane)
-    }
-}
-
-impl Scenario<'_> {
-    /// Returns the road network.
-    pub fn network(&self) -> Network<'_> {
-        match self.map_input() {
-            LinkedMap::Unnamed => Network::Unnamed,
-            LinkedMap::Simulator => Network::Simulator,
-            LinkedMap::NotHad => Network::NotHad,
-            LinkedMap::Foreign => Network::Foreign,
-            LinkedMap::Roads(network) => Network::Map(network),
-        }
-    }
-
-    /// Calls `look` with the map, if it is known. Borrows from the map cannot leave the closure.
-    pub fn on_map<T>(&self, look: impl for<'r> FnOnce(&RoadMap<'r>) -> T) -> Option<T> {
-        self.network().map().map(|network| network.with(look))
     }
 }

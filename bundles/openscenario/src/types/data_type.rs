@@ -2,9 +2,9 @@
 
 use std::borrow::Cow;
 
-use crate::date_time::DateTime;
 use crate::expr;
-use crate::text::trim;
+use crate::types::date_time::DateTime;
+use crate::types::text::trim;
 
 /// A basic data type (OpenSCENARIO XML, "Data types").
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -1,4 +1,4 @@
-//! Parameters and their scope. A declaration is in scope in the element around its
+//! Scope of parameters. A declaration is in scope in the element around its
 //! `ParameterDeclarations`. The innermost declaration of a name wins. A catalog's entry sees only
 //! its own declarations.
 
@@ -6,43 +6,10 @@ use foldhash::{HashMap, HashMapExt as _};
 use qcbus_document::Node;
 
 use crate::Version;
-use crate::data_type::{DataType, Value};
-use crate::expr::Operand;
-use crate::faults::{Problem, ValueFaultKind};
-use crate::reading::{Expected, resolve};
-
-/// A declared parameter.
-#[derive(Debug, Clone)]
-pub struct Declaration<'d> {
-    /// The `ParameterDeclaration`.
-    pub node: Node<'d>,
-    /// Its name, without the `$` that old files write before it.
-    pub name: &'d str,
-    /// Its type, or `None` if `parameterType` is missing or no type.
-    pub data_type: Option<DataType>,
-    /// Its value.
-    pub declared: Declared<'d>,
-}
-
-/// Result of a declaration.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Declared<'d> {
-    /// A value of its type.
-    Value(Value<'d>),
-    /// No usable value. The reason is reported at the declaration.
-    Faulty,
-}
-
-/// Kind of a declaration, named by its element.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Declares {
-    /// `ParameterDeclaration`
-    Parameter,
-    /// `VariableDeclaration`
-    Variable,
-    /// `MonitorDeclaration`
-    Monitor,
-}
+use crate::types::data_type::DataType;
+use crate::types::declaration::{Declaration, Declared};
+use crate::types::faults::{Problem, ValueFaultKind};
+use crate::types::reading::{Expected, resolve};
 
 /// The declarations of one element.
 #[derive(Debug, Clone, Default)]
@@ -213,26 +180,5 @@ impl<'d> Context<'d> {
         around
             .filter_map(|holder| self.frame(holder))
             .flat_map(|frame| frame.declarations.iter().map(|one| one.name))
-    }
-}
-
-/// Returns the meaning of a declaration in an expression.
-pub(crate) fn operand(declaration: Option<&Declaration<'_>>) -> Operand {
-    let Some(declaration) = declaration else {
-        return Operand::Undeclared;
-    };
-    match (&declaration.declared, declaration.data_type) {
-        (Declared::Faulty, _) => Operand::Unresolved,
-        (Declared::Value(Value::Integer(value)), _) => {
-            Operand::Value(crate::expr::Value::Integer(*value))
-        }
-        (Declared::Value(Value::Double(value)), _) => {
-            Operand::Value(crate::expr::Value::Double(*value))
-        }
-        (Declared::Value(Value::Boolean(value)), _) => {
-            Operand::Value(crate::expr::Value::Boolean(*value))
-        }
-        (Declared::Value(Value::Text(_)), Some(DataType::DateTime)) => Operand::Text("dateTime"),
-        (Declared::Value(Value::Text(_)), _) => Operand::Text("string"),
     }
 }

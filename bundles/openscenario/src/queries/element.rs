@@ -2,22 +2,23 @@
 
 use std::borrow::Cow;
 
-use qcbus_document::{Attribute, Node};
+use qcbus_document::{Attribute, Named, Node};
 use qcbus_schema::ValueType;
 
-use crate::data_type::{Value, parse_boolean, parse_double, parse_integer};
-use crate::reading::Reading;
-use crate::scenario::Scenario;
-use crate::scope::{ContextId, Declaration};
-use crate::text::trim;
+use crate::queries::scenario::{Scenario, key};
+use crate::types::data_type::{Value, parse_boolean, parse_double, parse_integer};
+use crate::types::declaration::Declaration;
+use crate::types::reading::Reading;
+use crate::types::scope::ContextId;
+use crate::types::text::trim;
 
 /// A node together with the context in which it is read. The context is the checked document, or a
 /// catalog entry with the values that its reference assigns.
 #[derive(Clone, Copy)]
 pub struct Element<'m, 'd> {
-    pub(crate) scenario: &'m Scenario<'d>,
-    pub(crate) node: Node<'d>,
-    pub(crate) context: ContextId,
+    pub(super) scenario: &'m Scenario<'d>,
+    pub(super) node: Node<'d>,
+    pub(super) context: ContextId,
 }
 
 impl PartialEq for Element<'_, '_> {
@@ -109,11 +110,7 @@ impl<'m, 'd> Element<'m, 'd> {
         }
         let (reference, outer) = context.reference?;
         let node = reference.parent()?;
-        Some(Element {
-            scenario: self.scenario,
-            node,
-            context: outer,
-        })
+        Some(self.scenario.element_in(outer, node))
     }
 
     /// Returns the ancestors, the nearest first.
@@ -270,5 +267,62 @@ impl<'m, 'd> Element<'m, 'd> {
     pub fn declarations(self) -> &'m [Declaration<'d>] {
         let frame = self.scenario.context(self.context).frame(self.node);
         frame.map_or(&[], |frame| frame.declarations.as_slice())
+    }
+}
+
+impl<'d> Scenario<'d> {
+    /// Returns the root element.
+    pub fn root(&self) -> Element<'_, 'd> {
+        self.element(self.contexts[0].top)
+    }
+
+    /// Returns the elements of a name in the document itself, in document order.
+    pub fn elements(&self, name: &str) -> impl Iterator<Item = Element<'_, 'd>> {
+        let nodes = self.document.elements(name);
+        nodes.map(|node| self.element(node))
+    }
+
+    /// Returns an element of the document itself.
+    pub fn element(&self, node: Node<'d>) -> Element<'_, 'd> {
+        self.element_in(0, node)
+    }
+
+    /// Returns an element that is read in a context.
+    pub(super) fn element_in(&self, context: ContextId, node: Node<'d>) -> Element<'_, 'd> {
+        Element {
+            scenario: self,
+            node,
+            context,
+        }
+    }
+
+    /// Returns the elements of a name in the document and in the catalog entries that it refers to.
+    /// An entry occurs once per reference.
+    pub fn elements_everywhere(&self, name: &str) -> impl Iterator<Item = Element<'_, 'd>> {
+        // The list is cached per document, because thousands of references may lead to entries of
+        // the same few catalogs.
+        let mut known: Vec<(usize, Named<'d>)> = Vec::new();
+        self.tops().flat_map(move |top| {
+            let document = top.node.document();
+            let key = key(document);
+            let named = match known.iter().find(|(other, _)| *other == key) {
+                Some((_, named)) => *named,
+                None => {
+                    let named = document.named(name);
+                    known.push((key, named));
+                    named
+                }
+            };
+            let itself = top.is(name).then_some(top);
+            let within = named.within(top.node);
+            let within = within.map(move |node| Element { node, ..top });
+            itself.into_iter().chain(within)
+        })
+    }
+
+    /// Returns the root element, and each catalog entry once per reference to it.
+    pub fn tops(&self) -> impl Iterator<Item = Element<'_, 'd>> {
+        let contexts = (0..).zip(&self.contexts);
+        contexts.map(|(context, one)| self.element_in(context, one.top))
     }
 }

@@ -5,9 +5,7 @@ use std::borrow::Cow;
 use foldhash::{HashMap, HashSet, HashSetExt as _};
 use qcbus_document::Node;
 
-use crate::element::Element;
-use crate::scenario::Scenario;
-use crate::scope::ContextId;
+use crate::types::scope::ContextId;
 
 /// Kind of an entity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -40,11 +38,11 @@ impl EntityKind {
 /// A scenario object.
 #[derive(Debug, Clone)]
 pub struct Entity<'d> {
-    node: Node<'d>,
-    context: ContextId,
-    name: Cow<'d, str>,
-    kind: EntityKind,
-    object: Option<(Node<'d>, ContextId)>,
+    pub(crate) node: Node<'d>,
+    pub(crate) context: ContextId,
+    pub(crate) name: Cow<'d, str>,
+    pub(crate) kind: EntityKind,
+    pub(crate) object: Option<(Node<'d>, ContextId)>,
 }
 
 impl<'d> Entity<'d> {
@@ -57,46 +55,21 @@ impl<'d> Entity<'d> {
     pub fn kind(&self) -> EntityKind {
         self.kind
     }
-
-    /// Returns the `ScenarioObject`.
-    pub fn element<'m>(&self, scenario: &'m Scenario<'d>) -> Element<'m, 'd> {
-        Element {
-            scenario,
-            node: self.node,
-            context: self.context,
-        }
-    }
-
-    /// Returns the `Vehicle`, `Pedestrian` or `MiscObject`, from the document or from a catalog
-    /// entry.
-    pub fn object<'m>(&self, scenario: &'m Scenario<'d>) -> Option<Element<'m, 'd>> {
-        let (node, context) = self.object?;
-        Some(Element {
-            scenario,
-            node,
-            context,
-        })
-    }
 }
 
 /// A selection of entities.
 #[derive(Debug, Clone)]
 pub struct Selection<'d> {
-    node: Node<'d>,
-    name: Cow<'d, str>,
-    members: Vec<Cow<'d, str>>,
-    types: Vec<Cow<'d, str>>,
+    pub(crate) node: Node<'d>,
+    pub(crate) name: Cow<'d, str>,
+    pub(crate) members: Vec<Cow<'d, str>>,
+    pub(crate) types: Vec<Cow<'d, str>>,
 }
 
 impl<'d> Selection<'d> {
     /// Returns its name with parameters replaced.
     pub fn name(&self) -> &str {
         &self.name
-    }
-
-    /// Returns the `EntitySelection`.
-    pub fn element<'m>(&self, scenario: &'m Scenario<'d>) -> Element<'m, 'd> {
-        scenario.element(self.node)
     }
 
     /// Returns the names of the members that it lists.
@@ -119,75 +92,19 @@ pub struct Entities<'d> {
     selection_names: HashMap<String, u32>,
 }
 
-/// Elements that may be the object of a `ScenarioObject`.
-const OBJECTS: [&str; 4] = [
-    "Vehicle",
-    "Pedestrian",
-    "MiscObject",
-    "ExternalObjectReference",
-];
-
 impl<'d> Entities<'d> {
-    pub(crate) fn of(scenario: &Scenario<'d>) -> Entities<'d> {
-        let mut entities = Entities::default();
-        let block = scenario.root().child("Entities");
-        for child in block.into_iter().flat_map(Element::children) {
-            match child.name() {
-                "ScenarioObject" => entities.add(child, 0),
-                "EntitySelection" => entities.add_selection(child),
-                _ => {}
-            }
-        }
-        entities
+    pub(crate) fn add(&mut self, object: Entity<'d>) {
+        let at = u32::try_from(self.objects.len()).unwrap_or(u32::MAX);
+        let name = object.name().to_owned();
+        self.object_names.entry(name).or_insert(at);
+        self.objects.push(object);
     }
 
-    fn add(&mut self, element: Element<'_, 'd>, depth: usize) {
-        let object = element.child_or_entry(&OBJECTS);
-        let kind = match object.map(Element::name) {
-            Some("Vehicle") => EntityKind::Vehicle,
-            Some("Pedestrian") => EntityKind::Pedestrian,
-            Some("MiscObject") => EntityKind::MiscObject,
-            Some("ExternalObjectReference") => EntityKind::External,
-            _ => EntityKind::Unknown,
-        };
-        if let Some(name) = element.text("name") {
-            let at = u32::try_from(self.objects.len()).unwrap_or(u32::MAX);
-            self.object_names.entry(name.to_string()).or_insert(at);
-            self.objects.push(Entity {
-                node: element.node,
-                context: element.context,
-                name,
-                kind,
-                object: object.map(|object| (object.node, object.context)),
-            });
-        }
-        // A trailer that is defined inside its vehicle is a separate entity (1.3).
-        let trailer = object.and_then(|object| object.path(&["Trailer", "Trailer"]));
-        if let Some(trailer) = trailer.filter(|_| depth < 16) {
-            self.add(trailer, depth + 1);
-        }
-    }
-
-    fn add_selection(&mut self, element: Element<'_, 'd>) {
-        let Some(name) = element.text("name") else {
-            return;
-        };
-        let members = element.child("Members");
-        let all = || members.into_iter().flat_map(Element::children);
-        let named = |wanted: &'static str, attribute: &'static str| {
-            all()
-                .filter(|child| child.is(wanted))
-                .filter_map(|child| child.text(attribute))
-                .collect()
-        };
+    pub(crate) fn add_selection(&mut self, selection: Selection<'d>) {
         let at = u32::try_from(self.selections.len()).unwrap_or(u32::MAX);
-        self.selection_names.entry(name.to_string()).or_insert(at);
-        self.selections.push(Selection {
-            node: element.node,
-            name,
-            members: named("EntityRef", "entityRef"),
-            types: named("ByType", "objectType"),
-        });
+        let name = selection.name().to_owned();
+        self.selection_names.entry(name).or_insert(at);
+        self.selections.push(selection);
     }
 
     /// Returns the scenario objects in document order.
