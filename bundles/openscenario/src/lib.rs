@@ -29,7 +29,7 @@ pub use types::reading::Reading;
 pub use types::road_network::{LaneAt, RoadNetwork};
 pub use types::roads_nearby::RoadsNearby;
 pub use types::storyboard::{StoryElement, StoryKind, Storyboard};
-pub use types::text::{identifier, is_identifier};
+pub use types::text::{bare, identifier, is_identifier};
 pub use types::ways::{Stop, Way, Ways};
 
 /// The version in a file header: major and minor.

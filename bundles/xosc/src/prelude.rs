@@ -5,6 +5,6 @@ pub(crate) use qcbus_document::{Attribute, Document, Node};
 pub(crate) use qcbus_opendrive::{Road, RoadMap, Side};
 pub(crate) use qcbus_openscenario::{
     Actors, CatalogKind, DataType, Declaration, Declared, Element, Entity, EntityKind, Form,
-    LaneAt, Network, Resolution, Scenario, Value, ValueFaultKind,
+    LaneAt, Network, Resolution, Scenario, Value, ValueFaultKind, bare,
 };
 pub(crate) use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink, basic};

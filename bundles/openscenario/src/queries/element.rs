@@ -263,6 +263,12 @@ impl<'m, 'd> Element<'m, 'd> {
         self.scenario.context(self.context).names(self.node)
     }
 
+    /// Returns the first of its own declarations with this name.
+    pub fn declaration(self, name: &str) -> Option<&'m Declaration<'d>> {
+        let frame = self.scenario.context(self.context).frame(self.node);
+        frame?.get(name)
+    }
+
     /// Returns the declarations in its own `ParameterDeclarations`.
     pub fn declarations(self) -> &'m [Declaration<'d>] {
         let frame = self.scenario.context(self.context).frame(self.node);

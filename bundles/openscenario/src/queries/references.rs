@@ -14,6 +14,7 @@ use crate::types::faults::ValueFaultKind;
 use crate::types::inputs::Inputs;
 use crate::types::reading::{Expected, resolve};
 use crate::types::scope::{Context, ContextId};
+use crate::types::text::bare;
 
 /// Maximum depth of references from entry to entry.
 const MAX_DEPTH: u32 = 8;
@@ -105,8 +106,7 @@ impl<'d> Scenario<'d> {
         outer: ContextId,
         entry: Node<'d>,
     ) -> Option<(&'d str, Declared<'d>)> {
-        let name = assignment.attr("parameterRef")?;
-        let name = name.strip_prefix('$').unwrap_or(name);
+        let name = bare(assignment.attr("parameterRef")?);
         let declared = declaration(entry, name)?;
         let data_type = declared
             .attr("parameterType")
@@ -181,6 +181,11 @@ impl<'d> Scenario<'d> {
 }
 
 impl<'m, 'd> Element<'m, 'd> {
+    /// Returns the assignments of a `CatalogReference`.
+    pub fn assignments(self) -> impl Iterator<Item = Element<'m, 'd>> {
+        assignments(self.node).map(move |node| Element { node, ..self })
+    }
+
     /// Returns the child with one of these names. Otherwise returns the entry with one of these
     /// names that a `CatalogReference` in its place leads to.
     pub fn child_or_entry(self, names: &[&str]) -> Option<Element<'m, 'd>> {
@@ -204,8 +209,7 @@ pub(super) fn assignments(reference: Node<'_>) -> impl Iterator<Item = Node<'_>>
 /// Returns the declaration of a parameter by the entry itself.
 fn declaration<'d>(entry: Node<'d>, name: &str) -> Option<Node<'d>> {
     let block = entry.child("ParameterDeclarations")?;
-    block.children_named("ParameterDeclaration").find(|one| {
-        one.attr("name")
-            .is_some_and(|own| own.strip_prefix('$').unwrap_or(own) == name)
-    })
+    block
+        .children_named("ParameterDeclaration")
+        .find(|one| one.attr("name").is_some_and(|own| bare(own) == name))
 }

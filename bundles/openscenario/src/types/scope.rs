@@ -10,6 +10,7 @@ use crate::types::data_type::DataType;
 use crate::types::declaration::{Declaration, Declared};
 use crate::types::faults::{Problem, ValueFaultKind};
 use crate::types::reading::{Expected, resolve};
+use crate::types::text::bare;
 
 /// The declarations of one element.
 #[derive(Debug, Clone, Default)]
@@ -100,8 +101,7 @@ impl<'d> Context<'d> {
         version: Version,
         problems: &mut Vec<DeclarationProblem<'d>>,
     ) -> Declaration<'d> {
-        let name = node.attr("name").unwrap_or("");
-        let name = name.strip_prefix('$').unwrap_or(name);
+        let name = bare(node.attr("name").unwrap_or(""));
         let data_type = node
             .attr("parameterType")
             .and_then(DataType::of_declaration);
@@ -135,7 +135,7 @@ impl<'d> Context<'d> {
             .into_iter()
             .flat_map(|block| block.children_named("ParameterDeclaration"));
         let mut later = later.skip_while(|other| *other != node);
-        let is_it = |name: &str| name.strip_prefix('$').unwrap_or(name) == problem.name;
+        let is_it = |name: &str| bare(name) == problem.name;
         let later = later.find(|other| other.attr("name").is_some_and(is_it));
         if let Some(later) = later {
             problem.kind = ValueFaultKind::Order;

@@ -10,6 +10,11 @@ pub fn is_identifier(text: &str) -> bool {
     !text.is_empty() && identifier(text).len() == text.len()
 }
 
+/// Returns a name without the `$` that old files write before it.
+pub fn bare(name: &str) -> &str {
+    name.strip_prefix('$').unwrap_or(name)
+}
+
 /// Returns the longest parameter name at the start of a text, or an empty text.
 pub fn identifier(text: &str) -> &str {
     let starts = |byte: u8| byte.is_ascii_alphabetic() || byte == b'_';

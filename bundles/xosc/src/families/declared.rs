@@ -155,11 +155,6 @@ impl Declarable {
     }
 }
 
-/// Returns a name without the `$` that old files write before it.
-pub(crate) fn bare(name: &str) -> &str {
-    name.strip_prefix('$').unwrap_or(name)
-}
-
 /// Returns the type that a declaration names.
 pub(crate) fn type_of(declaration: Element<'_, '_>, attribute: &str) -> Option<DataType> {
     DataType::of_declaration(declaration.written(attribute)?)

@@ -46,8 +46,7 @@ pub(crate) fn inputs<'d>(scenario: &Scenario<'_>, subject: &'d Subject<'d>) -> O
 
 /// Returns the name of a parameter, without a superfluous `$`.
 pub(crate) fn parameter_name<'d>(source: Element<'_, 'd>, attribute: &str) -> Option<&'d str> {
-    let written = source.written(attribute)?;
-    Some(written.strip_prefix('$').unwrap_or(written))
+    source.written(attribute).map(bare)
 }
 
 /// Returns the declaration of a parameter by a scenario itself.
@@ -55,8 +54,7 @@ pub(crate) fn declaration<'m, 'd>(
     target: &'m Scenario<'d>,
     name: &str,
 ) -> Option<&'m Declaration<'d>> {
-    let mut own = target.root().declarations().iter();
-    own.find(|one| one.name == name)
+    target.root().declaration(name)
 }
 
 /// Returns the lower and upper limit of a range.

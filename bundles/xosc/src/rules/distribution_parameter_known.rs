@@ -32,10 +32,9 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 continue;
             }
             let names = target.root().declarations().iter().map(|one| one.name);
-            let further_in = target.elements("ParameterDeclaration").find(|one| {
-                one.written("name")
-                    .is_some_and(|own| own.strip_prefix('$').unwrap_or(own) == name)
-            });
+            let further_in = target
+                .elements("ParameterDeclaration")
+                .find(|one| one.written("name").is_some_and(|own| bare(own) == name));
             let why = match further_in {
                 Some(_) => {
                     "; a parameter that is declared further inside cannot be set from outside"

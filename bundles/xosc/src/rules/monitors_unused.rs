@@ -20,7 +20,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let dangling = declared::MONITORS.dangling(scenario, &["SetMonitorAction"]);
     for declaration in declared::MONITORS.declarations(scenario) {
         let name = declaration.written("name").unwrap_or("");
-        if !set.contains(declared::bare(name)) && !dangling.may_mean(name) {
+        if !set.contains(bare(name)) && !dangling.may_mean(name) {
             let text = format!(
                 "no `SetMonitorAction` sets the monitor `{name}`, so it reports its initial value throughout the \
                  run"

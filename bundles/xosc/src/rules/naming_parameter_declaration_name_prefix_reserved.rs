@@ -1,4 +1,3 @@
-use crate::families::declared;
 use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
@@ -13,7 +12,7 @@ pub static RULE: Rule<Scene> = Rule {
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for declaration in scenario.elements("ParameterDeclaration") {
-        let name = declared::bare(declaration.written("name").unwrap_or(""));
+        let name = bare(declaration.written("name").unwrap_or(""));
         if name.starts_with("OSC") {
             let text = format!(
                 "the parameter is named `{name}`, but names that begin with `OSC` are reserved for the standard"

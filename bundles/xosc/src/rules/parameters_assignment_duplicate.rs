@@ -62,7 +62,7 @@ fn across(block: Element<'_, '_>, found: &mut Sink<'_>) {
         };
         let mut said: HashSet<&str> = HashSet::default();
         for (source, attribute, name) in sources {
-            let name = name.strip_prefix('$').unwrap_or(name);
+            let name = bare(name);
             let other = *first.entry(name).or_insert(distribution);
             if other == distribution || !said.insert(name) {
                 continue;
@@ -93,7 +93,7 @@ fn within<'m, 'd: 'm>(
         let Some(written) = child.written(attribute) else {
             continue;
         };
-        let name = written.strip_prefix('$').unwrap_or(written);
+        let name = bare(written);
         let Some(known) = first.get(name) else {
             first.insert(name, child);
             continue;

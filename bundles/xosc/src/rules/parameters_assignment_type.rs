@@ -12,8 +12,7 @@ pub static RULE: Rule<Scene> = Rule {
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for (assignment, _, text) in scenario.assignment_faults() {
-        let name = assignment.written("parameterRef").unwrap_or("");
-        let name = name.strip_prefix('$').unwrap_or(name);
+        let name = bare(assignment.written("parameterRef").unwrap_or(""));
         let text = format!("the value for `{name}` is invalid: {text}");
         // If the default does not fit either, the type is wrong. This is a fault of the catalog.
         match misdeclared(assignment, name) {
@@ -34,7 +33,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
 fn misdeclared<'d>(assignment: Element<'_, 'd>, name: &str) -> Option<Node<'d>> {
     let reference = assignment.parent()?.parent()?;
     let entry = assignment.scenario().entry(reference)?;
-    let declaration = entry.declarations().iter().find(|one| one.name == name)?;
+    let declaration = entry.declaration(name)?;
     let default = declaration.node.attr("value")?;
     let fits = default.contains('$') || declaration.data_type?.parse(default).is_some();
     (!fits).then_some(declaration.node)
@@ -46,15 +45,9 @@ fn constraints(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let Some(entry) = scenario.entry(reference) else {
             continue;
         };
-        let block = reference.child("ParameterAssignments");
-        let assignments = block
-            .into_iter()
-            .flat_map(|block| block.children_named("ParameterAssignment"));
-        for assignment in assignments {
-            let name = assignment.written("parameterRef").unwrap_or("");
-            let name = name.strip_prefix('$').unwrap_or(name);
-            let mut own = entry.declarations().iter();
-            let Some(declaration) = own.find(|one| one.name == name) else {
+        for assignment in reference.assignments() {
+            let name = bare(assignment.written("parameterRef").unwrap_or(""));
+            let Some(declaration) = entry.declaration(name) else {
                 continue;
             };
             let Declared::Value(value) = &declaration.declared else {

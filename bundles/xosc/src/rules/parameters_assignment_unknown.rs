@@ -16,17 +16,12 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let Some(entry) = scenario.entry(reference) else {
             continue;
         };
-        let block = reference.child("ParameterAssignments");
-        let assignments = block
-            .into_iter()
-            .flat_map(|block| block.children_named("ParameterAssignment"));
-        for assignment in assignments {
+        for assignment in reference.assignments() {
             let Some(written) = assignment.written("parameterRef") else {
                 continue;
             };
-            let name = written.strip_prefix('$').unwrap_or(written);
-            let mut names = entry.declarations().iter().map(|one| one.name);
-            if !names.any(|declared| declared == name) {
+            let name = bare(written);
+            if entry.declaration(name).is_none() {
                 let names = entry.declarations().iter().map(|one| one.name);
                 let near = hint(name, names.clone());
                 let what = match entry.declarations().len() {

@@ -58,11 +58,6 @@ fn is_number(element: Element<'_, '_>, attribute: Attribute<'_>) -> bool {
 fn assigned(assignment: Element<'_, '_>) -> Option<DataType> {
     let reference = assignment.parent()?.parent()?;
     let entry = assignment.scenario().entry(reference)?;
-    let name = assignment.written("parameterRef")?;
-    let name = name.strip_prefix('$').unwrap_or(name);
-    entry
-        .declarations()
-        .iter()
-        .find(|one| one.name == name)?
-        .data_type
+    let name = bare(assignment.written("parameterRef")?);
+    entry.declaration(name)?.data_type
 }

@@ -1,4 +1,3 @@
-use crate::families::declared;
 use crate::prelude::*;
 
 pub static RULE: Rule<Scene> = Rule {
@@ -25,7 +24,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let value = declaration.node.attr("value").unwrap_or("");
-            if declared::bare(value) == declaration.name && value.starts_with('$') {
+            if bare(value) == declaration.name && value.starts_with('$') {
                 // The outer value is passed on intentionally.
                 continue;
             }

@@ -81,14 +81,8 @@ fn without_value(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
 }
 
 fn assigns(reference: Element<'_, '_>, name: &str) -> bool {
-    let block = reference.child("ParameterAssignments");
-    let mut assignments = block
-        .into_iter()
-        .flat_map(|block| block.children_named("ParameterAssignment"));
-    assignments.any(|assignment| {
-        let own = assignment.written("parameterRef").unwrap_or("");
-        own.strip_prefix('$').unwrap_or(own) == name
-    })
+    let mut assignments = reference.assignments();
+    assignments.any(|assignment| bare(assignment.written("parameterRef").unwrap_or("")) == name)
 }
 
 /// Returns the first attribute in an entry that contains a parameter.

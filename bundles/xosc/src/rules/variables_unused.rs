@@ -22,7 +22,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let used = declared::VARIABLES.names(scenario, USES);
     let dangling = declared::VARIABLES.dangling(scenario, USES);
     for declaration in declared::VARIABLES.declarations(scenario) {
-        let name = declared::bare(declaration.written("name").unwrap_or(""));
+        let name = bare(declaration.written("name").unwrap_or(""));
         if !used.contains(name) && !dangling.may_mean(name) {
             let text = format!(
                 "no action sets the variable `{name}`, and no condition reads it; it can be used only from \
