@@ -185,6 +185,15 @@ impl<'d> WrittenIn<'d> {
     pub fn get(&self, value: &Value) -> Option<WrittenAt<'d>> {
         self.0.get(&(value.piece, value.offset)).copied()
     }
+
+    /// Returns the place at which the value of an attribute is written, if it was replaced.
+    pub fn of_attribute(
+        &self,
+        taken: &Taken<'_, 'd>,
+        attribute: Attribute<'d>,
+    ) -> Option<WrittenAt<'d>> {
+        self.get(taken.copy.edit(attribute)?)
+    }
 }
 
 /// Returns the shortest key with the attribute's element: `AbsoluteTargetSpeed.value`.

@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use crate::assembly::place;
+use crate::families::copies::WrittenAt;
 use crate::prelude::*;
 
 /// Maximum number of further places that a finding lists. The rest is only counted.
@@ -82,6 +83,13 @@ impl<'d> Finds<'d> {
     ) -> Option<&mut Find<'d>> {
         let find = Find::of(at, place(target), there, text, "it is also set here");
         self.note(place(at), place(target), find)
+    }
+
+    /// Notes a fault of a value that is written at `origin` and that an attribute in a library file
+    /// gets.
+    pub fn value(&mut self, origin: WrittenAt<'d>, target: Attribute<'d>, text: String) {
+        let at = origin.attribute().into();
+        self.given(at, target.into(), "the attribute that gets the value", text);
     }
 
     fn note(

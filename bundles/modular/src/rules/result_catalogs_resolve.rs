@@ -36,8 +36,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
             let Some((attribute, wrong)) = wrong(&taken, reference, &catalogs) else {
                 continue;
             };
-            let edit = taken.copy.edit(attribute);
-            match edit.and_then(|edit| origins.get(edit)) {
+            match origins.of_attribute(&taken, attribute) {
                 Some(origin) => {
                     let text = format!("{} leads to no catalog entry: {wrong}", origin.what());
                     let at = origin.attribute().into();

@@ -34,8 +34,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
             if scenario.entities().contains(&name) {
                 continue;
             }
-            let edit = taken.copy.edit(attribute);
-            match edit.and_then(|edit| origins.get(edit)) {
+            match origins.of_attribute(&taken, attribute) {
                 Some(origin) => {
                     let text = given(origin, &name, &scenario);
                     let at = origin.attribute().into();

@@ -4,8 +4,8 @@ use crate::assembly::{Assembly, Modular};
 use crate::families::copies::{Taken, WrittenAt, WrittenIn, parameter_of, short_name};
 use crate::families::finds::Finds;
 use crate::prelude::*;
-use qcbus_openscenario::Scenario;
 use qcbus_openscenario::expr;
+use qcbus_openscenario::{Scenario, bare};
 
 pub static RULE: Rule<Modular> = Rule {
     id: "check_qcbus_mosc_result_parameters_resolved",
@@ -33,16 +33,9 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
                 .into_iter()
                 .filter(|name| !is_declared(name, attribute, &taken, &scenario));
             for name in missing {
-                let edit = taken.copy.edit(attribute);
-                if let Some(origin) = edit.and_then(|edit| origins.get(edit)) {
+                if let Some(origin) = origins.of_attribute(&taken, attribute) {
                     let text = given(origin, name, attribute, &scenario);
-                    let at = origin.attribute().into();
-                    finds.given(
-                        at,
-                        attribute.into(),
-                        "the attribute that gets the value",
-                        text,
-                    );
+                    finds.value(origin, attribute, text);
                     continue;
                 }
                 let piece = taken.copy.piece;
@@ -112,10 +105,7 @@ fn is_declared<'d>(
 fn declaration<'d>(holder: Node<'d>, name: &str) -> Option<Node<'d>> {
     let block = holder.child("ParameterDeclarations")?;
     let mut all = block.children_named("ParameterDeclaration");
-    all.find(|one| {
-        let own = one.attr("name").unwrap_or("");
-        own.strip_prefix('$').unwrap_or(own) == name
-    })
+    all.find(|one| bare(one.attr("name").unwrap_or("")) == name)
 }
 
 fn brought(taken: &Taken<'_, '_>, attribute: Attribute<'_>, name: &str) -> String {

@@ -115,13 +115,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
                 value.text,
                 range.instead(number)
             );
-            let at = origin.attribute().into();
-            finds.given(
-                at,
-                attribute.into(),
-                "the attribute that gets the value",
-                text,
-            );
+            finds.value(origin, attribute, text);
         }
     }
     finds.say(found);

@@ -37,13 +37,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
                 attribute.name(),
                 attribute.node().name()
             );
-            let at = origin.attribute().into();
-            finds.given(
-                at,
-                attribute.into(),
-                "the attribute that gets the value",
-                text,
-            );
+            finds.value(origin, attribute, text);
         }
     }
     finds.say(found);
