@@ -1,8 +1,8 @@
 //! Checks the form of a `geoReference`. The standard requires a PROJ string. Other forms, such as
 //! well-known text and EPSG codes, are harmless where PROJ itself reads the map.
 
-use super::proj_string::{self, Flaw};
-use crate::prelude::*;
+use super::proj_string;
+use super::reference_code::{Flaw, code, no_plane, other_form, short, warning};
 
 /// Names at the start of well-known text. The last ones give degrees, not a plane.
 const WKT: &[&str] = &[
@@ -25,12 +25,6 @@ const WKT_IN_DEGREES: &[&str] = &[
     "GEODETICCRS",
     "GEOCCS",
 ];
-
-/// Authorities for codes of reference systems that PROJ knows.
-const AUTHORITIES: &[&str] = &["EPSG", "ESRI", "IGNF", "IAU_2015", "NKG", "OGC"];
-
-/// EPSG codes for coordinates in degrees: WGS 84, with height, ETRS89, NAD83.
-const DEGREES: &[u32] = &[4326, 4979, 4258, 4269];
 
 /// Returns the faults in the text of a `geoReference` that is not empty.
 pub(crate) fn flaws(text: &str) -> Vec<Flaw> {
@@ -78,64 +72,4 @@ fn wkt(text: &str) -> Option<Flaw> {
     } else {
         other_form("well-known text")
     })
-}
-
-/// Checks a code of a reference system, such as `EPSG:25832`, which `+init=` accepts as well.
-pub(crate) fn code(text: &str) -> Option<Flaw> {
-    let lower = text.to_ascii_lowercase();
-    if lower.starts_with("urn:ogc:def:crs:") || lower.contains("opengis.net/def/crs/") {
-        return Some(other_form("a URN or URL"));
-    }
-    let (authority, code) = text.split_once(':')?;
-    let (authority, code) = (authority.trim().to_ascii_uppercase(), code.trim());
-    if !AUTHORITIES.contains(&authority.as_str()) {
-        return None;
-    }
-    if authority != "EPSG" {
-        return Some(other_form("a code"));
-    }
-    let horizontal = code.split('+').next()?.trim();
-    Some(match horizontal.parse() {
-        Ok(number) if DEGREES.contains(&number) => no_plane(text),
-        Ok(1024..=32_767) => other_form("an EPSG code"),
-        _ => warning(format!(
-            "`{}` is not an EPSG code; EPSG codes are numbers from 1024 to 32767",
-            short(text)
-        )),
-    })
-}
-
-fn other_form(form: &str) -> Flaw {
-    Flaw {
-        level: Level::Information,
-        text: format!(
-            "`geoReference` is {form}, which some map readers do not understand; the standard requires a PROJ \
-             string, such as `+proj=utm +zone=32`"
-        ),
-    }
-}
-
-fn no_plane(what: &str) -> Flaw {
-    warning(format!(
-        "`{what}` gives degrees and no projection onto a plane, but x and y of the map are metres on a plane"
-    ))
-}
-
-fn warning(text: String) -> Flaw {
-    Flaw {
-        level: Level::Warning,
-        text,
-    }
-}
-
-/// Returns the beginning of a long text.
-fn short(text: &str) -> String {
-    let mut letters = text.chars();
-    let start: String = letters.by_ref().take(40).collect();
-    let start = start.split_whitespace().collect::<Vec<_>>().join(" ");
-    if letters.next().is_some() {
-        format!("{start}…")
-    } else {
-        start
-    }
 }

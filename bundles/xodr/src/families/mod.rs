@@ -40,6 +40,7 @@ pub(crate) mod proj_string;
 pub(crate) mod proj_values;
 pub(crate) mod rails;
 pub(crate) mod redundancy;
+pub(crate) mod reference_code;
 pub(crate) mod refline;
 pub(crate) mod roadside;
 pub(crate) mod routes;

@@ -1,17 +1,11 @@
 //! Checks of a PROJ string. PROJ itself does not report many faults: it ignores unknown names and
 //! uses defaults for missing values.
 
-use super::georeference::code;
 use super::proj_names::{ANGLES, CHOICES, CONES, MERIDIANS, NO_PROJECTIONS, NUMBERS, keys, names};
 use super::proj_values::{degrees, number};
+use super::reference_code::{Flaw, code};
 use crate::prelude::*;
 use qcbus_schema::closest;
-
-/// One fault with its level and text.
-pub(crate) struct Flaw {
-    pub(crate) level: Level,
-    pub(crate) text: String,
-}
 
 /// Maximum numbers of checked words, where a dozen is usual, and of bytes per word.
 const MOST_WORDS: usize = 200;

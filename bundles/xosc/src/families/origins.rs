@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use crate::families::placement::{self, Start};
 use crate::families::positions::{AT_END, find_lane, lane_of, road_of, section_of, station};
-use crate::families::relative;
+use crate::families::relative::{self, OnRoad};
 use crate::prelude::*;
 use foldhash::{HashMap, HashMapExt as _};
 use qcbus_opendrive::TrafficRule;
@@ -24,18 +24,6 @@ pub(crate) struct Whereabouts<'w, 'r> {
     pub(crate) is_sure: bool,
     /// Position on a road, if it was placed on one. Otherwise [`Origins::on`] searches for it.
     on: Option<OnRoad<'w, 'r>>,
-}
-
-/// A place on a road.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct OnRoad<'w, 'r> {
-    pub(crate) road: &'w Road<'r>,
-    pub(crate) s: f64,
-    pub(crate) t: f64,
-    /// The lane, if it is known.
-    pub(crate) lane: Option<i64>,
-    /// Whether an entity here certainly faces along the road.
-    pub(crate) along: bool,
 }
 
 enum Memo<'w, 'r> {

@@ -1,11 +1,22 @@
 //! Positions relative to another on the same road: the lane, the station, and the remaining length
 //! of road.
 
-use crate::families::origins::OnRoad;
 use crate::prelude::*;
 use foldhash::{HashMap, HashMapExt as _};
 use qcbus_opendrive::ContactPoint;
 use qcbus_opendrive::RoadEnd;
+
+/// A place on a road.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OnRoad<'w, 'r> {
+    pub(crate) road: &'w Road<'r>,
+    pub(crate) s: f64,
+    pub(crate) t: f64,
+    /// The lane, if it is known.
+    pub(crate) lane: Option<i64>,
+    /// Whether an entity here certainly faces along the road.
+    pub(crate) along: bool,
+}
 
 /// Returns the lanes that a `RelativeLanePosition` may mean. Tools disagree on whether the center
 /// lane counts. Against the road they also disagree on which side is left.
@@ -70,10 +81,7 @@ impl<'m, 'd> Reach<'m, 'd> {
     /// Returns the maximum distance beyond an end of a road.
     fn beyond(&mut self, road: &Road<'d>, end: ContactPoint) -> Option<f64> {
         // Path of ends that are passed, with the ends that are still to be visited beyond each.
-        let start = RoadEnd {
-            road: road.index(),
-            end,
-        };
+        let start = RoadEnd::of(road, end);
         let mut way = vec![(start, self.next(start)?, 0.0_f64)];
         loop {
             let (here, open, best) = way.last_mut()?;

@@ -1,5 +1,6 @@
-use crate::families::origins::{OnRoad, Origins};
+use crate::families::origins::Origins;
 use crate::families::positions::{ON_ROAD, lane_of, metres, road_of, section_of, shown, station};
+use crate::families::relative::OnRoad;
 use crate::families::relative::{self, Reach};
 use crate::prelude::*;
 use foldhash::HashSet;
