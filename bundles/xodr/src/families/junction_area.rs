@@ -160,6 +160,12 @@ pub(crate) fn reference_line(junction: &Junction<'_>) -> Option<Placed> {
     }
 }
 
+/// Returns the element of the reference line of a junction, or of the junction without one.
+pub(crate) fn line_node<'a>(junction: &Junction<'a>) -> Node<'a> {
+    let first = junction.plan_view().geometries().first();
+    first.map_or(junction.node(), |one| one.node())
+}
+
 /// Returns s and t of a point beside a straight line.
 pub(crate) fn beside(line: &Placed, point: Point) -> (f64, f64) {
     let (sin, cos) = line.hdg.sin_cos();

@@ -123,10 +123,25 @@ fn local(point: &ObjectPoint<'_>) -> Option<[f64; 3]> {
     Some([point.u()?, point.v()?, point.z()?])
 }
 
+/// Reports objects whose points need more space than their bounding volume. `points` returns the
+/// points of an object, which are called `what` in the text.
+pub(crate) fn report_outside<'m, 'a>(
+    part: MapPart<'m, 'a>,
+    points: impl Fn(&ObjectFrame<'m, 'a>, &Object<'a>) -> Vec<LocalPoint<'a>>,
+    what: &str,
+    found: &mut Sink<'_>,
+) {
+    for (road, object) in part.objects() {
+        if let Some(frame) = ObjectFrame::of(road, &object) {
+            report_too_large(road, &object, &points(&frame, &object), what, found);
+        }
+    }
+}
+
 /// Reports an object whose points need more space than its bounding volume. The standard does not
 /// define the origin in the volume. Its examples put it in the middle or at a corner. Therefore
 /// only extents are compared.
-pub(crate) fn report_too_large(
+fn report_too_large(
     road: &Road<'_>,
     object: &Object<'_>,
     points: &[LocalPoint<'_>],

@@ -59,6 +59,33 @@ pub(crate) fn number(node: Node<'_>, attribute: &str) -> Option<f64> {
     node.f64(attribute).ok().filter(|value| value.is_finite())
 }
 
+/// Reports tunnels or bridges without a type, or with a type that is not in the standard.
+pub(crate) fn check_types(
+    map: &RoadMap<'_>,
+    name: &'static str,
+    types: &[&str],
+    found: &mut Sink<'_>,
+) {
+    for node in below(map, name, "objects") {
+        let kind = node.attr("type").map_or("", str::trim);
+        if types.contains(&kind) {
+            continue;
+        }
+        let has = match kind {
+            "" => "no `type`".to_owned(),
+            kind => format!("the unknown type `{kind}`"),
+        };
+        let text = format!(
+            "{} has {has}; its type must be one of {}",
+            named(node),
+            listed(types)
+        );
+        found
+            .issue(Place::attribute_or_node(node, "type"), text)
+            .stands(map, node);
+    }
+}
+
 /// Checks whether the file has an older version than this.
 pub(crate) fn is_before(found: &Sink<'_>, edition: (u16, u16)) -> bool {
     let version = found.version();

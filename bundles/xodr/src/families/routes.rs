@@ -10,6 +10,20 @@ pub(crate) const NARROW: Param = Param::number(
     "width below which a lane counts as beginning or ending there",
 );
 
+/// Types of lanes with regular vehicle traffic in one direction.
+pub(crate) const DIRECTED: [&str; 10] = [
+    "driving",
+    "entry",
+    "exit",
+    "onRamp",
+    "offRamp",
+    "connectingRamp",
+    "slipLane",
+    "bus",
+    "taxi",
+    "HOV",
+];
+
 /// Checks whether a lane is intended for through traffic of vehicles. This is stricter than being
 /// drivable: routes do not use a border, for example.
 pub(crate) fn is_route(lane: LaneRef<'_, '_>) -> bool {

@@ -1,4 +1,4 @@
-use crate::families::junction_area::{boundary, reference_line, ring};
+use crate::families::junction_area::{boundary, line_node, reference_line, ring};
 use crate::families::polygons::{distance_to_line, sides};
 use crate::prelude::*;
 
@@ -42,12 +42,9 @@ fn check(junction: &Junction<'_>, line: &Placed, ring: &[Point], found: &mut Sin
              {nearest:.3} m away from it",
             junction.id()
         );
-        let node = junction
-            .plan_view()
-            .geometries()
-            .first()
-            .map_or(junction.node(), |one| one.node());
-        found.issue(node, text).point(start.x, start.y, 0.0);
+        found
+            .issue(line_node(junction), text)
+            .point(start.x, start.y, 0.0);
     }
 }
 

@@ -1,4 +1,4 @@
-use crate::families::junction_area::{beside, boundary, reference_line, ring};
+use crate::families::junction_area::{beside, boundary, line_node, reference_line, ring};
 use crate::prelude::*;
 
 const TOLERANCE: Param = Param::number(
@@ -41,11 +41,8 @@ fn check(junction: &Junction<'_>, line: &Placed, ring: &[Point], found: &mut Sin
              junction must be at a right angle to a point of the line",
             junction.id()
         );
-        let node = junction
-            .plan_view()
-            .geometries()
-            .first()
-            .map_or(junction.node(), |one| one.node());
-        found.issue(node, text).point(point.x, point.y, 0.0);
+        found
+            .issue(line_node(junction), text)
+            .point(point.x, point.y, 0.0);
     }
 }

@@ -1,19 +1,6 @@
 use crate::families::on_road::OnRoad;
+use crate::families::routes::DIRECTED;
 use crate::prelude::*;
-
-/// Types of lanes on which traffic runs in one direction.
-const DIRECTED: &[&str] = &[
-    "driving",
-    "entry",
-    "exit",
-    "onRamp",
-    "offRamp",
-    "connectingRamp",
-    "slipLane",
-    "bus",
-    "taxi",
-    "HOV",
-];
 
 pub static RULE: Rule<Roads> = Rule {
     id: "check_asam_xodr_road_lane_lane_reverse_left_right",

@@ -1,4 +1,4 @@
-use crate::families::object_frame::{ObjectFrame, TOLERANCE, report_too_large};
+use crate::families::object_frame::{TOLERANCE, report_outside};
 use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -13,20 +13,15 @@ pub static RULE: Rule<Roads> = Rule {
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
-    for (road, object) in map.part(part).objects() {
-        let Some(frame) = ObjectFrame::of(road, &object) else {
-            continue;
-        };
-        let points: Vec<_> = object
-            .polylines()
-            .flat_map(|line| frame.vertices(&line, true))
-            .collect();
-        report_too_large(
-            road,
-            &object,
-            &points,
-            "the skeleton (even without the width of its ends)",
-            found,
-        );
-    }
+    report_outside(
+        map.part(part),
+        |frame, object| {
+            object
+                .polylines()
+                .flat_map(|line| frame.vertices(&line, true))
+                .collect()
+        },
+        "the skeleton (even without the width of its ends)",
+        found,
+    );
 }

@@ -1,4 +1,4 @@
-use crate::families::object_parts::{Stands, below, listed, named};
+use crate::families::object_parts::check_types;
 use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -15,22 +15,5 @@ pub static RULE: Rule<Roads> = Rule {
 const TYPES: [&str; 2] = ["standard", "underpass"];
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
-    for node in below(map, "tunnel", "objects") {
-        let kind = node.attr("type").map_or("", str::trim);
-        if TYPES.contains(&kind) {
-            continue;
-        }
-        let has = match kind {
-            "" => "no `type`".to_owned(),
-            kind => format!("the unknown type `{kind}`"),
-        };
-        let text = format!(
-            "{} has {has}; its type must be one of {}",
-            named(node),
-            listed(&TYPES)
-        );
-        found
-            .issue(Place::attribute_or_node(node, "type"), text)
-            .stands(map, node);
-    }
+    check_types(map, "tunnel", &TYPES, found);
 }

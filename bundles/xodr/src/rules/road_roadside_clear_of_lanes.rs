@@ -1,6 +1,7 @@
 use crate::families::object_parts::{has_outline, named, number};
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::roadside::{Row, Spot, lane_at, lanes_at, place, stands_itself, things};
+use crate::families::routes::DIRECTED;
 use crate::prelude::*;
 
 pub static RULE: Rule<Roads> = Rule {
@@ -27,19 +28,6 @@ const CLEARANCE: Param = Param::number(
     "height above the road from which vehicles can pass below an object",
 );
 
-/// Types of lanes with regular vehicle traffic.
-const LANES: [&str; 10] = [
-    "driving",
-    "entry",
-    "exit",
-    "onRamp",
-    "offRamp",
-    "connectingRamp",
-    "slipLane",
-    "bus",
-    "taxi",
-    "HOV",
-];
 /// Types that never stand on a lane. Barriers, obstacles and patches may be intended there.
 const FIXED: [&str; 5] = ["pole", "tree", "vegetation", "streetLamp", "building"];
 
@@ -115,7 +103,7 @@ fn crossing(road: &Road<'_>, object: Node<'_>, repeat: Node<'_>, row: &Row, foun
     if end - s < (to - from).abs() {
         return;
     }
-    let lanes = lanes_at(road, s, &LANES).zip(lanes_at(road, end, &LANES));
+    let lanes = lanes_at(road, s, &DIRECTED).zip(lanes_at(road, end, &DIRECTED));
     let Some(([right, left], [end_right, end_left])) = lanes else {
         return;
     };
@@ -161,7 +149,7 @@ fn blocked<'m, 'a>(road: &'m Road<'a>, s: f64, t: f64, depth: f64) -> Option<Spo
     let spot = lane_at(road, s, t).filter(|spot| spot.depth > depth)?;
     spot.lane
         .kind()
-        .is_some_and(|kind| LANES.contains(&kind))
+        .is_some_and(|kind| DIRECTED.contains(&kind))
         .then_some(spot)
 }
 
