@@ -154,15 +154,6 @@ impl<'m, 'a> LaneRef<'m, 'a> {
         self.t(Edge::Outer, ds)
     }
 
-    /// Returns the slope dt/ds of a border.
-    pub fn t_slope(self, edge: Edge, ds: impl Into<Station>) -> Option<f64> {
-        let part = |profile: &Profile<'a>, station| Some([profile.slope_at(station)?]);
-        let [slope] = self.sum(edge, ds.into(), part, |section, station| {
-            Some([section.center_slope(station)?])
-        })?;
-        Some(slope)
-    }
-
     /// Returns t of a border and its slope dt/ds.
     pub(crate) fn t_and_slope(self, edge: Edge, ds: Station) -> Option<[f64; 2]> {
         self.sum(edge, ds, Profile::both_at, |section, station| {
@@ -206,12 +197,6 @@ impl<'m, 'a> LaneRef<'m, 'a> {
     pub fn inner_neighbour(self) -> Option<LaneRef<'m, 'a>> {
         self.at
             .side_lane(self.side()?, self.lane.rank().checked_sub(1)?)
-    }
-
-    /// Returns the next lane away from the center on the same side.
-    pub fn outer_neighbour(self) -> Option<LaneRef<'m, 'a>> {
-        self.at
-            .side_lane(self.side()?, self.lane.rank().checked_add(1)?)
     }
 }
 

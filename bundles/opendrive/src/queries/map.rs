@@ -192,6 +192,11 @@ impl<'a> RoadMap<'a> {
         places.filter_map(|place| self.junctions.get(place))
     }
 
+    /// Returns the junction of a road, if it belongs to one.
+    pub fn junction_of(&self, road: &Road<'_>) -> Option<&Junction<'a>> {
+        self.junction(road.junction()?)
+    }
+
     /// Returns the signal controllers (14.6).
     pub fn controllers(&self) -> impl Iterator<Item = Controller<'a>> + use<'a> {
         listed(self.root, "controller").map(Controller::of)

@@ -68,10 +68,7 @@ impl<'a> Used<'a> {
         }
         let ends = ContactPoint::BOTH.into_iter().zip(touches);
         for (end, _) in ends.filter(|(_, touches)| *touches) {
-            let at = RoadEnd {
-                road: road.index(),
-                end,
-            };
+            let at = RoadEnd::of(road, end);
             let named = connection.lane_links();
             self.lanes.extend(
                 named.filter_map(|link| map.lane_at_road_end(at, link.from()?, link.from_layer())),

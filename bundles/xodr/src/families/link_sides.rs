@@ -6,7 +6,7 @@ use foldhash::HashSet;
 /// Checks whether a road belongs to a virtual junction. Such junctions do not split roads, so the
 /// surrounding roads need no link to them.
 pub(crate) fn in_virtual_junction(map: &RoadMap<'_>, road: &Road<'_>) -> bool {
-    let junction = road.junction().and_then(|id| map.junction(id));
+    let junction = map.junction_of(road);
     junction.is_some_and(|junction| junction.kind() == Some(JunctionType::Virtual))
 }
 

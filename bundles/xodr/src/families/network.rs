@@ -39,7 +39,7 @@ impl Parts {
                 parts.join(road.index(), linked.map(Road::index));
                 parts.join(road.index(), junction.map(|it| roads + it.index()));
             }
-            let junction = road.junction().and_then(|id| map.junction(id));
+            let junction = map.junction_of(road);
             parts.join(road.index(), junction.map(|it| roads + it.index()));
         }
         for (junction, connection) in map.connections() {

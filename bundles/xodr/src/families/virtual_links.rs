@@ -5,7 +5,7 @@ use foldhash::HashSet;
 
 /// Checks whether a link leads from a road of a virtual junction to its main road.
 pub(crate) fn leads_to_main_road(map: &RoadMap<'_>, road: &Road<'_>, link: RoadLink<'_>) -> bool {
-    let junction = road.junction().and_then(|id| map.junction(id));
+    let junction = map.junction_of(road);
     junction.is_some_and(|junction| {
         junction.kind() == Some(JunctionType::Virtual)
             && junction.main_road().is_some()

@@ -41,10 +41,7 @@ pub(crate) fn has_no_links(map: &RoadMap<'_>, end: ContactPoint, found: &mut Sin
     let zero = found.number(&ZERO_WIDTH);
     let junctions = LaneLinks::of(map, end);
     for lane in map.lanes().filter(|lane| is_zero_at(*lane, end, zero)) {
-        let at = LaneEnd {
-            lane: lane.key(),
-            end,
-        };
+        let at = LaneEnd::of(lane, end);
         let own: Vec<Node<'_>> = lane.links(end).map(|link| link.node()).collect();
         let own_text = format!("it must not have a `{}`", end.link_name());
         report(lane, end, &own, &own_text, found);

@@ -60,10 +60,7 @@ fn check(
 ) {
     let narrow = found.number(&NARROW);
     let open = |lane: &LaneRef<'_, '_>| {
-        let at = LaneEnd {
-            lane: lane.key(),
-            end,
-        };
+        let at = LaneEnd::of(*lane, end);
         is_route(*lane) && is_wide(*lane, end, narrow) && !taken.contains(&at)
     };
     let ending = lanes_at(road, end).filter(|lane| lane.links(end).next().is_none());

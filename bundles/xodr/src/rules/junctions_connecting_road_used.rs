@@ -17,7 +17,7 @@ pub static RULE: Rule<Roads> = Rule {
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let named = named(map);
     for road in map.roads() {
-        let Some(junction) = road.junction().and_then(|id| map.junction(id)) else {
+        let Some(junction) = map.junction_of(road) else {
             continue;
         };
         let kind = junction.kind();

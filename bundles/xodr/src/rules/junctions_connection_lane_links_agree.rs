@@ -131,10 +131,7 @@ fn unconnected<'a>(
     let Some((incoming, at)) = entries.missing(map, road, end) else {
         return;
     };
-    let from = RoadEnd {
-        road: incoming.index(),
-        end: at,
-    };
+    let from = RoadEnd::of(incoming, at);
     let comes_in = |id: &i64| {
         let lane = map.lane_at_road_end(from, *id, LayerKind::Permanent);
         let lane = lane.and_then(|at| map.lane(at.lane));

@@ -33,10 +33,7 @@ fn check(map: &RoadMap<'_>, path: CrossPath<'_>, end: ContactPoint, found: &mut 
     };
     let crossing = path.crossing_road().and_then(|id| map.road(id));
     let crossing = crossing.zip(link.to()).and_then(|(road, to)| {
-        let place = RoadEnd {
-            road: road.index(),
-            end,
-        };
+        let place = RoadEnd::of(road, end);
         map.lane(map.lane_at_road_end(place, to, LayerKind::Permanent)?.lane)
     });
     for (attribute, lane) in [("from", crossed), ("to", crossing)] {

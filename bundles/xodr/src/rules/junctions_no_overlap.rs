@@ -135,7 +135,7 @@ fn footprints<'m, 'a>(map: &'m RoadMap<'a>) -> Vec<Footprint<'m, 'a>> {
         .map(|junction| boundary(map, junction).map(|stretches| ring(&stretches)))
         .collect();
     for road in map.roads() {
-        let Some(junction) = road.junction().and_then(|id| map.junction(id)) else {
+        let Some(junction) = map.junction_of(road) else {
             continue;
         };
         let height = road.elevation().at_or_zero(0.0);

@@ -21,10 +21,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     // `road.linkage.both_sides_consistency` reports roads that the junction does not mention.
     let known = Known::by(map);
     for (road, end, junction) in arms(map) {
-        let at = RoadEnd {
-            road: road.index(),
-            end,
-        };
+        let at = RoadEnd::of(road, end);
         let all = used.is_whole(junction, road) || used.is_open(at);
         if !all && known.contains(junction, road, end) {
             check(&used, (road, end), junction, found);

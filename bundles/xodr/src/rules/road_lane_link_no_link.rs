@@ -28,10 +28,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
 /// Returns the reason why lanes have no target for a link at an end of a road, or `None`.
 fn nothing_to_link(map: &RoadMap<'_>, road: &Road<'_>, end: ContactPoint) -> Option<String> {
     let Some(link) = road.link(end) else {
-        let here = RoadEnd {
-            road: road.index(),
-            end,
-        };
+        let here = RoadEnd::of(road, end);
         // If other roads state that they touch this end, the link of the road is missing.
         let is_touched = map.contacts_of(here).next().is_some();
         return (!is_touched).then(|| {

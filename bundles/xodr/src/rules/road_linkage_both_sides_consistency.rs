@@ -24,10 +24,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     for road in map.roads() {
         for end in ContactPoint::BOTH {
             let Some(link) = road.link(end) else { continue };
-            let at = RoadEnd {
-                road: road.index(),
-                end,
-            };
+            let at = RoadEnd::of(road, end);
             let linked = map.linked_end(road, end).map(|contact| contact.to);
             if unlinked.contains(at) || linked.is_some_and(|to| unlinked.contains(to)) {
                 continue;

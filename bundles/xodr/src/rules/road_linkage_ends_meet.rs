@@ -60,10 +60,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let unlinked = UnlinkedArms::of(map);
     for road in map.roads() {
         for end in ContactPoint::BOTH {
-            let at = RoadEnd {
-                road: road.index(),
-                end,
-            };
+            let at = RoadEnd::of(road, end);
             if !unlinked.contains(at) {
                 junction(map, (road, end), &joined, found);
             }
@@ -226,10 +223,7 @@ impl<'m, 'd> Arms<'m, 'd> {
                 };
                 let arms = arms.entry(id).or_default();
                 if arms.len() < MOST_ARMS {
-                    arms.push(RoadEnd {
-                        road: road.index(),
-                        end,
-                    });
+                    arms.push(RoadEnd::of(road, end));
                 }
             }
         }
@@ -258,10 +252,7 @@ fn junction(
         junction.kind(),
         Some(JunctionType::Common | JunctionType::Direct)
     );
-    let at = RoadEnd {
-        road: road.index(),
-        end,
-    };
+    let at = RoadEnd::of(road, end);
     if !cuts || road.junction() == Some(id) || joined.contains(&(junction.index(), at)) {
         return;
     }

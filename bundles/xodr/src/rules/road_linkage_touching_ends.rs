@@ -67,10 +67,7 @@ fn open_ends<'m, 'a>(map: &'m RoadMap<'a>, narrow: f64) -> impl Iterator<Item = 
     let outside = map.roads().iter().filter(|road| road.junction().is_none());
     let ends = outside.flat_map(|road| ContactPoint::BOTH.map(|end| (road, end)));
     ends.filter_map(move |(road, end)| {
-        let own = RoadEnd {
-            road: road.index(),
-            end,
-        };
+        let own = RoadEnd::of(road, end);
         let linked = road.link(end).is_some() || map.contacts_of(own).next().is_some();
         if linked || routes_at(road, end, narrow).next().is_none() {
             return None;

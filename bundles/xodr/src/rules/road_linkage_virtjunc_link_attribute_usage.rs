@@ -112,7 +112,7 @@ fn beyond(map: &RoadMap<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
 /// the junction itself lies there.
 fn at_an_end(map: &RoadMap<'_>, road: &Road<'_>, link: RoadLink<'_>, found: &mut Sink<'_>) {
     let tolerance = found.number(&TOLERANCE);
-    let junction = road.junction().and_then(|id| map.junction(id));
+    let junction = map.junction_of(road);
     let main = link.road_id().and_then(|id| map.road(id));
     if let (Some(junction), Some(main), Some(end)) = (junction, main, link.contact_point()) {
         let touches = |s: Option<f64>| {

@@ -126,7 +126,7 @@ fn friends(map: &RoadMap<'_>) -> HashSet<(usize, usize)> {
         }
     }
     for road in map.roads() {
-        let junction = road.junction().and_then(|id| map.junction(id));
+        let junction = map.junction_of(road);
         let is_virtual = |one: &&Junction<'_>| one.kind() == Some(JunctionType::Virtual);
         if let Some(junction) = junction.filter(is_virtual) {
             add(Some(road.id()), junction.main_road());
