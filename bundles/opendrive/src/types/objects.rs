@@ -1,7 +1,5 @@
 //! Objects, tunnels and bridges (OpenDRIVE 1.9, chapter 13).
 
-use qcbus_document::Node;
-
 use crate::types::crg::Crg;
 use crate::types::outlines::{Outline, Polyline};
 use crate::types::road::Road;
@@ -105,11 +103,6 @@ impl<'a> Object<'a> {
     /// Returns the CRG records of the object's surface (13.13).
     pub fn crgs(&self) -> impl Iterator<Item = Crg<'a>> + use<'a> {
         listed(self.node.child("surface"), "CRG").map(Crg::of)
-    }
-
-    /// Returns the `<parkingSpace>` (13.7).
-    pub fn parking_space(&self) -> Option<Node<'a>> {
-        self.node.child("parkingSpace")
     }
 }
 

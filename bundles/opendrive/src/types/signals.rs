@@ -1,7 +1,5 @@
 //! Signals, boards and controllers (OpenDRIVE 1.9, chapter 14).
 
-use qcbus_document::Node;
-
 use crate::types::objects::Validity;
 use crate::types::road::Road;
 use crate::types::view::{children, listed, view};
@@ -70,18 +68,6 @@ impl<'a> Signal<'a> {
         vms_boards: SignalBoard "vmsBoard",
         /// The boards that combine both (14.7).
         multi_boards: SignalBoard "multiBoard",
-    }
-
-    /// Returns the `<semantics>` (14.8).
-    pub fn semantics(&self) -> Option<Node<'a>> {
-        self.node.child("semantics")
-    }
-
-    /// Returns `<positionRoad>` or `<positionInertial>` (14.9).
-    pub fn position_node(&self) -> Option<Node<'a>> {
-        let is_position =
-            |child: &Node<'a>| child.is("positionRoad") || child.is("positionInertial");
-        self.node.children().find(is_position)
     }
 }
 
