@@ -1,11 +1,12 @@
-//! Tests of checker bundles that go beyond the examples of their pages.
+//! Tests of checker bundles.
 //!
-//! [`mutate`] edits valid files and compares the findings with the expected ones. [`robust`] damages
+//! [`pages`] runs the examples of the rules' pages. [`mutate`] edits valid files and compares the findings with the expected ones. [`robust`] damages
 //! files. [`corpus`] compares findings with those that other tools recorded. These are used only in
 //! tests.
 
 pub mod corpus;
 pub mod mutate;
+pub mod pages;
 pub mod robust;
 
 /// Writes a note about skipped or failed cases to stderr.

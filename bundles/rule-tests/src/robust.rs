@@ -17,8 +17,9 @@ use std::path::{Path, PathBuf};
 
 use qcbus_document::fuzzing::Random;
 
-use qcbus_sdk::pages::evidence;
 use qcbus_sdk::{Bundle, Issue, Listener, Loaded, Outcome, Plan, Status, check};
+
+use crate::pages::evidence;
 
 /// A bundle under test.
 #[derive(Clone, Copy)]

@@ -8,7 +8,7 @@ use qcbus_document::{Document, FileKind};
 use qcbus_formats::xqar::Level;
 use qcbus_messages::{BUILD_DATE, Catalogue, CheckerInfo, ParamInfo};
 
-use crate::pages::{Page, Template};
+use crate::pages::{Head, Template};
 use crate::rule::Facts;
 use crate::{AnyRule, Backport, Version, VersionRange};
 
@@ -174,7 +174,7 @@ fn checkers_of(rule: &'static dyn AnyRule) -> Vec<Checker> {
             .versions
             .parse()
             .map_err(|error: crate::VersionError| error.to_string()),
-        description: Page::head(facts.page).summary,
+        description: Head::of(facts.page).summary,
     };
     if !facts.backport.is_separate() {
         return vec![plain];

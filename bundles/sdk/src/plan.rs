@@ -128,6 +128,23 @@ impl Plan {
         &self.checkers
     }
 
+    /// Returns the indices of all checkers in the order of checking.
+    pub fn order(&self) -> impl Iterator<Item = usize> {
+        self.groups.iter().flatten().copied()
+    }
+
+    /// Returns the indices of the preconditions of a checker.
+    ///
+    /// # Errors
+    /// A text that names a precondition that does not exist.
+    pub fn preconditions(&self, index: usize) -> Result<&[usize], &str> {
+        match self.entries.get(index).map(|entry| &entry.after) {
+            Some(Err(error)) => Err(error),
+            Some(Ok(after)) => Ok(after),
+            None => Ok(&[]),
+        }
+    }
+
     /// Checks whether a file that a parameter names has changed since it was read.
     pub(crate) fn is_outdated(&self) -> bool {
         self.seen.iter().any(Seen::is_outdated)

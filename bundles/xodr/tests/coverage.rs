@@ -9,7 +9,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use qcbus_rule_tests::corpus::agrees_or_says;
-use qcbus_sdk::pages::evidence;
+use qcbus_rule_tests::pages::evidence;
 use qcbus_xodr::BUNDLE;
 
 const ANNEX: &str = include_str!("../annex_f.tsv");

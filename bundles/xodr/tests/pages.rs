@@ -2,7 +2,7 @@
 
 #[test]
 fn pages_keep_their_word() {
-    qcbus_sdk::pages::assert_pages(
+    qcbus_rule_tests::pages::assert_pages(
         &qcbus_xodr::BUNDLE,
         concat!(env!("CARGO_MANIFEST_DIR"), "/src/rules"),
     );

@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
+use qcbus_rule_tests::pages::evidence;
 use qcbus_rule_tests::robust::{NUMBERS, Robust};
 use qcbus_sdk::Plan;
-use qcbus_sdk::pages::evidence;
 use qcbus_xodr::BUNDLE;
 
 const ROBUST: Robust = Robust {

@@ -8,7 +8,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use qcbus_rule_tests::corpus::agrees_or_says;
-use qcbus_sdk::pages::evidence;
+use qcbus_rule_tests::pages::evidence;
 use qcbus_xosc::BUNDLE;
 
 const RULES: &str = include_str!("../rules.tsv");

@@ -16,7 +16,6 @@ use qcbus_messages::shown;
 
 use super::{Exit, Timings};
 use crate::Permits;
-use crate::pages::level_name;
 use crate::{BUILD_DATE, Bundle, Listener, Loaded, Outcome, Plan, UserFiles, check_with};
 
 /// Output format of findings.
@@ -231,7 +230,7 @@ fn as_text(path: &Path, pooled: &Pooled) -> String {
             .filter(|place| place.elsewhere.is_some())
             .map(|place| format!(" ({})", place.written()))
             .unwrap_or_default();
-        let level = level_name(issue.level);
+        let level = issue.level.as_str();
         let text = format!(
             "{}:{row}:{column}: {level}: {}{place} [{}]",
             to_text(path),

@@ -71,7 +71,7 @@ fn bus_arguments(args: Args) -> Vec<OsString> {
 mod tests {
     #[test]
     fn rule_pages_are_consistent() {
-        qcbus_sdk::pages::assert_pages(
+        qcbus_rule_tests::pages::assert_pages(
             &super::BUNDLE,
             concat!(env!("CARGO_MANIFEST_DIR"), "/src/polite"),
         );

@@ -2,13 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use qcbus_formats::xqar::Issue;
+use qcbus_sdk::{Bundle, Issue, Listener, Outcome, Plan, check};
 
 use super::example::{Staged, version_of};
 use super::{Example, Page, Verdict};
-use crate::Bundle;
-use crate::check::{Listener, Outcome, check};
-use crate::plan::Plan;
 
 /// A complete document of a page.
 #[derive(Debug, Clone)]

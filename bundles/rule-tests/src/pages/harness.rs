@@ -3,22 +3,19 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use qcbus_formats::xqar::{Issue, Status};
+use qcbus_sdk::{AnyRule, Bundle, Checker, Issue, Listener, Outcome, Plan, Status, Version, check};
 
 use super::bless::blessed;
 use super::example::{Staged, Verdict, version_of};
 use super::render::render;
 use super::{Example, Page};
-use crate::check::{Listener, Outcome, check};
-use crate::plan::Plan;
-use crate::{AnyRule, Bundle, Checker, Version};
 
 /// Fails the running test if [`check_pages`] returns complaints.
 ///
 /// ```text
 /// #[test]
 /// fn pages_keep_their_word() {
-///     qcbus_sdk::pages::assert_pages(&BUNDLE, concat!(env!("CARGO_MANIFEST_DIR"), "/src/rules"));
+///     qcbus_rule_tests::pages::assert_pages(&BUNDLE, concat!(env!("CARGO_MANIFEST_DIR"), "/src/rules"));
 /// }
 /// ```
 ///
@@ -69,10 +66,9 @@ pub fn check_pages(bundle: &'static Bundle, rules_dir: &Path) -> Vec<String> {
 fn of_the_list(bundle: &'static Bundle) -> Vec<String> {
     let mut complaints = Vec::new();
     let plan = Plan::by_default(bundle);
-    let order: Vec<usize> = plan.groups.iter().flatten().copied().collect();
-    let rank = |index: usize| order.iter().position(|&other| other == index);
+    let rank = |index: usize| plan.order().position(|other| other == index);
     let mut seen = BTreeSet::new();
-    for (index, checker) in plan.checkers.iter().enumerate() {
+    for (index, checker) in plan.checkers().iter().enumerate() {
         let id = &checker.id;
         if !seen.insert(id.as_str()) || id.is_empty() {
             complaints.push(format!("`{id}`: the id is empty or already used"));
@@ -89,7 +85,7 @@ fn of_the_list(bundle: &'static Bundle) -> Vec<String> {
                 .err()
                 .map(|error| format!("`{id}`: {error}")),
         );
-        match &plan.entries[index].after {
+        match plan.preconditions(index) {
             Err(error) => complaints.push(format!("`{id}`: {error}")),
             // This check of the order also excludes cycles.
             Ok(after) => complaints.extend(
@@ -99,7 +95,7 @@ fn of_the_list(bundle: &'static Bundle) -> Vec<String> {
                     .map(|&other| {
                         format!(
                             "`{id}`: its precondition `{}` does not run before it",
-                            plan.checkers[other].id
+                            plan.checkers()[other].id
                         )
                     }),
             ),

@@ -4,10 +4,9 @@ use std::path::Path;
 use std::str::FromStr;
 
 use qcbus_messages::path_text::split_archive;
+use qcbus_sdk::{AnyRule, Bundle, LoadError, Loaded, Version, VersionRange};
 
 use super::{Example, ExampleFile};
-use crate::load::{LoadError, Loaded};
-use crate::{AnyRule, Bundle, Version, VersionRange};
 
 /// Expected result of a rule for an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,18 +32,6 @@ impl FromStr for Verdict {
             )),
         }
     }
-}
-
-/// A minimal document with a placeholder, so that an example shows only its subject.
-///
-/// `{major}` and `{minor}` stand for the version. `{example}`, alone on its line, stands for the
-/// example.
-#[derive(Debug, Clone, Copy)]
-pub struct Template {
-    /// Name for `in=NAME`. An example without a name uses the bundle's first template.
-    pub name: &'static str,
-    /// The document.
-    pub text: &'static str,
 }
 
 /// An example as a set of files.

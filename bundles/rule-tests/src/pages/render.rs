@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use qcbus_formats::location::OtherPlace;
-use qcbus_formats::xqar::{Issue, Level, Location, Locations};
+use qcbus_formats::xqar::{Issue, Location, Locations};
 
 use super::example::Staged;
 
@@ -22,7 +22,7 @@ pub(super) fn render(issues: &[Issue], uid: &str, staged: &Staged) -> String {
         } else {
             format!(" [{}]", issue.rule_uid)
         };
-        let level = level_name(issue.level);
+        let level = issue.level.as_str();
         let _ = writeln!(text, "{level} {}:{rule} {}", first.0, issue.description);
         for extra in first.1 {
             let _ = writeln!(text, "  {extra}");
@@ -48,15 +48,6 @@ pub(super) fn render(issues: &[Issue], uid: &str, staged: &Staged) -> String {
         }
     }
     staged.without_folder(&text)
-}
-
-/// Returns the word for a level in all text output.
-pub(crate) fn level_name(level: Level) -> &'static str {
-    match level {
-        Level::Error => "error",
-        Level::Warning => "warning",
-        Level::Information => "information",
-    }
 }
 
 /// Returns row, column and XPath, then all other information about the place.

@@ -1,14 +1,12 @@
 //! Parser of a page.
 
+use qcbus_sdk::pages::Head;
+
 use super::example::Verdict;
 
 /// A parsed page.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Page {
-    /// The first heading.
-    pub title: String,
-    /// The first paragraph, on one line.
-    pub summary: String,
     /// The examples in order of appearance.
     pub examples: Vec<Example>,
 }
@@ -62,7 +60,7 @@ impl Page {
     /// [`PageError`] if the title or the summary is missing, a block is not closed, or the words
     /// after the fence of an example are unknown.
     pub fn parse(text: &str) -> Result<Page, PageError> {
-        let mut page = Page::head(text);
+        let mut page = Page::default();
         let lines: Vec<&str> = text.lines().collect();
         let mut at = 0;
         while let Some(line) = lines.get(at) {
@@ -81,32 +79,12 @@ impl Page {
                 what: what.to_owned(),
             })
         };
-        match (page.title.is_empty(), page.summary.is_empty()) {
+        let head = Head::of(text);
+        match (head.title.is_empty(), head.summary.is_empty()) {
             (true, _) => missing("a page must begin with a title, `# …`"),
             (_, true) => missing("a sentence under the title must say what the rule requires"),
             _ => Ok(page),
         }
-    }
-
-    /// Returns title and summary only, empty if they are missing. Every start of a bundle needs
-    /// those of all its rules.
-    pub fn head(text: &str) -> Page {
-        let mut page = Page::default();
-        for line in text.lines().map(str::trim) {
-            let is_over = line.is_empty() || line.starts_with('#');
-            if line.starts_with("```") || (is_over && !page.summary.is_empty()) {
-                break;
-            }
-            match line.strip_prefix("# ") {
-                Some(title) if page.title.is_empty() => title.trim().clone_into(&mut page.title),
-                _ if is_over || page.title.is_empty() => {}
-                _ => {
-                    let gap = if page.summary.is_empty() { "" } else { " " };
-                    page.summary.extend([gap, line]);
-                }
-            }
-        }
-        page
     }
 
     fn block(
@@ -238,12 +216,8 @@ mod tests {
         ```xml also file=c.xodr\n<c/>\n```\n\n```issues\nerror 1:1 /b: no\n```\n";
 
     #[test]
-    fn page_is_parsed_into_title_and_examples() {
+    fn page_is_parsed_into_examples() {
         let page = Page::parse(PAGE).unwrap();
-        assert_eq!(
-            (page.title.as_str(), page.summary.as_str()),
-            ("Title", "One sentence on two lines.")
-        );
         let [good, bad] = page.examples.as_slice() else {
             panic!("{page:?}")
         };
@@ -254,19 +228,6 @@ mod tests {
         assert_eq!(bad.files[1].name.as_deref(), Some("c.xodr"));
         assert_eq!(bad.expected.as_deref(), Some("error 1:1 /b: no\n"));
         assert_eq!(bad.expected_lines, 21..24);
-    }
-
-    #[test]
-    fn summary_ends_with_its_paragraph() {
-        let of = |text: &str| Page::head(text).summary;
-        assert_eq!(of(PAGE), "One sentence on two lines.");
-        assert_eq!(
-            of("\n\n  # T  \n\n\n  One  \n two\n\ntwo\nthree\n"),
-            "One two"
-        );
-        assert_eq!(of("# T\n\nS\n```xml good\n<a/>\n```\nS\nafter it\n"), "S");
-        assert_eq!(of("# T\nS\n## Next\nnot S\n"), "S");
-        assert_eq!(of("no title"), "");
     }
 
     #[test]

@@ -11,7 +11,6 @@ mod harness;
 mod parse;
 mod render;
 
-pub use example::{Template, Verdict};
+pub use example::Verdict;
 pub use harness::{assert_pages, check_pages};
 pub use parse::{Example, ExampleFile, Page, PageError};
-pub(crate) use render::level_name;
