@@ -288,19 +288,11 @@ pub(crate) fn level_of(name: &str) -> PyResult<Level> {
     }
 }
 
-fn level_name(level: Level) -> &'static str {
-    match level {
-        Level::Error => "error",
-        Level::Warning => "warning",
-        Level::Information => "information",
-    }
-}
-
 fn describe<'py>(py: Python<'py>, checker: &str, issue: &Issue) -> PyResult<Bound<'py, PyDict>> {
     let said = PyDict::new(py);
     said.set_item("checker", checker)?;
     said.set_item("text", &issue.description)?;
-    said.set_item("level", level_name(issue.level))?;
+    said.set_item("level", issue.level.as_str())?;
     said.set_item("uid", &issue.rule_uid)?;
     let places = issue
         .locations
