@@ -35,14 +35,10 @@ impl Offered {
         };
         let (offers, why_not) = match ask_broker(instance.dir(), &request) {
             Ok(Response::Offers { offers }) => (offers, None),
-            _ => {
-                let name = instance.name();
-                let why = format!(
-                    "no broker runs as instance `{name}`, so only rules that come with qcbus are known"
-                );
-                (Vec::new(), Some(why))
-            }
+            Ok(other) => (Vec::new(), Some(format!("unexpected answer: {other:?}"))),
+            Err(error) => (Vec::new(), Some(error.to_string())),
         };
+        let why_not = why_not.map(|it| format!("only rules that come with qcbus are known: {it}"));
         Ok(Offered { offers, why_not })
     }
 
@@ -79,7 +75,7 @@ pub fn line((offer, rule): OfferedRule<'_>) -> String {
 pub fn page((offer, rule): OfferedRule<'_>) -> String {
     let mut lines = vec![rule.id.to_string()];
     lines.extend(rule.rule_uids.iter().map(|uid| format!("  {uid}")));
-    let level = format!("{:?}", rule.level).to_lowercase();
+    let level = rule.level.as_str();
     let kinds: Vec<&str> = rule.kinds.iter().map(|it| it.as_str()).collect();
     let asked = if rule.default_on {
         ""
@@ -118,7 +114,7 @@ pub fn describe((offer, rule): OfferedRule<'_>) -> serde_json::Value {
         "id": &*rule.id,
         "bundle": offer.name,
         "uids": uids,
-        "level": format!("{:?}", rule.level).to_lowercase(),
+        "level": rule.level.as_str(),
         "kinds": kinds,
         "default": rule.default_on,
         "description": &*rule.description,

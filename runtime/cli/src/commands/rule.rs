@@ -138,7 +138,7 @@ fn unknown(id: &str, offered: &Offered) -> Exit {
     }
     let hint = standard::hint(id);
     let why = offered.why_not.as_deref();
-    let why = why.map(|it| format!(" ({it})")).unwrap_or_default();
+    let why = why.map(|it| format!("; {it}")).unwrap_or_default();
     talk::fail(&format!("rule `{id}` not found; {hint}{why}"));
     Exit::Usage
 }
@@ -150,7 +150,7 @@ fn page(checker: &Checker) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(head, "  {uid}");
     }
-    let level = format!("{:?}", facts.level).to_lowercase();
+    let level = facts.level.as_str();
     let versions = match &checker.range {
         Ok(range) if range.is_everything() => "every version".to_owned(),
         Ok(range) => format!("versions {range}"),
@@ -175,7 +175,7 @@ fn describe(bundle: &str, checker: &Checker) -> serde_json::Value {
         "id": checker.id,
         "bundle": bundle,
         "uids": facts.uids,
-        "level": format!("{:?}", checker.level()).to_lowercase(),
+        "level": checker.level().as_str(),
         "versions": facts.versions,
         "default": facts.default_on,
         "after": facts.after,
