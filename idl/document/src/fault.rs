@@ -161,6 +161,8 @@ fault_codes! {
     ArchiveLimit = 102, "archive-limit", Archive, true;
     /// Two members with the same name.
     ArchiveDuplicate = 103, "archive-duplicate", Archive, true;
+    /// A member whose name would be a plain relative path with `/` instead of its backslashes.
+    ArchiveBackslash = 104, "archive-backslash", Archive, true;
 }
 
 impl FaultCode {

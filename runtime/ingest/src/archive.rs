@@ -171,38 +171,42 @@ fn check_directory(
         );
         faults.push(TextFault::new(Code::ArchiveDuplicate, 0, text));
     }
-    let escaping: Vec<String> = (0..archive.len())
+    let escaping: Vec<(Code, String)> = (0..archive.len())
         .filter_map(|index| {
             let entry = archive.by_index_raw(index).ok()?;
             let name = entry.name().ok()?.into_owned();
             match entry.is_symlink() {
-                true => Some(format!(
-                    "the member `{}` is a symbolic link",
-                    shown::line(&name)
+                true => Some((
+                    Code::ArchiveEscapes,
+                    format!("the member `{}` is a symbolic link", shown::line(&name)),
                 )),
                 false => (!stays_inside(&name)).then(|| refused(&name)),
             }
         })
         .take(MOST_NAMED)
         .collect();
-    for what in escaping {
+    for (code, what) in escaping {
         let text = format!("{what}; it is not read");
-        faults.push(TextFault::new(Code::ArchiveEscapes, 0, text));
+        faults.push(TextFault::new(code, 0, text));
     }
     Ok(())
 }
 
 /// Describes the fault in the name of a member.
-fn refused(name: &str) -> String {
+fn refused(name: &str) -> (Code, String) {
     let name_shown = shown::line(name);
     match has_only_backslashes(name) {
-        true => {
+        true => (
+            Code::ArchiveBackslash,
             format!(
                 "the member `{name_shown}` has a backslash in its name, but names in archives use `/` as \
                  separator"
-            )
-        }
-        false => format!("the member `{name_shown}` points outside the archive"),
+            ),
+        ),
+        false => (
+            Code::ArchiveEscapes,
+            format!("the member `{name_shown}` points outside the archive"),
+        ),
     }
 }
 

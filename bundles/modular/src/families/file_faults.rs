@@ -21,7 +21,11 @@ pub const LIMITS: &[FaultCode] = &[
 ];
 
 /// Faults about the names of members.
-pub const NAMES: &[FaultCode] = &[FaultCode::ArchiveEscapes, FaultCode::ArchiveDuplicate];
+pub const NAMES: &[FaultCode] = &[
+    FaultCode::ArchiveEscapes,
+    FaultCode::ArchiveBackslash,
+    FaultCode::ArchiveDuplicate,
+];
 
 /// Faults about document type declarations.
 pub const DOCTYPES: &[FaultCode] = &[FaultCode::Doctype];

@@ -20,7 +20,7 @@ fn run(assembly: &Assembly<'_>, found: &mut Sink<'_>) {
             FaultCode::ArchiveDuplicate => {
                 "other tools may read another one; keep only one of them"
             }
-            _ if fault.text.contains("has a backslash") => {
+            FaultCode::ArchiveBackslash => {
                 "some tools treat it as a path separator, others as part of the name; pack the archive with `/`"
             }
             _ => {

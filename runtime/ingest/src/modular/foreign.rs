@@ -23,7 +23,7 @@ const KNOWN: [(&str, &[&str], &[&str]); 2] = [
 /// Reports the parts of a reference that are never read. The intent of an unknown element is
 /// unknown, so it prevents the expansion. In this case `true` is returned.
 pub(super) fn say<'d>(reference: Node<'d>, problems: &mut Problems<'d>) -> bool {
-    let before = problems.0.len();
+    let before = problems.list.len();
     for element in std::iter::once(reference).chain(reference.descendants()) {
         let known = KNOWN.iter().find(|(name, ..)| element.is(name));
         let Some((_, attributes, children)) = known else {
@@ -58,7 +58,7 @@ pub(super) fn say<'d>(reference: Node<'d>, problems: &mut Problems<'d>) -> bool 
             push(What::ForeignAttribute, Spot::Node(element), text, problems);
         }
     }
-    let said = problems.0.get(before..).unwrap_or(&[]);
+    let said = problems.list.get(before..).unwrap_or(&[]);
     said.iter().any(|it| it.what == What::ForeignElement)
 }
 

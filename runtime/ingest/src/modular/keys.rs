@@ -169,7 +169,9 @@ fn overlap<'d>(
     attribute: Attribute<'d>,
     problems: &mut Problems<'d>,
 ) {
-    if best.value.value() == other.value.value() {
+    // An overlap of two keys is reported once, however many attributes they share.
+    if best.value.value() == other.value.value() || !problems.is_new_overlap(best.node, other.node)
+    {
         return;
     }
     let of_the_tool = match other.key.contains('.') {
@@ -186,22 +188,12 @@ fn overlap<'d>(
         best.value.value(),
         other.value.value()
     );
-    // An overlap of two keys is reported once, however many attributes they share.
-    let is_said = |problem: &Problem<'d>| {
-        problem.what == What::KeyOverlap
-            && problem.at.node() == other.node
-            && problem
-                .text
-                .starts_with(&format!("the keys `{}`", best.key))
-    };
-    if !problems.lately(is_said) {
-        problems.push(Problem {
-            what: What::KeyOverlap,
-            at: Spot::of(other.node, "key"),
-            target: Some(Spot::Attribute(attribute)),
-            text,
-        });
-    }
+    problems.push(Problem {
+        what: What::KeyOverlap,
+        at: Spot::of(other.node, "key"),
+        target: Some(Spot::Attribute(attribute)),
+        text,
+    });
 }
 
 fn tie<'d>(one: &Key<'d>, other: &Key<'d>, attribute: Attribute<'d>, problems: &mut Problems<'d>) {

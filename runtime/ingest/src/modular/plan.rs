@@ -107,7 +107,7 @@ pub fn expand(pieces: Vec<Piece<'_>>, max_text: u64) -> Expansion<'_> {
         },
     };
     expander.root();
-    expander.out.problems = expander.problems.0;
+    expander.out.problems = expander.problems.list;
     expander.out
 }
 
@@ -482,7 +482,7 @@ impl<'d> Expander<'d> {
                 "the expanded scenario becomes too large: more than {MOST_COPIES} groups, or more bytes than the \
                  limit max_archive allows"
             );
-            if !self.problems.0.iter().any(|it| it.what == What::Size) {
+            if !self.problems.list.iter().any(|it| it.what == What::Size) {
                 self.say(What::Size, referring.group.into(), None, text);
             }
             return None;

@@ -20,21 +20,38 @@ const MOST: usize = 1000;
 
 /// The problems of an expansion, up to a maximum number.
 #[derive(Debug, Default)]
-pub(super) struct Problems<'d>(pub Vec<Problem<'d>>);
+pub(super) struct Problems<'d> {
+    pub list: Vec<Problem<'d>>,
+    /// Pairs of keys whose overlap was reported.
+    overlaps: Vec<[Node<'d>; 2]>,
+}
+
+/// Number of the last problems that are compared with a new one.
+const LAST: usize = 64;
 
 impl<'d> Problems<'d> {
     /// Adds a problem. The first problem of each kind that stops the expansion is always added,
     /// even above the maximum.
     pub fn push(&mut self, problem: Problem<'d>) {
-        let is_first = |what| !self.0.iter().any(|other| other.what == what);
-        if self.0.len() < MOST || (problem.what.stops() && is_first(problem.what)) {
-            self.0.push(problem);
+        let is_first = |what| !self.list.iter().any(|other| other.what == what);
+        if self.list.len() < MOST || (problem.what.stops() && is_first(problem.what)) {
+            self.list.push(problem);
         }
     }
 
-    /// Checks whether one of the last 64 problems matches.
+    /// Checks whether one of the last problems matches.
     pub fn lately(&self, is_it: impl Fn(&Problem<'d>) -> bool) -> bool {
-        self.0.iter().rev().take(64).any(is_it)
+        self.list.iter().rev().take(LAST).any(is_it)
+    }
+
+    /// Notes that two keys overlap. Returns `false` if this was noted lately.
+    pub fn is_new_overlap(&mut self, best: Node<'d>, other: Node<'d>) -> bool {
+        let pair = [best, other];
+        let is_new = !self.overlaps.iter().rev().take(LAST).any(|it| *it == pair);
+        if is_new {
+            self.overlaps.push(pair);
+        }
+        is_new
     }
 }
 

@@ -70,7 +70,9 @@ pub(super) fn trouble(document: Document<'_>) -> Option<String> {
         !code.makes_partial()
             || matches!(
                 code,
-                FaultCode::ArchiveEscapes | FaultCode::ArchiveDuplicate
+                FaultCode::ArchiveEscapes
+                    | FaultCode::ArchiveBackslash
+                    | FaultCode::ArchiveDuplicate
             )
     };
     if let Some(fault) = document.faults().find(|fault| !whole(fault.code)) {

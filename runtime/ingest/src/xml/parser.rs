@@ -424,7 +424,7 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         self.bad.clear();
         attribute_value(raw, &mut self.scratch, &mut self.bad);
         for bad in std::mem::take(&mut self.bad) {
-            self.bad_reference(file, at + bad.offset, &bad.text)?;
+            self.bad_reference(file, at + bad.offset, &bad.why)?;
         }
         match raw.find('<') {
             Some(less) => {

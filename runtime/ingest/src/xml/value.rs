@@ -6,12 +6,25 @@ use super::chars::is_char;
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct BadReference {
     pub offset: usize,
-    pub text: String,
+    pub why: Unresolved,
+}
+
+/// Reason why a reference has no character, with the beginning of its name.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum Unresolved {
+    #[error("& must be written &amp;")]
+    NoName,
+    #[error("the entity &{0}; is not defined (XML has lt, gt, amp, quot and apos)")]
+    Undefined(String),
+    #[error("&{0}; is not a character that XML allows")]
+    Forbidden(String),
+    #[error("&{0}; is not a valid character reference")]
+    Malformed(String),
 }
 
 /// Returns the character for `&name;`. Only the five entities of XML and character references are
 /// known. A document cannot define others, because a DOCTYPE is refused.
-pub(crate) fn resolve_reference(name: &str) -> Result<char, String> {
+pub(crate) fn resolve_reference(name: &str) -> Result<char, Unresolved> {
     match name {
         "lt" => return Ok('<'),
         "gt" => return Ok('>'),
@@ -22,9 +35,7 @@ pub(crate) fn resolve_reference(name: &str) -> Result<char, String> {
     }
     let shown: String = name.chars().take(40).collect();
     let Some(number) = name.strip_prefix('#') else {
-        return Err(format!(
-            "the entity &{shown}; is not defined (XML has lt, gt, amp, quot and apos)"
-        ));
+        return Err(Unresolved::Undefined(shown));
     };
     let (digits, radix) = number
         .strip_prefix('x')
@@ -33,8 +44,8 @@ pub(crate) fn resolve_reference(name: &str) -> Result<char, String> {
     let code = all_digits.then(|| u32::from_str_radix(digits, radix).unwrap_or(u32::MAX));
     match code.map(char::from_u32) {
         Some(Some(c)) if is_char(c) => Ok(c),
-        Some(_) => Err(format!("&{shown}; is not a character that XML allows")),
-        None => Err(format!("&{shown}; is not a valid character reference")),
+        Some(_) => Err(Unresolved::Forbidden(shown)),
+        None => Err(Unresolved::Malformed(shown)),
     }
 }
 
@@ -84,15 +95,15 @@ fn reference(rest: &str, offset: usize, out: &mut String, bad: &mut Vec<BadRefer
         Some(len) if body.as_bytes()[len] == b';' => {
             resolve_reference(&body[..len]).map(|c| (c, len + 2))
         }
-        _ => Err("& must be written &amp;".to_string()),
+        _ => Err(Unresolved::NoName),
     };
     match outcome {
         Ok((c, used)) => {
             out.push(c);
             used
         }
-        Err(text) => {
-            bad.push(BadReference { offset, text });
+        Err(why) => {
+            bad.push(BadReference { offset, why });
             out.push('&');
             1
         }
@@ -133,7 +144,7 @@ mod tests {
             assert_eq!(out, raw);
             assert_eq!(bad.len(), 1, "{raw}");
             assert_eq!(bad[0].offset, offset, "{raw}");
-            assert!(bad[0].text.contains(part), "{}", bad[0].text);
+            assert!(bad[0].why.to_string().contains(part), "{}", bad[0].why);
         }
     }
 

@@ -4,7 +4,7 @@ use qcbus_document::FaultCode;
 
 use super::{File, Parser, Stop, narrow, shown};
 use crate::xml::sink::Sink;
-use crate::xml::value::{line_ends, resolve_reference};
+use crate::xml::value::{Unresolved, line_ends, resolve_reference};
 
 impl<'t, S: Sink> Parser<'_, 't, S> {
     pub(super) fn text(
@@ -34,7 +34,7 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
             self.fault(file, FaultCode::BadText, from + at, text)?;
         }
         if text.starts_with('&') {
-            self.bad_reference(file, from, "& must be written &amp;")?;
+            self.bad_reference(file, from, &Unresolved::NoName)?;
         }
         self.append(file, from, to, text, false);
         Ok(())
@@ -83,8 +83,8 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
                 self.append(file, from, to, c.encode_utf8(&mut [0; 4]), true);
                 Ok(())
             }
-            Err(text) => {
-                self.bad_reference(file, from, &text)?;
+            Err(why) => {
+                self.bad_reference(file, from, &why)?;
                 self.append(file, from, to, &file.text[from..to], true);
                 Ok(())
             }
@@ -95,13 +95,13 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
         &mut self,
         file: File<'t>,
         at: usize,
-        text: &str,
+        why: &Unresolved,
     ) -> Result<(), Stop> {
         // The refused DOCTYPE may have defined the entity, and one fault is enough.
-        if self.refused_doctype && text.contains("not defined") {
+        if self.refused_doctype && matches!(why, Unresolved::Undefined(_)) {
             return Ok(());
         }
-        self.fault(file, FaultCode::BadReference, at, text)
+        self.fault(file, FaultCode::BadReference, at, &why.to_string())
     }
 
     pub(super) fn cdata(
