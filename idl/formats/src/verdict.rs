@@ -11,12 +11,12 @@ use crate::xqar::{Checker, CheckerBundle, Level, Results, Status};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// Every requested checker ran or did not apply, and at least one ran. No issue kept is an
+    /// Every demanded checker ran or did not apply, and at least one ran. No issue kept is an
     /// error.
     Accepted,
     /// At least one of the issues kept is an error.
     Rejected,
-    /// No error was found, but a requested checker crashed, hung, was missing or was blocked, or
+    /// No error was found, but a demanded checker crashed, hung, was missing or was blocked, or
     /// none of them applied.
     Undetermined,
 }

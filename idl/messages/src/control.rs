@@ -348,7 +348,7 @@ pub struct Status {
     pub queue: QueueStatus,
     /// Bundles and reporters.
     pub peers: Vec<PeerStatus>,
-    /// Counter of changes of the required bundles and of the checkers requested from them.
+    /// Counter of changes of the required bundles and of the demanded checkers.
     pub epoch: u64,
     /// Paths in the watched directories that cannot be accessed now; the first hundred.
     #[serde(default)]

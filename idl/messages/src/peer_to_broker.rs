@@ -46,7 +46,7 @@ pub enum FromPeer {
         /// The checkers.
         ended: Vec<CheckerEnd>,
     },
-    /// All requested checkers of the bundle have ended.
+    /// All demanded checkers of the bundle have ended.
     JobDone {
         /// The job.
         job: JobId,

@@ -132,7 +132,7 @@ pub(crate) struct ArtifactProperties {
     pub path: String,
     /// Number of findings. It is larger than the number of results if some were left out.
     pub found: Found,
-    /// Whether every required checker gave an answer.
+    /// Whether every demanded checker gave an answer.
     pub answered: bool,
 }
 

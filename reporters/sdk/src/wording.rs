@@ -29,9 +29,9 @@ pub fn rounded(number: f64) -> String {
 /// Returns a short explanation of a verdict for new users.
 pub fn meaning(verdict: Verdict) -> &'static str {
     match verdict {
-        Verdict::Accepted => "all requested checkers have run and found no error",
+        Verdict::Accepted => "all demanded checkers have run and found no error",
         Verdict::Rejected => "at least one error was found",
-        Verdict::Undetermined => "a requested checker could not run; the file is not accepted",
+        Verdict::Undetermined => "a demanded checker could not run; the file is not accepted",
     }
 }
 

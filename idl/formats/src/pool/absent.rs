@@ -32,7 +32,7 @@ pub(super) fn bundle(config: &BundleConfig, why: Option<String>) -> BundleOutcom
 }
 
 /// Returns the outcome of a missing bundle that is required but not configured.
-pub(super) fn demanded(why: String) -> BundleOutcome {
+pub(super) fn required(why: String) -> BundleOutcome {
     BundleOutcome {
         description: String::from("Required, but not available."),
         checkers: vec![whole(why)],

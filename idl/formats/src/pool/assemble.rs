@@ -142,7 +142,7 @@ impl<'a> Pool<'a, '_> {
         let outcome = match (outcome.absent.clone(), entry) {
             (None, _) => outcome,
             (why, Some(bundle)) => absent::bundle(bundle, why),
-            (Some(why), None) => absent::demanded(why),
+            (Some(why), None) => absent::required(why),
         };
         let BundleOutcome {
             version,

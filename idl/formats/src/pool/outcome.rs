@@ -85,21 +85,21 @@ pub struct BundleOutcome {
     pub description: String,
     /// Parameters of the bundle beyond the configured ones.
     pub params: Vec<Param>,
-    /// Its checkers in the order of its catalogue: the requested checkers, and those that blocked
+    /// Its checkers in the order of its catalogue: the demanded checkers, and those that blocked
     /// one of them.
     pub checkers: Vec<CheckerOutcome>,
     /// The reason why a required bundle is missing. It never joined, so its checkers are unknown.
     pub absent: Option<String>,
-    /// Numbers of requested and available checkers; `None` when they were not counted.
+    /// Numbers of demanded and available checkers; `None` when they were not counted.
     pub asked: Option<Asked>,
 }
 
-/// Numbers of requested and available checkers of a bundle.
+/// Numbers of demanded and available checkers of a bundle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Asked {
-    /// Number of requested checkers.
+    /// Number of demanded checkers.
     pub asked: usize,
-    /// Number of checkers in the catalogue, except unrequested ones that are off by default.
+    /// Number of checkers in the catalogue, except undemanded ones that are off by default.
     pub offered: usize,
 }
 
@@ -142,8 +142,8 @@ impl CheckerOutcome {
     }
 }
 
-/// Checks for each outcome whether it is part of the answer. It is if it is requested, or if it
-/// blocks a requested checker directly or through others.
+/// Checks for each outcome whether it is part of the answer. It is if it is demanded, or if it
+/// blocks a demanded checker directly or through others.
 pub fn in_the_answer(checkers: &[CheckerOutcome], demanded: impl Fn(&str) -> bool) -> Vec<bool> {
     let mut kept: Vec<bool> = checkers.iter().map(|it| demanded(&it.id)).collect();
     loop {

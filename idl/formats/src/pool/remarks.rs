@@ -99,22 +99,22 @@ pub(super) fn level_order(config: &Config) -> Option<Remark> {
     })
 }
 
-/// Returns the remark that none of the requested checkers examined the file.
+/// Returns the remark that none of the demanded checkers examined the file.
 pub(super) fn nobody_looked(pooled: &Pooled) -> Remark {
     let open = match pooled.unfinished.as_slice() {
-        [] => String::from("no checker is required for this file"),
+        [] => String::from("no checker is demanded for this file"),
         [only] => format!(
-            "the only required checker, `{}`, does not apply to this file",
+            "the only demanded checker, `{}`, does not apply to this file",
             only.checker
         ),
         all => format!(
-            "none of the {} required checkers applies to this file",
+            "none of the {} demanded checkers applies to this file",
             all.len()
         ),
     };
     Remark {
         checker: String::from("qcbus_checkers"),
-        description: String::from("At least one required checker checks the file."),
+        description: String::from("At least one demanded checker checks the file."),
         issue: None,
         open: Some(open),
     }
