@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use qcbus_ingest::{Limits, Prepared, prepare_bytes};
+use qcbus_messages::path_text::to_text;
 use qcbus_messages::{Catalogue, Digest};
 
 use crate::{Bundle, Param};
@@ -139,7 +140,7 @@ impl Resource {
         if found.is_empty() {
             let endings: Vec<String> = self.endings.iter().map(|end| format!(".{end}")).collect();
             return Err(ResourceError::Nothing {
-                path: path.display().to_string(),
+                path: to_text(path),
                 endings: endings.join(" or "),
             });
         }
@@ -199,7 +200,7 @@ impl UserFiles {
 
     /// Returns the directory as text for results and plans.
     pub(crate) fn directory(&self) -> String {
-        self.directory.display().to_string()
+        to_text(&self.directory)
     }
 
     /// Writes the directory and the digest of its files into the catalogue as new defaults. A
@@ -241,7 +242,7 @@ impl ListingError {
         match self {
             ListingError::Io(path, error) => unreadable(&path, &error),
             ListingError::TooMuch => ResourceError::TooMuch {
-                path: directory.display().to_string(),
+                path: to_text(directory),
                 most: MOST,
                 deepest: DEEPEST,
             },
@@ -299,7 +300,7 @@ fn fingerprint(files: &[ResourceFile]) -> String {
 
 fn unreadable(path: &Path, error: &std::io::Error) -> ResourceError {
     ResourceError::Unreadable {
-        path: path.display().to_string(),
+        path: to_text(path),
         why: error.to_string(),
     }
 }

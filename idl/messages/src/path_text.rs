@@ -63,6 +63,15 @@ pub fn to_text(path: &Path) -> String {
     text
 }
 
+/// Returns the path relative to the current directory if it lies below it, for people.
+pub fn relative(path: &Path) -> &Path {
+    let here = std::env::current_dir().ok();
+    let below = here.and_then(|here| path.strip_prefix(here).ok());
+    below
+        .filter(|it| !it.as_os_str().is_empty())
+        .unwrap_or(path)
+}
+
 fn escape(bytes: &[u8], text: &mut String) {
     for byte in bytes {
         text.push_str(&format!("%{byte:02X}"));

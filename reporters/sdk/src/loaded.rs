@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use qcbus_formats::xqar::{self, Results};
-use qcbus_messages::path_text::{from_text, to_text};
+use qcbus_messages::path_text::{from_text, relative, to_text};
 use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
 
 /// Reasons why an `.xqar` could not be read.
@@ -46,7 +46,7 @@ pub fn load(path: &Path) -> Result<ResultMessage, LoadError> {
     let input = input_of(&results, &absolute);
     Ok(ResultMessage {
         job: JobId(0),
-        display_path: displayed(&input),
+        display_path: to_text(relative(&from_text(&input))),
         input,
         xqar: to_text(&absolute),
         verdict: Verdict::of(&results),
@@ -79,13 +79,6 @@ fn input_of(results: &Results, xqar: &Path) -> String {
         here
     };
     to_text(&path)
-}
-
-/// Returns the path relative to the current directory if the file is below it.
-fn displayed(input: &str) -> String {
-    let current = std::env::current_dir().unwrap_or_default();
-    let path = from_text(input);
-    to_text(path.strip_prefix(&current).unwrap_or(&path))
 }
 
 #[cfg(test)]

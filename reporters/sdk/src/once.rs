@@ -117,7 +117,7 @@ fn configured(path: &Path, name: &str) -> Result<Vec<Param>, OnceError> {
     let parsed = Config::parse(&bytes).map_err(|error| wrong(error.to_string()))?;
     for oddity in &parsed.oddities {
         let (row, column) = (oddity.row, oddity.column);
-        tracing::warn!("{}:{row}:{column}: {}", path.display(), oddity.text);
+        tracing::warn!("{}:{row}:{column}: {}", to_text(path), oddity.text);
     }
     let config = parsed.config;
     let global = config

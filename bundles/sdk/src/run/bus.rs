@@ -11,6 +11,7 @@ use qcbus_document::Image;
 use qcbus_formats::config::Config;
 use qcbus_formats::pool::Ending;
 use qcbus_formats::xqar::Issue;
+use qcbus_messages::path_text::to_text;
 use qcbus_messages::{
     CheckerEnd, Digest, DocId, FromPeer, Hello, IS_STOPPING, Job, JobId, PROTOCOL_VERSION, Role,
     ToPeer, codec,
@@ -574,8 +575,11 @@ impl Daemon {
         if let Some(sandbox) = &self.sandbox
             && let Some(outside) = plan.files().iter().find(|it| sandbox.keeps_out(it))
         {
-            let file = outside.display();
-            tracing::info!(%file, "the configuration names files that only a new process may read");
+            let file = to_text(outside);
+            tracing::info!(
+                file,
+                "the configuration names files that only a new process may read"
+            );
             self.outgrown = true;
             return None;
         }

@@ -66,13 +66,13 @@ fn module(
         source,
     })?;
     let parsed = Config::parse(&bytes).map_err(|error| ModuleError::Config {
-        path: path.display().to_string(),
+        path: to_text(path),
         error,
     })?;
     for oddity in &parsed.oddities {
         tracing::warn!(
             "{}:{}:{}: {}",
-            path.display(),
+            to_text(path),
             oddity.row,
             oddity.column,
             oddity.text
@@ -93,7 +93,7 @@ fn module(
     } else {
         Vec::new()
     };
-    let input = input.display().to_string();
+    let input = to_text(&input);
     let mut nowhere = qcbus_formats::pool::NoPlaces;
     let pooled = pool(
         PoolInput {

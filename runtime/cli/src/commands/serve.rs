@@ -97,17 +97,13 @@ fn explain(error: &StartError) -> String {
 }
 
 fn banner(options: &Options) -> String {
-    let directories: Vec<String> = options
-        .roots
-        .iter()
-        .map(|it| it.display().to_string())
-        .collect();
+    let directories: Vec<String> = options.roots.iter().map(|it| to_text(it)).collect();
     format!(
         "qcbus {} serves {} as instance `{}`, results in {}",
         env!("CARGO_PKG_VERSION"),
         directories.join(", "),
         options.instance.name(),
-        options.out.display()
+        to_text(&options.out)
     )
 }
 
@@ -131,19 +127,19 @@ fn tell(told: Told) {
 /// Refuses a gate inside a watched directory, because its files would be checked. Refuses a watched
 /// directory inside the gate, because published files could replace checked ones.
 fn keep_apart(gate: &Path, roots: &[PathBuf]) -> Result<(), String> {
-    let shown = gate.display();
+    let shown = to_text(gate);
     if let Some(root) = roots.iter().find(|root| gate.starts_with(root)) {
         return Err(format!(
             "the gate {shown} is inside the watched directory {}: published files would be checked and published \
              again; choose a directory outside it",
-            root.display()
+            to_text(root)
         ));
     }
     if let Some(root) = roots.iter().find(|root| root.starts_with(gate)) {
         return Err(format!(
             "the watched directory {} is inside the gate {shown}: published files might replace files that must \
              be checked; choose a separate directory for the gate",
-            root.display()
+            to_text(root)
         ));
     }
     Ok(())
@@ -158,8 +154,8 @@ fn of_its_own(gate: &Path, other: &Path, what: &str) -> Result<(), String> {
     Err(format!(
         "the gate {} and the {what} {} overlap: files that were not published are removed from a gate; choose a \
          separate directory for the gate",
-        gate.display(),
-        other.display()
+        to_text(gate),
+        to_text(other)
     ))
 }
 
@@ -167,11 +163,11 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
     let mut roots = BTreeSet::new();
     for directory in &args.directories {
         let real = std::fs::canonicalize(directory)
-            .map_err(|error| format!("cannot watch {}: {error}", directory.display()))?;
+            .map_err(|error| format!("cannot watch {}: {error}", to_text(directory)))?;
         if !real.is_dir() {
             return Err(format!(
                 "cannot watch {}: it is not a directory; use `qcbus check` for files",
-                directory.display()
+                to_text(directory)
             ));
         }
         roots.insert(real);

@@ -27,17 +27,6 @@ pub fn absolute(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf())
 }
 
-/// Returns the path relative to the current directory, if it lies below it.
-pub fn relative(path: &Path) -> &Path {
-    let here = std::env::current_dir().ok();
-    let below = here
-        .as_deref()
-        .and_then(|here| path.strip_prefix(here).ok());
-    below
-        .filter(|it| !it.as_os_str().is_empty())
-        .unwrap_or(path)
-}
-
 /// Resolves a path. Links are followed as far as the path exists.
 pub fn real(path: &Path) -> PathBuf {
     let mut real = PathBuf::new();

@@ -17,14 +17,14 @@ use qcbus_bus::{HostOptions, Instance, SharedMemory, StartError as BusError};
 use qcbus_document::FileKind;
 use qcbus_formats::config::{Choice, Config, Known};
 use qcbus_messages::Exit;
-use qcbus_messages::path_text::to_text;
+use qcbus_messages::path_text::{relative, to_text};
 use qcbus_publish::gate::Outside;
 use qcbus_publish::result_paths::ResultPaths;
 use qcbus_types::Settings;
 use tokio::sync::mpsc;
 
 use super::settings::{
-    absolute, dialect, limits, manifest_directory, memory_limit, program, relative, settings,
+    absolute, dialect, limits, manifest_directory, memory_limit, program, settings,
 };
 use crate::args::CheckArgs;
 use crate::{standard, talk};

@@ -9,7 +9,7 @@ use qcbus_document::Suffix;
 use qcbus_formats::config::Config;
 use qcbus_formats::pool::{CHOICE_CHECKER, OWN_BUNDLE};
 use qcbus_formats::xqar::{Issue, Level};
-use qcbus_messages::path_text::to_text;
+use qcbus_messages::path_text::{relative, to_text};
 use qcbus_messages::{Exit, ResultMessage, Verdict, shown};
 use qcbus_publish::result_paths::ResultPaths;
 use qcbus_report_text::{Folding, Options};
@@ -19,7 +19,6 @@ use qcbus_types::{Delivery, Judged, Notice};
 use super::outputs::{Outputs, Terminal};
 use super::tally::Tally;
 use crate::args::{CheckArgs, FailLevel, PrintArgs};
-use crate::commands::settings::relative;
 use crate::talk;
 
 /// Maximum number of unchecked files that are named.
