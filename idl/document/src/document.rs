@@ -8,7 +8,7 @@ use crate::layout::{
     ALIGNMENT, FaultRecord, Header, HeapRecord, MAGIC, NAME_IN_HEAP, NameRecord, NodeRecord,
     Section, U16, U32, VERSION,
 };
-use crate::node::{Named, Node};
+use crate::node::{Elements, Named, Node};
 
 /// A parsed file, read in place.
 ///
@@ -149,11 +149,7 @@ impl<'a> Document<'a> {
 
     /// Returns the elements with this local name in document order; other elements cost nothing.
     pub fn elements(&self, name: &str) -> Elements<'a> {
-        let postings = self.name_id(name).map_or(&[][..], |id| self.postings(id));
-        Elements {
-            document: *self,
-            postings: postings.iter(),
-        }
+        Named::new(*self, name).all()
     }
 
     /// Returns the elements with this local name, for queries in successive subtrees.
@@ -405,28 +401,6 @@ impl NameMatcher<'_, '_> {
         bytes
             .and_then(|bytes| bytemuck::try_from_bytes(bytes).ok())
             .is_some_and(|record| self.document.is_record_of(record, self.name.as_bytes()))
-    }
-}
-
-/// The elements of one name in document order; created by [`Document::elements`].
-#[derive(Clone, Debug)]
-pub struct Elements<'a> {
-    document: Document<'a>,
-    postings: std::slice::Iter<'a, U32>,
-}
-
-impl<'a> Iterator for Elements<'a> {
-    type Item = Node<'a>;
-
-    fn next(&mut self) -> Option<Node<'a>> {
-        let document = self.document;
-        self.postings
-            .by_ref()
-            .find_map(|index| document.node(index.get()).filter(Node::is_element))
-    }
-
-    fn size_hint(&self) -> (usize, Option<usize>) {
-        (0, Some(self.postings.len()))
     }
 }
 

@@ -28,11 +28,11 @@ mod xpath;
 
 pub use attribute::{Attribute, Attributes};
 pub use builder::{BuildError, Capacities, ImageBuilder};
-pub use document::{Document, Elements, ImageError};
+pub use document::{Document, ImageError};
 pub use fault::{Fault, FaultCode, FaultGroup};
 pub use image::Image;
 pub use kind::{FileKind, SUFFIXES, Suffix};
-pub use node::{Ancestors, Children, ChildrenNamed, Descendants, DescendantsNamed, Named, Node};
+pub use node::{Ancestors, Children, ChildrenNamed, Descendants, Elements, Named, Node};
 pub use source::{Position, Source};
 pub use value::{NumberKind, ValueError};
 pub use xpath::{XPathError, XPaths};

@@ -222,7 +222,7 @@ impl<'a> Node<'a> {
     }
 
     /// Returns all elements of this name within it. Elements of other names cost no time.
-    pub fn descendants_named(&self, name: &str) -> DescendantsNamed<'a> {
+    pub fn descendants_named(&self, name: &str) -> Elements<'a> {
         self.document.named(name).within(*self)
     }
 
@@ -484,8 +484,16 @@ impl<'a> Named<'a> {
         Named { document, postings }
     }
 
+    /// Returns all of them in document order.
+    pub(crate) fn all(&self) -> Elements<'a> {
+        Elements {
+            document: self.document,
+            postings: self.postings.iter(),
+        }
+    }
+
     /// Returns the elements within an element of the same document, in order, without itself.
-    pub fn within(&self, node: Node<'a>) -> DescendantsNamed<'a> {
+    pub fn within(&self, node: Node<'a>) -> Elements<'a> {
         let mut postings = self.postings;
         if !postings.is_empty() {
             let Descendants { next, end, .. } = node.descendants();
@@ -494,21 +502,20 @@ impl<'a> Named<'a> {
             let upto = postings.partition_point(|index| index.get() < end);
             postings = postings.get(..upto).unwrap_or(&[]);
         }
-        DescendantsNamed {
-            document: self.document,
-            postings: postings.iter(),
-        }
+        let document = self.document;
+        Named { document, postings }.all()
     }
 }
 
-/// Elements of one name within a subtree; made by [`Node::descendants_named`].
+/// The elements of one name in a document or a subtree, in order; made by [`Document::elements`] and
+/// [`Node::descendants_named`].
 #[derive(Clone, Debug)]
-pub struct DescendantsNamed<'a> {
+pub struct Elements<'a> {
     document: Document<'a>,
     postings: std::slice::Iter<'a, crate::layout::U32>,
 }
 
-impl<'a> Iterator for DescendantsNamed<'a> {
+impl<'a> Iterator for Elements<'a> {
     type Item = Node<'a>;
 
     fn next(&mut self) -> Option<Node<'a>> {
@@ -516,6 +523,10 @@ impl<'a> Iterator for DescendantsNamed<'a> {
         self.postings
             .by_ref()
             .find_map(|index| document.node(index.get()).filter(Node::is_element))
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        (0, Some(self.postings.len()))
     }
 }
 
