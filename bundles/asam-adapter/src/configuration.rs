@@ -1,9 +1,9 @@
 //! Configuration file for a module: the configuration in force with the file names of the run.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use qcbus_formats::config::{BundleConfig, Config, ConfigParam, INPUT_PARAMS};
+use qcbus_formats::markup::Markup;
 
 /// Parameters of a bundle that name its result file. The framework's name comes first.
 const RESULT_PARAMS: [&str; 2] = ["resultFile", "strResultFile"];
@@ -28,30 +28,27 @@ pub(crate) struct Configuration<'c> {
 impl Configuration<'_> {
     /// Returns the configuration text.
     pub fn text(&self) -> String {
-        let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Config>\n");
-        param(&mut text, 1, INPUT_PARAMS[0], self.input);
-        let global = self.config.map_or(&[][..], |it| &it.params);
-        params(&mut text, 1, global);
+        let mut out = Markup::new(String::new());
+        out.open("Config", &[]);
+        param(&mut out, INPUT_PARAMS[0], self.input);
+        params(&mut out, self.config.map_or(&[][..], |it| &it.params));
         let own = self.config.and_then(|it| it.bundle(self.name, self.name));
         for (application, result) in self.sections {
-            let application = escaped(application);
-            let _ = writeln!(text, "  <CheckerBundle application=\"{application}\">");
-            param(&mut text, 2, RESULT_PARAMS[0], result);
+            out.open("CheckerBundle", &[("application", application)]);
+            param(&mut out, RESULT_PARAMS[0], result);
             if let Some(own) = own {
-                section(&mut text, own);
+                section(&mut out, own);
             }
-            text.push_str("  </CheckerBundle>\n");
+            out.close("CheckerBundle");
         }
-        text.push_str("</Config>\n");
-        text
+        out.close("Config");
+        out.finish()
     }
 }
 
 /// Returns the configuration of a report module: the result file, the output file and its own
 /// parameters. ASAM's modules name the two files differently from others.
 pub(crate) fn of_report(applications: &[String], result: &str, own: &[(String, String)]) -> String {
-    let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<Config>\n");
-    param(&mut text, 1, INPUT_PARAMS[0], result);
     let named = own
         .iter()
         .rev()
@@ -61,71 +58,54 @@ pub(crate) fn of_report(applications: &[String], result: &str, own: &[(String, S
     let report = named
         .filter(|it| !it.starts_with("__"))
         .unwrap_or("Report.txt");
+    let mut out = Markup::new(String::new());
+    out.open("Config", &[]);
+    param(&mut out, INPUT_PARAMS[0], result);
     for application in applications {
-        let application = escaped(application);
-        let _ = writeln!(text, "  <ReportModule application=\"{application}\">");
+        out.open("ReportModule", &[("application", application)]);
         for name in RESULT_INPUTS {
-            param(&mut text, 2, name, result);
+            param(&mut out, name, result);
         }
         for name in OUTPUT_PARAMS {
-            param(&mut text, 2, name, report);
+            param(&mut out, name, report);
         }
         let is_ours = |name: &str| RESULT_INPUTS.contains(&name) || OUTPUT_PARAMS.contains(&name);
         for (name, value) in own.iter().filter(|(name, _)| !is_ours(name)) {
-            param(&mut text, 2, name, value);
+            param(&mut out, name, value);
         }
-        text.push_str("  </ReportModule>\n");
+        out.close("ReportModule");
     }
-    text.push_str("</Config>\n");
-    text
+    out.close("Config");
+    out.finish()
 }
 
-fn section(text: &mut String, own: &BundleConfig) {
-    params(text, 2, &own.params);
+fn section(out: &mut Markup, own: &BundleConfig) {
+    params(out, &own.params);
     for checker in &own.checkers {
         // ASAM writes the larger number for the milder level.
-        let (mildest, worst) = (checker.levels.mildest() as u8, checker.levels.worst() as u8);
-        let id = escaped(&checker.id);
-        let _ = writeln!(
-            text,
-            "    <Checker checkerId=\"{id}\" maxLevel=\"{worst}\" minLevel=\"{mildest}\">"
-        );
-        params(text, 3, &checker.params);
-        text.push_str("    </Checker>\n");
+        let mildest = (checker.levels.mildest() as u8).to_string();
+        let worst = (checker.levels.worst() as u8).to_string();
+        let attributes = [
+            ("checkerId", checker.id.as_str()),
+            ("maxLevel", &worst),
+            ("minLevel", &mildest),
+        ];
+        out.open("Checker", &attributes);
+        params(out, &checker.params);
+        out.close("Checker");
     }
 }
 
 /// Writes parameters, except those that name files of the run. The adapter sets these itself.
-fn params(text: &mut String, depth: usize, all: &[ConfigParam]) {
+fn params(out: &mut Markup, all: &[ConfigParam]) {
     let is_ours = |name: &str| INPUT_PARAMS.contains(&name) || RESULT_PARAMS.contains(&name);
     for it in all.iter().filter(|it| !is_ours(&it.name)) {
-        param(text, depth, &it.name, &it.value);
+        param(out, &it.name, &it.value);
     }
 }
 
-fn param(text: &mut String, depth: usize, name: &str, value: &str) {
-    let (indent, name, value) = ("  ".repeat(depth), escaped(name), escaped(value));
-    let _ = writeln!(text, "{indent}<Param name=\"{name}\" value=\"{value}\"/>");
-}
-
-/// Escapes a text as an attribute value. Characters that XML cannot represent are left out. No
-/// configuration contains them.
-fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\t' | '\n' | '\r' => {
-                let _ = write!(escaped, "&#{};", u32::from(c));
-            }
-            c if c < ' ' || matches!(c, '\u{fffe}' | '\u{ffff}') => {}
-            c => escaped.push(c),
-        }
-    }
-    escaped
+fn param(out: &mut Markup, name: &str, value: &str) {
+    out.empty("Param", &[("name", name), ("value", value)]);
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ pub mod config;
 pub mod distance;
 pub mod location;
 pub mod manifest;
+pub mod markup;
 pub mod pool;
 mod text;
 pub mod verdict;

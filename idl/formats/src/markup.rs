@@ -1,4 +1,4 @@
-//! Writing of tags, indentation and escapes.
+//! Writing of XML: tags, indentation and escapes.
 
 use std::fmt::Write as _;
 
@@ -23,7 +23,8 @@ static SPECIAL: [bool; 256] = {
 };
 
 /// A text to which elements are appended, indented by two spaces for each level.
-pub(super) struct Markup {
+#[derive(Debug, Default)]
+pub struct Markup {
     text: String,
     depth: usize,
 }
@@ -35,10 +36,12 @@ impl Markup {
         Markup { text, depth: 0 }
     }
 
+    /// Returns the whole text.
     pub fn finish(self) -> String {
         self.text
     }
 
+    /// Writes the start tag of an element with children.
     pub fn open(&mut self, name: &str, attributes: &[(&str, &str)]) {
         self.indent();
         self.tag(name, attributes);
@@ -46,6 +49,7 @@ impl Markup {
         self.depth += 1;
     }
 
+    /// Writes the end tag of an element with children.
     pub fn close(&mut self, name: &str) {
         self.depth -= 1;
         self.indent();
@@ -53,12 +57,14 @@ impl Markup {
         self.text.push('\n');
     }
 
+    /// Writes an element without content.
     pub fn empty(&mut self, name: &str, attributes: &[(&str, &str)]) {
         self.indent();
         self.tag(name, attributes);
         self.text.push_str("/>\n");
     }
 
+    /// Writes the indentation of the current level.
     pub fn indent(&mut self) {
         for _ in 0..self.depth {
             self.text.push_str("  ");
@@ -83,19 +89,22 @@ impl Markup {
         }
     }
 
+    /// Writes `</name>`.
     pub fn end_tag(&mut self, name: &str) {
         self.text.push_str("</");
         self.text.push_str(name);
         self.text.push('>');
     }
 
+    /// Writes a text as character data.
     pub fn characters(&mut self, text: &str) {
         self.escape(text, false);
     }
 
     /// Escapes characters with a meaning in markup. Readers turn white space in attributes into
-    /// spaces, so it is written by number. So is a carriage return in text.
-    fn escape(&mut self, value: &str, attribute: bool) {
+    /// spaces, so it is written by number. So is a carriage return in text. Characters that XML
+    /// does not allow become U+FFFD.
+    pub fn escape(&mut self, value: &str, attribute: bool) {
         let mut rest = value;
         while let Some(at) = rest.bytes().position(|byte| SPECIAL[usize::from(byte)]) {
             self.text.push_str(&rest[..at]);

@@ -1,57 +1,35 @@
 //! A `DomainSpecificInfo` as XML text, the form that ASAM's report uses.
 
+use qcbus_formats::markup::Markup;
 use qcbus_formats::xqar::{DomainInfo, InfoElement};
 
 /// Returns the XML text on one line.
 pub(crate) fn text(info: &DomainInfo) -> String {
-    let mut out = String::from("<DomainSpecificInfo name=\"");
-    escape(&info.name, &mut out);
-    out.push_str("\">");
+    let mut out = Markup::default();
+    out.tag("DomainSpecificInfo", &[("name", &info.name)]);
+    out.raw(">");
     for child in &info.content {
         element(child, &mut out);
     }
-    out.push_str("</DomainSpecificInfo>");
-    out
+    out.end_tag("DomainSpecificInfo");
+    out.finish()
 }
 
-fn element(element: &InfoElement, out: &mut String) {
-    out.push('<');
-    out.push_str(&element.name);
-    for (name, value) in &element.attributes {
-        out.push(' ');
-        out.push_str(name);
-        out.push_str("=\"");
-        escape(value, out);
-        out.push('"');
-    }
+fn element(element: &InfoElement, out: &mut Markup) {
+    let attributes = element.attributes.iter();
+    let attributes: Vec<(&str, &str)> = attributes.map(|(n, v)| (&**n, &**v)).collect();
+    out.tag(&element.name, &attributes);
     if element.text.is_empty() && element.children.is_empty() {
-        out.push_str("/>");
+        out.raw("/>");
         return;
     }
-    out.push('>');
-    escape(&element.text, out);
+    out.raw(">");
+    // White space is written by number, so that the text stays on one line.
+    out.escape(&element.text, true);
     for child in &element.children {
         self::element(child, out);
     }
-    out.push_str("</");
-    out.push_str(&element.name);
-    out.push('>');
-}
-
-fn escape(text: &str, out: &mut String) {
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            // A reader would otherwise convert these characters to spaces in attributes.
-            '\t' => out.push_str("&#9;"),
-            '\n' => out.push_str("&#10;"),
-            '\r' => out.push_str("&#13;"),
-            c => out.push(c),
-        }
-    }
+    out.end_tag(&element.name);
 }
 
 #[cfg(test)]

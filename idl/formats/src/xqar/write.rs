@@ -1,13 +1,12 @@
 //! Writing of result files: ASAM's current form, and the form of 2023.
 
 mod info;
-mod markup;
 
 use super::{
     Checker, CheckerBundle, Issue, Level, Location, Locations, Metadata, Param, Results, numbers,
     road,
 };
-use markup::Markup;
+use crate::markup::Markup;
 
 /// Version of the result format that is written when a result has none.
 pub const FORMAT_VERSION: &str = "1.0.0";

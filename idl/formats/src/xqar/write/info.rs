@@ -2,7 +2,7 @@
 //! file because of them.
 
 use super::super::{DomainInfo, InfoElement, MAX_INFO_DEPTH};
-use super::markup::Markup;
+use crate::markup::Markup;
 use crate::xml::{is_name_char, is_name_start};
 
 /// Namespaces that must not be bound to a prefix (Namespaces in XML 1.0, section 3).
