@@ -10,10 +10,13 @@
 //!   nothing for writing, reads only declared files and starts no process. It then writes only to
 //!   its open files: its own streams.
 //!
+//! [`descendants`] finds all processes that a program has started.
+//!
 //! A sandbox cannot be widened again, so [`run_sessions`] starts a fresh process after a lost
 //! session.
 
 mod calls;
+pub mod descendants;
 mod inner;
 mod launcher;
 mod looks;
