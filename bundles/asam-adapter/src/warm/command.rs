@@ -18,125 +18,23 @@ enum Piece {
 }
 
 /// Variables that a shell sets or interprets itself. The environment does not determine them.
-const SHELLS_OWN: &[&str] = &[
-    "IFS",
-    "PWD",
-    "OLDPWD",
-    "PPID",
-    "OPTIND",
-    "OPTARG",
-    "OPTERR",
-    "LINENO",
-    "RANDOM",
-    "SRANDOM",
-    "SECONDS",
-    "EPOCHSECONDS",
-    "EPOCHREALTIME",
-    "UID",
-    "EUID",
-    "GROUPS",
-    "HOSTNAME",
-    "HOSTTYPE",
-    "MACHTYPE",
-    "OSTYPE",
-    "SHLVL",
-    "SHELL",
-    "SHELLOPTS",
-    "FUNCNAME",
-    "DIRSTACK",
-    "PIPESTATUS",
-    "PATH",
-    "PS1",
-    "PS2",
-    "PS4",
-    "TERM",
-    "COLUMNS",
-    "LINES",
-    "HISTCMD",
-    "_",
-];
+const SHELLS_OWN: &str = "\
+    IFS PWD OLDPWD PPID OPTIND OPTARG OPTERR LINENO RANDOM SRANDOM SECONDS EPOCHSECONDS \
+    EPOCHREALTIME UID EUID GROUPS HOSTNAME HOSTTYPE MACHTYPE OSTYPE SHLVL SHELL SHELLOPTS \
+    FUNCNAME DIRSTACK PIPESTATUS PATH PS1 PS2 PS4 TERM COLUMNS LINES HISTCMD _";
 
 /// Words that a shell executes itself, even if a program of that name exists.
-const BUILTINS: &[&str] = &[
-    ".",
-    ":",
-    "alias",
-    "bg",
-    "bind",
-    "break",
-    "builtin",
-    "caller",
-    "case",
-    "cd",
-    "chdir",
-    "command",
-    "compgen",
-    "complete",
-    "compopt",
-    "continue",
-    "coproc",
-    "declare",
-    "dirs",
-    "disown",
-    "do",
-    "done",
-    "echo",
-    "elif",
-    "else",
-    "enable",
-    "esac",
-    "eval",
-    "exec",
-    "exit",
-    "export",
-    "false",
-    "fc",
-    "fg",
-    "fi",
-    "for",
-    "function",
-    "getopts",
-    "hash",
-    "help",
-    "history",
-    "if",
-    "in",
-    "jobs",
-    "kill",
-    "let",
-    "local",
-    "logout",
-    "mapfile",
-    "popd",
-    "printf",
-    "pushd",
-    "pwd",
-    "read",
-    "readarray",
-    "readonly",
-    "return",
-    "select",
-    "set",
-    "shift",
-    "shopt",
-    "source",
-    "suspend",
-    "test",
-    "then",
-    "time",
-    "times",
-    "trap",
-    "true",
-    "type",
-    "typeset",
-    "ulimit",
-    "umask",
-    "unalias",
-    "unset",
-    "until",
-    "wait",
-    "while",
-];
+const BUILTINS: &str = "\
+    . : alias bg bind break builtin caller case cd chdir command compgen complete compopt \
+    continue coproc declare dirs disown do done echo elif else enable esac eval exec exit \
+    export false fc fg fi for function getopts hash help history if in jobs kill let local \
+    logout mapfile popd printf pushd pwd read readarray readonly return select set shift shopt \
+    source suspend test then time times trap true type typeset ulimit umask unalias unset \
+    until wait while";
+
+fn has_word(list: &str, word: &str) -> bool {
+    list.split(' ').any(|it| it == word)
+}
 
 /// Returns the words of `command`, or the reason why it needs a shell.
 pub(super) fn words(command: &str) -> Result<Vec<Word>, WhyCold> {
@@ -165,7 +63,7 @@ impl Word {
     /// Checks whether a shell would handle this word itself as the first word of a command.
     pub(super) fn is_builtin(&self) -> bool {
         self.fixed()
-            .is_none_or(|it| BUILTINS.contains(&it.as_str()) || it.contains('='))
+            .is_none_or(|it| has_word(BUILTINS, &it) || it.contains('='))
     }
 
     /// Appends the arguments that this word yields in `environment`: none, one or several.
@@ -242,10 +140,7 @@ impl Reader<'_> {
                     self.push(other);
                 }
                 other => {
-                    return Err(WhyCold::new(format!(
-                        "its command needs a shell because of `{}`",
-                        other.escape_debug()
-                    )));
+                    return Err(needs_shell(&format!("of `{}`", other.escape_debug())));
                 }
             }
         }
@@ -289,11 +184,7 @@ impl Reader<'_> {
             match self.rest.next() {
                 Some('"') => return Ok(()),
                 Some('$') => self.variable(true)?,
-                Some(next @ ('`' | '\\')) => {
-                    return Err(WhyCold::new(format!(
-                        "its command needs a shell because of `{next}`"
-                    )));
-                }
+                Some(next @ ('`' | '\\')) => return Err(needs_shell(&format!("of `{next}`"))),
                 Some(next) => self.push(next),
                 None => return Err(unclosed()),
             }
@@ -309,19 +200,19 @@ impl Reader<'_> {
         }
         let closed = !in_braces || self.rest.next_if_eq(&'}').is_some();
         if !closed || name.is_empty() || name.starts_with(|it: char| it.is_ascii_digit()) {
-            return Err(WhyCold::new(
-                "its command needs a shell because of a `$` that is not $NAME or ${NAME}",
-            ));
+            return Err(needs_shell("of a `$` that is not $NAME or ${NAME}"));
         }
-        if SHELLS_OWN.contains(&name.as_str()) || name.starts_with("BASH") {
-            return Err(WhyCold::new(format!(
-                "its command needs a shell because ${name} is a variable of the shell"
-            )));
+        if has_word(SHELLS_OWN, &name) || name.starts_with("BASH") {
+            return Err(needs_shell(&format!("${name} is a variable of the shell")));
         }
         let pieces = self.word.get_or_insert_default();
         pieces.push(Piece::Variable { name, quoted });
         Ok(())
     }
+}
+
+fn needs_shell(why: &str) -> WhyCold {
+    WhyCold(format!("its command needs a shell because {why}"))
 }
 
 fn unclosed() -> WhyCold {
