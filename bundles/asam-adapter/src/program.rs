@@ -4,16 +4,18 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use qcbus_disk::{FileFingerprint, foreign};
+use qcbus_disk::foreign;
 use qcbus_messages::Digest;
 use sha2::{Digest as _, Sha256};
+
+use crate::look::Look;
 
 /// Maximum size of such a file in bytes. A larger file or an unreadable file is not compared.
 const MOST: u64 = 256 << 20;
 
 /// A file that a command runs.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Program {
+pub(crate) struct Program {
     /// Absolute path of the file.
     pub path: PathBuf,
     /// Digest of the file when the module was learned. `None` if it was not computed or the file
@@ -38,9 +40,9 @@ fn digest_of(path: &Path) -> io::Result<Digest> {
     Ok(Digest(Sha256::digest(bytes).into()))
 }
 
-/// Programs, each with its file mark when its digest was last found unchanged.
+/// Programs, each with its look when its digest was last found unchanged.
 #[derive(Debug)]
-pub(crate) struct Programs(Vec<(Program, Option<FileFingerprint>)>);
+pub(crate) struct Programs(Vec<(Program, Option<Look>)>);
 
 impl Programs {
     pub(crate) fn new(programs: &[Program]) -> Programs {
@@ -51,7 +53,7 @@ impl Programs {
     pub(crate) fn changed(&mut self) -> Option<String> {
         self.0.iter_mut().find_map(|(program, seen)| {
             let digest = program.digest?;
-            let now = FileFingerprint::at(&program.path);
+            let now = Look::at(&program.path);
             if now.is_some() && now == *seen {
                 return None;
             }

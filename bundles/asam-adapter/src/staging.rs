@@ -1,13 +1,14 @@
 //! Copies the documents of a job to a private directory and keeps their relative paths.
 
-use std::fs::{File, Metadata};
+use std::fs::File;
 use std::io::{self, Write as _};
-use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 
 use qcbus_disk::foreign;
 use sha2::{Digest as _, Sha256};
 
+use crate::look::Look;
 use crate::messages::{Bytes, Document, MOST};
 
 /// Documents in a private directory.
@@ -24,14 +25,6 @@ struct Copied {
     path: PathBuf,
     look: Look,
     digest: [u8; 32],
-}
-
-/// File metadata that differs after a file was changed or replaced.
-type Look = (u64, u64, u64, i64, i64);
-
-fn look(found: &Metadata) -> Look {
-    let (inode, size) = (found.ino(), found.size());
-    (found.dev(), inode, size, found.ctime(), found.ctime_nsec())
 }
 
 impl Staged {
@@ -82,7 +75,7 @@ impl Staged {
         // The file is read-only to prevent accidental writes.
         out.set_permissions(std::fs::Permissions::from_mode(0o400))?;
         self.files.push(Copied {
-            look: look(&out.metadata()?),
+            look: Look::of(&out.metadata()?),
             digest: Sha256::digest(bytes).into(),
             path,
         });
@@ -105,8 +98,7 @@ impl Staged {
 
 impl Copied {
     fn has_changed(&self) -> bool {
-        let now = std::fs::symlink_metadata(&self.path);
-        if now.is_ok_and(|now| look(&now) == self.look) {
+        if Look::at(&self.path) == Some(self.look) {
             return false;
         }
         // Maybe only the permissions or the hard links have changed.

@@ -3,11 +3,12 @@
 use std::ffi::OsString;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::os::unix::ffi::OsStrExt;
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
+
+use crate::look::Look;
 
 /// Files, each with its fingerprint at the time of the check.
 #[derive(Debug)]
@@ -15,13 +16,7 @@ pub(super) struct Stamps(Vec<(PathBuf, Option<Fingerprint>)>);
 
 #[derive(Debug, PartialEq, Eq)]
 enum Fingerprint {
-    File {
-        device: u64,
-        inode: u64,
-        size: u64,
-        modified: (i64, i64),
-        changed: (i64, i64),
-    },
+    File(Look),
     /// Hash of the importable names in it. Other files, such as results, may be written there.
     Directory(u64),
 }
@@ -49,7 +44,8 @@ impl Stamps {
         let mut stamps = Vec::new();
         for file in files {
             let stamp = look(&file);
-            let meanwhile = |it: &Fingerprint| matches!(it, Fingerprint::File { changed, .. } if *changed >= begun);
+            let meanwhile =
+                |it: &Fingerprint| matches!(it, Fingerprint::File(it) if it.changed >= begun);
             if stamp.as_ref().is_none_or(meanwhile) {
                 return Err(file);
             }
@@ -70,13 +66,7 @@ fn look(file: &Path) -> Option<Fingerprint> {
     if data.is_dir() {
         return importable(file).map(Fingerprint::Directory);
     }
-    Some(Fingerprint::File {
-        device: data.dev(),
-        inode: data.ino(),
-        size: data.size(),
-        modified: (data.mtime(), data.mtime_nsec()),
-        changed: (data.ctime(), data.ctime_nsec()),
-    })
+    Some(Fingerprint::File(Look::of(&data)))
 }
 
 fn importable(directory: &Path) -> Option<u64> {
