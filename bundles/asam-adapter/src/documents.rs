@@ -76,8 +76,7 @@ pub(crate) fn of<'d>(subject: &Subject<'d>) -> Result<Files<'d>, String> {
 /// Returns the path that a packed file would have if it were unpacked. ASAM's modules cannot read
 /// packed files. They would report that a valid packed file is not XML.
 fn unpacked(path: &Path) -> Option<PathBuf> {
-    let is_packed = Suffix::of_path(path).is_some_and(|it| it.packed);
-    let name = path.file_name()?.to_str().filter(|_| is_packed)?;
+    let name = path.file_name()?.to_str().filter(|_| is_packed(path))?;
     let stem = name.split_at_checked(name.len().checked_sub(".xodrz".len())?);
     let by_letter = stem.filter(|(_, end)| end.eq_ignore_ascii_case(".xodrz"));
     let name = match by_letter {
@@ -88,21 +87,28 @@ fn unpacked(path: &Path) -> Option<PathBuf> {
     Some(path.with_file_name(name))
 }
 
+fn is_packed(path: &Path) -> bool {
+    Suffix::of_path(path).is_some_and(|it| it.packed)
+}
+
 fn bytes_of(
     path: &Path,
     text: &[u8],
     digest: Option<[u8; 32]>,
     transcoded: bool,
 ) -> Result<Bytes, String> {
-    let is_packed = Suffix::of_path(path).is_some_and(|it| it.packed);
+    let unverified = |why: &str| {
+        let path = path.display();
+        format!("the bytes of {path} cannot be verified: it is included, and {why}")
+    };
     match digest {
         Some(digest) if <[u8; 32]>::from(Sha256::digest(text)) == digest => {
             Ok(Bytes::Here(text.len() as u64))
         }
         Some(digest) => Ok(Bytes::OnDisk(digest)),
-        None if transcoded || is_packed => Err(format!(
-            "the bytes of {} cannot be verified: it is included, and not in UTF-8",
-            path.display()
+        None if is_packed(path) => Err(unverified("packed")),
+        None if transcoded => Err(unverified(
+            "it or the file that includes it is not in UTF-8",
         )),
         None => Ok(Bytes::Here(text.len() as u64)),
     }
