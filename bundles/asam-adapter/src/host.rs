@@ -20,11 +20,12 @@ pub fn run(
     arguments: impl IntoIterator<Item = OsString>,
     complain: impl Fn(&str),
 ) -> Exit {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
     let Asked {
         hosted,
         is_runner,
         rest,
-    } = match parse(arguments) {
+    } = match parse(arguments.clone()) {
         Ok(asked) => asked,
         Err(error) => {
             complain(&format!("asam-adapter: {error}"));
@@ -46,7 +47,7 @@ pub fn run(
         Mode::Bus(options) => options.threads,
         _ => 1,
     };
-    match begin(hosted, count, program) {
+    match begin(hosted, count, program, &arguments) {
         Ok(bundle) => qcbus_sdk::run::run(bundle, mode.reading(own())),
         Err(why) => {
             complain(&why);
@@ -59,11 +60,12 @@ fn begin(
     mut hosted: Hosted,
     count: usize,
     program: &[&str],
+    arguments: &[OsString],
 ) -> Result<&'static qcbus_sdk::Bundle, String> {
     // The digests are taken before the first run, and each run compares them.
-    hosted.programs.iter_mut().for_each(crate::Program::look);
+    hosted.programs.iter_mut().for_each(crate::program::Program::look);
     let name = hosted.name.clone();
-    let runners = Runners::start(count, &hosted, program)
+    let runners = Runners::start(count, &hosted, program, arguments)
         .map_err(|error| format!("`{name}` cannot be run: {error}"))?;
     let learned = learn(&hosted, &runners)
         .map_err(|why| format!("`{name}` cannot be used as a bundle: {why}"))?;

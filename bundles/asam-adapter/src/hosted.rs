@@ -12,7 +12,7 @@ use crate::program::Program;
 
 /// An ASAM module that takes part as a bundle.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Hosted {
+pub(crate) struct Hosted {
     /// Name under which the module joins, and name of the bundle in results and configurations.
     pub name: String,
     /// Shell command of the module: `qc_opendrive -c $ASAM_QC_FRAMEWORK_CONFIG_FILE`.
@@ -39,7 +39,7 @@ pub struct Hosted {
 
 /// Resource limits of a run. A run that exceeds a limit is killed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Limits {
+pub(crate) struct Limits {
     /// Wall-clock time.
     pub time: Duration,
     /// Memory of all processes together, and private memory of each process, in bytes.
@@ -85,7 +85,7 @@ pub(crate) struct Asked {
 pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Asked, UsageError> {
     use lexopt::Arg::{Long, Short, Value};
     let mut parser = lexopt::Parser::from_args(arguments);
-    let (mut name, mut command) = (None, None);
+    let (mut name, mut command, mut digests) = (None, None, Vec::new());
     let mut asked = Asked {
         hosted: Hosted {
             name: String::new(),
@@ -111,12 +111,8 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Ask
             Long("application") => hosted.application = Some(parser.value()?.string()?),
             Long("directory") => hosted.directory = Some(parser.value()?.into()),
             Long("program") => hosted.programs.push(Program::at(parser.value()?.into())),
-            Long("digest") => {
-                let digest = parser.value()?.parse()?;
-                if let Some(program) = hosted.programs.last_mut() {
-                    program.digest = Some(digest);
-                }
-            }
+            // An unreadable program has a digest that cannot be parsed.
+            Long("digest") => digests.push(parser.value()?.parse().ok()),
             Long("scratch") => hosted.scratch = parser.value()?.into(),
             Long("env") => hosted
                 .environment
@@ -142,46 +138,12 @@ pub(crate) fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Ask
             Short(_) | Long(_) => return Err(argument.unexpected().into()),
         }
     }
+    for (program, digest) in hosted.programs.iter_mut().zip(digests) {
+        program.digest = digest;
+    }
     hosted.name = name.ok_or(UsageError::Lacks("asam-adapter", "--name"))?;
     hosted.command = command.ok_or(UsageError::Lacks("asam-adapter", "--exec"))?;
     Ok(asked)
-}
-
-impl Hosted {
-    /// Returns the arguments from which [`parse`] builds the same value again.
-    pub(crate) fn arguments(&self) -> Vec<OsString> {
-        let mut words: Vec<OsString> = Vec::new();
-        let mut add = |option: &str, value: OsString| words.extend([option.into(), value]);
-        add("--name", self.name.clone().into());
-        add("--exec", self.command.clone().into());
-        add("--scratch", self.scratch.clone().into());
-        if let Some(application) = &self.application {
-            add("--application", application.into());
-        }
-        if let Some(directory) = &self.directory {
-            add("--directory", directory.into());
-        }
-        for (name, value) in &self.environment {
-            add("--env", format!("{name}={value}").into());
-        }
-        for kind in self.kinds.iter().flatten() {
-            add("--kind", kind.as_str().into());
-        }
-        for program in &self.programs {
-            add("--program", program.path.clone().into());
-            if let Some(digest) = program.digest {
-                add("--digest", digest.to_string().into());
-            }
-        }
-        let limits = &self.limits;
-        add("--seconds", limits.time.as_secs().to_string().into());
-        add("--memory-mb", (limits.memory >> 20).to_string().into());
-        add("--output-mb", (limits.output >> 20).to_string().into());
-        if self.is_cold {
-            words.push("--cold".into());
-        }
-        words
-    }
 }
 
 fn variable(text: &str) -> Result<(String, String), UsageError> {
@@ -206,18 +168,43 @@ fn positive(parser: &mut lexopt::Parser) -> Result<u64, UsageError> {
 
 #[cfg(test)]
 mod tests {
+    use qcbus_messages::Digest;
+
     use super::*;
 
     #[test]
-    fn hosted_arguments_parse_back_to_same_options() {
-        let line = "--name a --exec x --application b --directory /d --env K=V=W --kind xodr --seconds 7 \
-                    --memory-mb 8 --output-mb 9 --program /p --digest 0707070707070707070707070707070707070707070707070707070707070707 \
-                    --program /q --scratch /s --cold --launch 3 --die-with-parent";
+    fn arguments_of_runner_are_parsed_with_those_of_sdk_apart() {
+        let seven = "07".repeat(32);
+        let line = format!(
+            "--name a --exec x --application b --directory /d --env K=V=W --kind xodr --seconds 7 --memory-mb 8 \
+             --output-mb 9 --program /p --program /q --scratch /s --cold --launch 3 --die-with-parent --digest {seven} \
+             --digest - --runner"
+        );
         let asked = parse(line.split_whitespace().map(OsString::from)).unwrap();
         assert_eq!(asked.rest, ["--launch", "3", "--die-with-parent"]);
-        assert_eq!(asked.hosted.environment, [("K".into(), "V=W".into())]);
-        let again = parse(asked.hosted.arguments()).unwrap();
-        assert_eq!(again.hosted, asked.hosted);
+        assert!(asked.is_runner);
+        let program = |path: &str, digest| Program {
+            path: path.into(),
+            digest,
+        };
+        let expected = Hosted {
+            name: "a".into(),
+            command: "x".into(),
+            application: Some("b".into()),
+            directory: Some("/d".into()),
+            environment: vec![("K".into(), "V=W".into())],
+            kinds: Some(vec![FileKind::Xodr]),
+            limits: Limits {
+                time: Duration::from_secs(7),
+                memory: 8 << 20,
+                output: 9 << 20,
+                ..Limits::default()
+            },
+            programs: vec![program("/p", Some(Digest([7; 32]))), program("/q", None)],
+            scratch: "/s".into(),
+            is_cold: true,
+        };
+        assert_eq!(asked.hosted, expected);
     }
 
     #[test]

@@ -31,10 +31,11 @@ impl ReportModule {
         program: &[&str],
         arguments: impl IntoIterator<Item = OsString>,
     ) -> Result<(ReportModule, Vec<OsString>), (Exit, String)> {
-        let asked = parse(arguments).map_err(|error| (Exit::Usage, error.to_string()))?;
+        let arguments: Vec<OsString> = arguments.into_iter().collect();
+        let asked = parse(arguments.clone()).map_err(|error| (Exit::Usage, error.to_string()))?;
         let hosted = asked.hosted;
         let name = &hosted.name;
-        let runners = Runners::start(1, &hosted, program)
+        let runners = Runners::start(1, &hosted, program, &arguments)
             .map_err(|error| (Exit::Internal, format!("`{name}` cannot be run: {error}")))?;
         Ok((ReportModule { hosted, runners }, asked.rest))
     }

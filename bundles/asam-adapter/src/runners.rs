@@ -23,18 +23,22 @@ pub(crate) struct Runners {
 pub(crate) type Answered = Result<(Ran, Vec<u8>), String>;
 
 impl Runners {
-    /// Starts the runners. `program` has the words after the program name that select the adapter.
+    /// Starts the runners. `program` has the words after the program name that select the adapter,
+    /// and `arguments` are those of this process.
     ///
     /// # Errors
     /// System errors.
-    pub fn start(count: usize, hosted: &Hosted, program: &[&str]) -> io::Result<Runners> {
-        let channels = (0..count.max(1)).map(|_| start(hosted, program));
-        let random = std::hash::BuildHasher::hash_one(&std::hash::RandomState::new(), count);
+    pub fn start(
+        count: usize,
+        hosted: &Hosted,
+        program: &[&str],
+        arguments: &[OsString],
+    ) -> io::Result<Runners> {
+        let channels = (0..count.max(1)).map(|_| start(hosted, program, arguments));
         Ok(Runners {
             free: Mutex::new(channels.collect::<io::Result<_>>()?),
             freed: Condvar::new(),
-            // A later bus process on the same channels must use other numbers.
-            next: AtomicU64::new(random),
+            next: AtomicU64::new(0),
         })
     }
 
@@ -44,12 +48,7 @@ impl Runners {
     /// If the runner has ended or the program differs from the learned one. No more runs are
     /// possible then.
     pub fn ask(&self, request: &Request, body: &[&[u8]]) -> io::Result<Answered> {
-        let channel = self.take();
-        let number = self.next.fetch_add(1, Ordering::Relaxed) ^ process_salt();
-        channel.send(number, request, body)?;
-        let answered = hear(&channel, number)?;
-        self.give_back(channel);
-        Ok(answered)
+        self.hear(self.send(request, body)?)
     }
 
     /// Runs the module over several inputs without a thread. All runners work at the same time.
@@ -60,19 +59,42 @@ impl Runners {
         let mut answers = Vec::new();
         let count = self.lock().len().max(1);
         for some in requests.chunks(count) {
-            let mut asked = Vec::new();
-            for (request, body) in some {
-                let channel = self.take();
-                let number = self.next.fetch_add(1, Ordering::Relaxed);
-                channel.send(number, request, &[body])?;
-                asked.push((channel, number));
-            }
-            for (channel, number) in asked {
-                answers.push(hear(&channel, number)?);
-                self.give_back(channel);
+            let asked = some
+                .iter()
+                .map(|(request, body)| self.send(request, &[body]));
+            for asked in asked.collect::<io::Result<Vec<_>>>()? {
+                answers.push(self.hear(asked)?);
             }
         }
         Ok(answers)
+    }
+
+    fn send(&self, request: &Request, body: &[&[u8]]) -> io::Result<(Channel, u64)> {
+        let channel = self.take();
+        // Sessions forked from one process use the same channels, so their numbers must differ.
+        let session = u64::from(std::process::id()) << 32;
+        let number = session ^ self.next.fetch_add(1, Ordering::Relaxed);
+        channel.send(number, request, body)?;
+        Ok((channel, number))
+    }
+
+    fn hear(&self, (channel, number): (Channel, u64)) -> io::Result<Answered> {
+        let message = loop {
+            let message = channel.receive(MOST)?;
+            let message = message.ok_or_else(|| io::Error::from(io::ErrorKind::UnexpectedEof))?;
+            // Other answers belong to requests of an earlier bus process.
+            if message.number == number {
+                break message;
+            }
+        };
+        let answered = match message.head()? {
+            Answer::Ran(ran) => Ok((ran, message.body)),
+            Answer::Not(why) => Err(why),
+            Answer::Changed(why) => return Err(io::Error::other(why)),
+        };
+        self.lock().push(channel);
+        self.freed.notify_one();
+        Ok(answered)
     }
 
     fn take(&self) -> Channel {
@@ -88,40 +110,13 @@ impl Runners {
         }
     }
 
-    fn give_back(&self, channel: Channel) {
-        self.lock().push(channel);
-        self.freed.notify_one();
-    }
-
     fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Channel>> {
         self.free.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// Returns a value that keeps the request numbers of sessions forked from one process distinct.
-fn process_salt() -> u64 {
-    u64::from(std::process::id()) << 32
-}
-
-fn hear(channel: &Channel, number: u64) -> io::Result<Answered> {
-    loop {
-        let message = channel.receive(MOST)?;
-        let message = message.ok_or_else(|| io::Error::from(io::ErrorKind::UnexpectedEof))?;
-        // This answer belongs to a request of an earlier bus process.
-        if message.number != number {
-            continue;
-        }
-        return Ok(match message.head()? {
-            Answer::Ran(ran) => Ok((ran, message.body)),
-            Answer::Not(why) => Err(why),
-            Answer::Changed(why) => return Err(io::Error::other(why)),
-        });
-    }
-}
-
-fn start(hosted: &Hosted, program: &[&str]) -> io::Result<Channel> {
+fn start(hosted: &Hosted, program: &[&str], arguments: &[OsString]) -> io::Result<Channel> {
     let (own, other) = Channel::pair()?;
-    let arguments = program.iter().map(OsString::from);
     // This path is the running program, even if the file at its original path was replaced.
     let mut command = Command::new("/proc/self/exe");
     if let Some(name) = std::env::args_os().next() {
@@ -130,11 +125,13 @@ fn start(hosted: &Hosted, program: &[&str]) -> io::Result<Channel> {
     if let Some(lasting) = qcbus_sdk::run::lasting_stderr() {
         command.stderr(lasting);
     }
-    command
-        .args(arguments)
-        .arg("--runner")
-        .args(hosted.arguments())
-        .stdin(Stdio::from(other.into_socket()))
-        .spawn()?;
+    command.args(program).args(arguments).arg("--runner");
+    for program in &hosted.programs {
+        let digest = program.digest.map(|it| it.to_string());
+        command
+            .arg("--digest")
+            .arg(digest.as_deref().unwrap_or("-"));
+    }
+    command.stdin(Stdio::from(other.into_socket())).spawn()?;
     Ok(own)
 }
