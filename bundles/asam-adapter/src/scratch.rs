@@ -110,40 +110,19 @@ fn sweep(root: &Path) {
 
 /// Removes a path regardless of the permissions in it.
 fn remove(path: &Path) {
-    let gone = |it: &io::Result<()>| match it {
-        Ok(()) => true,
-        Err(error) => error.kind() == io::ErrorKind::NotFound,
-    };
-    if gone(&std::fs::remove_dir_all(path)) {
+    if std::fs::remove_dir_all(path).is_ok() || path.symlink_metadata().is_err() {
         return;
     }
-    // Permissions are added first. `rm` can remove trees that are too deep for open directories.
-    open_up(path, 64);
-    if gone(&std::fs::remove_dir_all(path)) {
-        return;
-    }
-    let removed = Command::new("rm")
-        .args(["-rf", "--"])
+    // A run may have taken permissions away, or made a tree that is too deep for open directories.
+    let script = "chmod -R u+rwx -- \"$0\"; rm -rf -- \"$0\"";
+    let removed = Command::new("sh")
+        .args(["-c", script])
         .arg(path)
         .stdin(Stdio::null())
         .stderr(Stdio::null())
         .status();
     if path.symlink_metadata().is_ok() {
         tracing::warn!(path = %path.display(), ?removed, "a private directory cannot be removed");
-    }
-}
-
-fn open_up(path: &Path, depth: usize) {
-    let Ok(found) = path.symlink_metadata() else {
-        return;
-    };
-    if !found.is_dir() || depth == 0 {
-        return;
-    }
-    let _ = std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o700));
-    let entries = std::fs::read_dir(path).into_iter().flatten().flatten();
-    for entry in entries {
-        open_up(&entry.path(), depth - 1);
     }
 }
 
