@@ -131,21 +131,12 @@ impl Channel {
                 Err(rustix::io::Errno::INTR) => continue,
                 Err(error) => return Err(error.into()),
             };
-            let Some(Packet {
-                number,
-                head,
-                body,
-                before,
-                content,
-            }) = Packet::of(&packet[..length])
-            else {
-                return Err(io::Error::new(ErrorKind::InvalidData, "invalid packet"));
-            };
+            let invalid = |why: &str| io::Error::new(ErrorKind::InvalidData, why);
+            let parts = packet[..length].split_first_chunk::<HEAD>();
+            let (words, content) = parts.ok_or_else(|| invalid("invalid packet"))?;
+            let [number, head, body, before] = numbers(words);
             if head.saturating_add(body) > most {
-                return Err(io::Error::new(
-                    ErrorKind::InvalidData,
-                    "a message is too long",
-                ));
+                return Err(invalid("a message is too long"));
             }
             if before == 0 {
                 let message = Message {
@@ -180,29 +171,9 @@ impl AsFd for Channel {
     }
 }
 
-struct Packet<'p> {
-    number: u64,
-    head: u64,
-    body: u64,
-    before: u64,
-    content: &'p [u8],
-}
-
-impl Packet<'_> {
-    fn of(bytes: &[u8]) -> Option<Packet<'_>> {
-        let (words, content) = bytes.split_first_chunk::<HEAD>()?;
-        let word = |at: usize| {
-            let bytes = words.get(8 * at..8 * at + 8)?;
-            Some(u64::from_le_bytes(bytes.try_into().ok()?))
-        };
-        Some(Packet {
-            number: word(0)?,
-            head: word(1)?,
-            body: word(2)?,
-            before: word(3)?,
-            content,
-        })
-    }
+/// Reads the numbers of a packet head.
+fn numbers(words: &[u8; HEAD]) -> [u64; 4] {
+    std::array::from_fn(|at| u64::from_le_bytes(std::array::from_fn(|byte| words[8 * at + byte])))
 }
 
 #[cfg(test)]
