@@ -30,8 +30,8 @@ struct Host {
     runners: Runners,
 }
 
-/// Subject of a rule.
-enum SendSide {
+/// The part of a result that a rule reports.
+enum Part {
     /// A checker of the module.
     Checker(&'static Known),
     /// All checkers without a rule of their own.
@@ -40,7 +40,7 @@ enum SendSide {
 
 struct HostedRule {
     facts: Facts,
-    send_side: SendSide,
+    part: Part,
     host: &'static Host,
 }
 
@@ -68,15 +68,11 @@ pub(crate) fn bundle(hosted: Hosted, learned: Learned, runners: Runners) -> &'st
     });
     let learned = &host.learned;
     let known = learned.checkers.iter();
-    let rules = known.map(|it| (facts_of(it), SendSide::Checker(it)));
-    let rules = rules.chain([(module_facts(), SendSide::Rest)]);
+    let rules = known.map(|it| (facts_of(it), Part::Checker(it)));
+    let rules = rules.chain([(module_facts(), Part::Rest)]);
     let rules: Vec<&'static dyn AnyRule> = rules
-        .map(|(facts, send_side)| {
-            let rule = leak(HostedRule {
-                facts,
-                send_side,
-                host,
-            });
+        .map(|(facts, part)| {
+            let rule = leak(HostedRule { facts, part, host });
             rule as &'static dyn AnyRule
         })
         .collect();
@@ -226,9 +222,9 @@ impl<'d> Built<'d> for Run<'d> {
         let Some(rule) = rule.as_any().downcast_ref::<HostedRule>() else {
             return;
         };
-        match rule.send_side {
-            SendSide::Checker(known) => self.told(known, found),
-            SendSide::Rest => self.told_besides(rule.host, found),
+        match rule.part {
+            Part::Checker(known) => self.told(known, found),
+            Part::Rest => self.told_besides(rule.host, found),
         }
     }
 }

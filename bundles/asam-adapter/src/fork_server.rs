@@ -6,23 +6,36 @@
 
 use std::ffi::OsString;
 use std::io::{self, PipeWriter};
-use std::os::fd::{AsFd as _, BorrowedFd};
+use std::os::fd::{AsFd as _, BorrowedFd, OwnedFd};
 use std::os::unix::process::CommandExt as _;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use qcbus_confine::Outer;
-use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+use qcbus_formats::manifest::May;
+use rustix::process::{Pid, PidfdFlags, Resource, Rlimit, getrlimit, pidfd_open, setrlimit};
 
 use crate::hosted::Limits;
-use crate::process::Run;
-use crate::warm::{self, Server, SpawnError, WhyCold, recognise};
+use crate::warm::{self, Server, SpawnError, WhyCold, die_with, recognise};
 
 /// Variables that are hidden from modules. They identify qcbus' own bundles.
 const OURS: [&str; 2] = ["QCBUS_LAUNCH", "QCBUS_SANDBOX"];
 /// Time limit for loading a module.
 const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Command of a run with its environment and limits.
+pub(crate) struct Run<'r> {
+    /// Shell command.
+    pub command: &'r str,
+    /// Variables in addition to those of this process.
+    pub environment: &'r [(OsString, OsString)],
+    /// Working directory.
+    pub directory: &'r Path,
+    pub limits: Limits,
+    /// Permissions besides writing in its private directory, or `None` if the run is not confined.
+    pub may: Option<May>,
+}
 
 /// Starts runs and holds the fork server that makes them start faster.
 #[derive(Debug)]
@@ -35,7 +48,8 @@ pub(crate) struct ForkServer {
 /// First process of a run.
 #[derive(Debug)]
 pub(crate) enum Started {
-    Cold(Child),
+    /// A child, with a descriptor that becomes readable at its end. Older kernels have none.
+    Cold(Child, Option<OwnedFd>),
     /// A process forked by the fork server.
     Warm(u32),
 }
@@ -75,51 +89,34 @@ impl ForkServer {
                 }
             }
         }
-        Ok(Started::Cold(start(run, writer)?))
+        let child = start(run, writer)?;
+        let ends = pidfd_open(Pid::from_child(&child), PidfdFlags::empty()).ok();
+        Ok(Started::Cold(child, ends))
     }
 
     fn warm(&mut self, run: &Run<'_>, writer: &PipeWriter) -> Result<u32, SpawnError> {
         let environment = environment(run);
         let nothing = std::fs::File::open("/dev/null")?;
-        let server = self.server(run, &environment)?;
-        let limits = &run.limits;
-        server.spawn(&warm::Run {
+        let limits = warm::Limits {
+            memory: Some(at_most(Resource::Data, run.limits.memory)),
+            file_size: Some(at_most(Resource::Fsize, run.limits.output)),
+        };
+        let server = match self.server.take() {
+            Some(server) => server,
+            None => {
+                // The result is the same for every job, and each attempt costs the time of an import.
+                let started = load(run, &environment, &limits);
+                started.inspect_err(|_| self.is_cold = true)?
+            }
+        };
+        self.server.insert(server).spawn(&warm::Run {
             environment: &environment,
             cwd: run.directory,
-            limits: warm::Limits {
-                memory: Some(at_most(Resource::Data, limits.memory)),
-                cpu_seconds: None,
-                file_size: Some(at_most(Resource::Fsize, limits.output)),
-            },
+            limits,
             stdin: nothing.as_fd(),
             stdout: writer.as_fd(),
             stderr: writer.as_fd(),
         })
-    }
-
-    fn server(
-        &mut self,
-        run: &Run<'_>,
-        environment: &[(OsString, OsString)],
-    ) -> Result<&mut Server, WhyCold> {
-        let is_there = self.server.is_some();
-        if !is_there {
-            let path = environment.iter().find(|(name, _)| name == "PATH");
-            let path = path.map(|(_, path)| path.clone()).unwrap_or_default();
-            let limits = warm::Limits {
-                memory: Some(at_most(Resource::Data, run.limits.memory)),
-                ..warm::Limits::default()
-            };
-            let command = without_going_where_it_is(run.command, run.directory);
-            let started = recognise(command, &path, Path::new("/"))
-                .and_then(|entry| Server::start(&entry, environment, &limits, PATIENCE));
-            // The result is the same for every job, and each attempt costs the time of an import.
-            let started = started.inspect_err(|_| self.is_cold = true)?;
-            return Ok(self.server.insert(started));
-        }
-        self.server
-            .as_mut()
-            .ok_or_else(|| WhyCold::new("its interpreter was stopped"))
     }
 
     /// Returns the exit status of a run, or `None` if the run has not ended.
@@ -128,7 +125,7 @@ impl ForkServer {
     /// System errors; for a forked run also that its interpreter has ended.
     pub fn ended(&mut self, started: &mut Started) -> io::Result<Option<ExitStatus>> {
         match started {
-            Started::Cold(child) => child.try_wait(),
+            Started::Cold(child, _) => child.try_wait(),
             Started::Warm(pid) => {
                 let Some(server) = &mut self.server else {
                     return Err(io::ErrorKind::BrokenPipe.into());
@@ -143,9 +140,12 @@ impl ForkServer {
         }
     }
 
-    /// Returns a descriptor that becomes readable when a forked run ends.
-    pub fn heard(&self) -> Option<BorrowedFd<'_>> {
-        self.server.as_ref().map(|server| server.as_fd())
+    /// Returns a descriptor that becomes readable when a run ends, if there is one.
+    pub fn heard<'s>(&'s self, started: &'s Started) -> Option<BorrowedFd<'s>> {
+        match started {
+            Started::Cold(_, ends) => ends.as_ref().map(|it| it.as_fd()),
+            Started::Warm(_) => self.server.as_ref().map(|it| it.as_fd()),
+        }
     }
 
     /// Returns the processes that belong to no run.
@@ -160,14 +160,27 @@ impl ForkServer {
     }
 }
 
-/// Returns all variables of a run, as a shell would set them.
+/// Starts an interpreter that has loaded the program of a run.
+fn load(
+    run: &Run<'_>,
+    environment: &[(OsString, OsString)],
+    limits: &warm::Limits,
+) -> Result<Server, WhyCold> {
+    let path = environment.iter().find(|(name, _)| name == "PATH");
+    let path = path.map(|(_, path)| path.clone()).unwrap_or_default();
+    let command = without_going_where_it_is(run.command, run.directory);
+    let entry = recognise(command, &path, Path::new("/"))?;
+    Server::start(&entry, environment, limits, PATIENCE)
+}
+
+/// Returns all variables of a run except the working directory.
 fn environment(run: &Run<'_>) -> Vec<(OsString, OsString)> {
     let is_given = |name: &OsString| run.environment.iter().any(|(other, _)| other == name);
-    let inherited = std::env::vars_os()
-        .filter(|(name, _)| !OURS.iter().any(|it| name == it) && name != "PWD" && !is_given(name));
-    let own = run.environment.iter().cloned();
-    let directory = ("PWD".into(), run.directory.as_os_str().to_owned());
-    inherited.chain(own).chain([directory]).collect()
+    let inherited = std::env::vars_os();
+    inherited
+        .filter(|(name, _)| !OURS.iter().any(|it| name == it) && !is_given(name))
+        .chain(run.environment.iter().cloned())
+        .collect()
 }
 
 #[expect(
@@ -195,13 +208,7 @@ fn start(run: &Run<'_>, writer: PipeWriter) -> io::Result<Child> {
         command.pre_exec(move || {
             rustix::process::setsid()?;
             restrict(&limits)?;
-            // The parent may have ended before `prctl`. Then this process would never be killed.
-            let failed = libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) != 0;
-            let parent = rustix::process::getppid().map(|it| it.as_raw_nonzero().get());
-            if failed || parent != Some(runner.cast_signed()) {
-                return Err(io::Error::from_raw_os_error(libc::ESRCH));
-            }
-            Ok(())
+            die_with(runner)
         });
     }
     if let Some(may) = &run.may {
@@ -213,17 +220,15 @@ fn start(run: &Run<'_>, writer: PipeWriter) -> io::Result<Child> {
 }
 
 fn restrict(limits: &Limits) -> io::Result<()> {
-    let most = |resource: Resource, bytes: u64| {
-        let bytes = Some(at_most(resource, bytes));
-        let limit = Rlimit {
-            current: bytes,
-            maximum: bytes,
-        };
-        setrlimit(resource, limit)
-    };
-    most(Resource::Core, 0)?;
-    most(Resource::Fsize, limits.output)?;
-    most(Resource::Data, limits.memory)?;
+    for (resource, bytes) in [
+        (Resource::Core, 0),
+        (Resource::Fsize, limits.output),
+        (Resource::Data, limits.memory),
+    ] {
+        let most = Some(at_most(resource, bytes));
+        let (current, maximum) = (most, most);
+        setrlimit(resource, Rlimit { current, maximum })?;
+    }
     Ok(())
 }
 

@@ -19,6 +19,7 @@ mod fork_server;
 mod host;
 mod hosted;
 mod learn;
+mod look;
 mod messages;
 mod process;
 mod program;
@@ -34,6 +35,5 @@ mod written;
 
 pub use fork_server::goes_where_it_is;
 pub use host::run;
-pub use hosted::{Hosted, Limits, usual_scratch};
-pub use program::Program;
+pub use hosted::usual_scratch;
 pub use report::{ReportFile, ReportModule};

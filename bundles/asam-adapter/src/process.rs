@@ -1,38 +1,22 @@
 //! A run of a module: starts it, monitors it, and ends it with all of its descendants.
 
-use std::ffi::OsString;
 use std::io::{self, PipeReader, Read as _};
-use std::os::fd::{AsFd as _, BorrowedFd, OwnedFd};
+use std::os::fd::BorrowedFd;
 use std::os::unix::process::ExitStatusExt as _;
-use std::path::Path;
 use std::process::ExitStatus;
 use std::time::{Duration, Instant};
 
-use qcbus_formats::manifest::May;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::process::{Pid, PidfdFlags, pidfd_open};
+use rustix::process::Signal;
 
 use crate::family;
-use crate::fork_server::{ForkServer, Started};
+use crate::fork_server::{ForkServer, Run, Started};
 use crate::hosted::Limits;
 
 /// Interval of the limit checks while a run is silent.
 const TICK: Duration = Duration::from_millis(100);
 /// Number of bytes of the final output that are stored.
 const SAID: usize = 4 << 10;
-
-/// Command of a run with its environment and limits.
-pub(crate) struct Run<'r> {
-    /// Shell command.
-    pub command: &'r str,
-    /// Variables in addition to those of this process.
-    pub environment: &'r [(OsString, OsString)],
-    /// Working directory.
-    pub directory: &'r Path,
-    pub limits: Limits,
-    /// Permissions besides writing in its private directory, or `None` if the run is not confined.
-    pub may: Option<May>,
-}
 
 /// End of a run.
 #[derive(Debug)]
@@ -77,16 +61,10 @@ pub(crate) fn run(
     let started = fork_server
         .start(run, writer, plainly)
         .map_err(Broken::Start)?;
-    let handle = match &started {
-        Started::Cold(child) => Pid::from_raw(child.id().cast_signed())
-            .and_then(|pid| pidfd_open(pid, PidfdFlags::empty()).ok()),
-        Started::Warm(_) => None,
-    };
     let mut watched = Watched {
         limits: run.limits,
         begin: Instant::now(),
         fork_server,
-        handle,
         started,
         reader,
         heard: Heard::default(),
@@ -109,8 +87,6 @@ struct Watched<'k> {
     limits: Limits,
     begin: Instant,
     fork_server: &'k mut ForkServer,
-    /// Descriptor for waiting together with other events. Older kernels do not have it.
-    handle: Option<OwnedFd>,
     started: Started,
     reader: PipeReader,
     heard: Heard,
@@ -151,13 +127,8 @@ impl Watched<'_> {
         if !self.heard.closed {
             fds.push(PollFd::new(&self.reader, PollFlags::IN));
         }
-        let ends = match self.started {
-            Started::Cold(_) => self.handle.as_ref().map(|it| it.as_fd()),
-            Started::Warm(_) => self.fork_server.heard(),
-        };
-        if let Some(ends) = ends {
-            fds.push(PollFd::from_borrowed_fd(ends, PollFlags::IN));
-        }
+        let ends = self.fork_server.heard(&self.started);
+        fds.extend(ends.map(|ends| PollFd::from_borrowed_fd(ends, PollFlags::IN)));
         let tick = Timespec {
             tv_sec: 0,
             tv_nsec: TICK.subsec_nanos().into(),
@@ -208,12 +179,12 @@ impl Watched<'_> {
         if status.success() {
             return None;
         }
-        let by_signal = |signal: i32| match signal {
-            libc::SIGXFSZ => {
+        let by_signal = |signal: i32| {
+            if signal == Signal::XFSZ.as_raw() {
                 let most = self.limits.output >> 20;
-                format!("was killed because it wrote a file of more than {most} MB")
+                return format!("was killed because it wrote a file of more than {most} MB");
             }
-            signal => format!("was killed by signal {signal}"),
+            format!("was killed by signal {signal}")
         };
         Some(match (status.code(), status.signal()) {
             (None, Some(signal)) => by_signal(signal),

@@ -12,10 +12,10 @@ use qcbus_messages::Exit;
 use crate::channel::{Channel, Message};
 use crate::configuration::{Configuration, of_report};
 use crate::family;
-use crate::fork_server::ForkServer;
+use crate::fork_server::{ForkServer, Run};
 use crate::hosted::Hosted;
 use crate::messages::{Answer, MOST, Ran, Request};
-use crate::process::{self, Broken, Run};
+use crate::process::{self, Broken};
 use crate::program::Programs;
 use crate::scratch::{Room, Scratch};
 use crate::staging::Staged;
@@ -52,10 +52,11 @@ fn runner(hosted: &Hosted) -> io::Result<()> {
     while let Some(message) = runner.channel.receive(MOST)? {
         let (answer, result) = match runner.answer(&message) {
             Ok((ran, result)) => (Answer::Ran(ran), result),
-            Err(NotRun::Why(why) | NotRun::Unkept(why)) => (Answer::Not(why), Vec::new()),
+            Err(NotRun::Why(why)) => (Answer::Not(why), Vec::new()),
             Err(NotRun::Changed(why)) => (Answer::Changed(why), Vec::new()),
-            Err(NotRun::Over) => return Ok(()),
-            Err(NotRun::Lost(error)) => return Err(io::Error::other(error)),
+            Err(NotRun::Broken(Broken::Unwanted)) => return Ok(()),
+            Err(NotRun::Broken(error @ Broken::Lasts(_))) => return Err(io::Error::other(error)),
+            Err(NotRun::Broken(error)) => (Answer::Not(error.to_string()), Vec::new()),
         };
         match runner.channel.send(message.number, &answer, &[&result]) {
             Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
@@ -71,12 +72,8 @@ enum NotRun {
     Why(String),
     /// The program differs from the learned one.
     Changed(String),
-    /// The interpreter of the run has ended.
-    Unkept(String),
-    /// The requesting process has ended.
-    Over,
-    /// This process cannot run anything more.
-    Lost(Broken),
+    /// The run was not started, or its end is unknown.
+    Broken(Broken),
 }
 
 impl From<io::Error> for NotRun {
@@ -112,12 +109,9 @@ impl Runner<'_> {
     fn answer(&mut self, message: &Message) -> Result<(Ran, Vec<u8>), NotRun> {
         match self.run(message, false) {
             // The run itself may have ended its interpreter. A plain run uses no such interpreter.
-            Err(NotRun::Unkept(why)) => {
-                tracing::warn!(
-                    module = self.hosted.name,
-                    why,
-                    "it is run again as a plain run"
-                );
+            Err(NotRun::Broken(Broken::Unkept(why))) => {
+                let module = &self.hosted.name;
+                tracing::warn!(module, %why, "it is run again as a plain run");
                 self.run(message, true)
             }
             answer => answer,
@@ -136,13 +130,8 @@ impl Runner<'_> {
             limits: self.hosted.limits,
             may: self.may_in(&prepared.room),
         };
-        let ended = match process::run(&run, self.channel.as_fd(), &mut self.fork_server, plainly) {
-            Ok(ended) => ended,
-            Err(Broken::Unwanted) => return Err(NotRun::Over),
-            Err(Broken::Unkept(error)) => return Err(NotRun::Unkept(error.to_string())),
-            Err(error @ Broken::Start(_)) => return Err(NotRun::Why(error.to_string())),
-            Err(error @ Broken::Lasts(_)) => return Err(NotRun::Lost(error)),
-        };
+        let ended = process::run(&run, self.channel.as_fd(), &mut self.fork_server, plainly)
+            .map_err(NotRun::Broken)?;
         // The program may have been replaced just before it was started.
         self.is_as_learned()?;
         let text = |path: &Path| path.to_string_lossy().into_owned();
@@ -190,17 +179,15 @@ impl Runner<'_> {
             NotRun::Why(why.to_owned())
         })?;
         let is_own = self.hosted.directory.is_none();
-        let sections = (1..)
-            .zip(&request.applications)
-            .map(|(number, application)| {
-                let name = format!("result-{number}.xqar");
-                let result = match is_own {
-                    true => name,
-                    false => own.join(name).to_string_lossy().into_owned(),
-                };
-                (application.clone(), result)
-            });
-        let sections: Vec<(String, String)> = sections.collect();
+        let applications = request.applications.iter().cloned();
+        let result = |number: i32| {
+            let name = format!("result-{number}.xqar");
+            match is_own {
+                true => name,
+                false => own.join(name).to_string_lossy().into_owned(),
+            }
+        };
+        let sections: Vec<(String, String)> = applications.zip((1..).map(result)).collect();
         let config = room.path().join("config.xml");
         let text = match &request.report {
             Some(params) => of_report(&request.applications, input, params),

@@ -189,7 +189,6 @@ fn jobs_run_in_parallel_and_can_be_killed() {
         stderr: out.as_fd(),
     };
     let mut pids: Vec<u32> = (0..4).map(|_| server.spawn(&run).unwrap()).collect();
-    assert_eq!(server.running(), pids);
     assert!(server.ended().unwrap().is_none());
     for pid in &pids {
         rustix::process::kill_process_group(process(*pid), Signal::KILL).unwrap();
@@ -213,12 +212,11 @@ fn process(pid: u32) -> Pid {
 #[test]
 fn job_process_gets_limits_of_its_job() {
     let Some(shop) = Workshop::new() else { return };
-    shop.console("limits", "import resource as r\ndef main():\n    print([r.getrlimit(it) for it in (r.RLIMIT_DATA, r.RLIMIT_CPU, r.RLIMIT_FSIZE)])\n");
+    shop.console("limits", "import resource as r\ndef main():\n    print([r.getrlimit(it) for it in (r.RLIMIT_DATA, r.RLIMIT_FSIZE)])\n");
     let mut server = shop.start("limits").unwrap();
     let (environment, cwd) = (shop.environment(&[]), shop.path("run"));
     let limits = Limits {
         memory: Some(1 << 30),
-        cpu_seconds: Some(77),
         file_size: Some(5000),
     };
     let outcome = shop.within(|stdin, stdout, stderr| {
@@ -233,12 +231,9 @@ fn job_process_gets_limits_of_its_job() {
         server.spawn(&run).unwrap();
         end_of(&mut server).1
     });
-    assert_eq!(
-        outcome.stdout,
-        "[(1073741824, 1073741824), (77, 77), (5000, 5000)]\n"
-    );
+    assert_eq!(outcome.stdout, "[(1073741824, 1073741824), (5000, 5000)]\n");
     // A run without limits is not affected by earlier limits.
-    assert!(!shop.warm(&mut server, &environment).stdout.contains("77"));
+    assert!(!shop.warm(&mut server, &environment).stdout.contains("5000"));
     // A missing directory is a failure of this job, not of the server.
     let null = File::open("/dev/null").unwrap();
     let run = Run {
@@ -465,12 +460,7 @@ fn killed_fork_server_leaves_its_jobs_to_subreaper() {
     wait_for(&server);
     let gone = server.ended().unwrap_err();
     assert_eq!(gone.kind(), std::io::ErrorKind::UnexpectedEof);
-    assert!(
-        gone.to_string()
-            .ends_with("has ended, with 1 jobs still running"),
-        "{gone}"
-    );
-    assert_eq!(server.running(), [pid]);
+    assert!(gone.to_string().ends_with("has ended"), "{gone}");
     assert!(matches!(server.spawn(&run), Err(SpawnError::Gone(_))));
     drop(server);
     // The job continues, and the subreaper receives its exit status.

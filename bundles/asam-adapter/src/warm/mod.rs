@@ -17,6 +17,7 @@ mod stamps;
 mod wire;
 
 pub use entry::{Entry, recognise};
+pub(crate) use server::die_with;
 pub use server::{Limits, Run, Server, SpawnError};
 
 /// Reason why a program is run plainly: a sentence for users, after "not kept warm: ".

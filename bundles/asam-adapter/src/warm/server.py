@@ -264,10 +264,10 @@ class Job:
     def __init__(self, request, fds):
         fields = request.split(b"\0")
         self.cwd = fields[0]
-        self.limits = [int(it) if it else None for it in fields[1:4]]
-        count = int(fields[4])
-        self.argv = [os.fsdecode(it) for it in fields[5 : 5 + count]]
-        self.environment = dict(it.split(b"=", 1) for it in fields[5 + count :] if it)
+        self.limits = [int(it) if it else None for it in fields[1:3]]
+        count = int(fields[3])
+        self.argv = [os.fsdecode(it) for it in fields[4 : 4 + count]]
+        self.environment = dict(it.split(b"=", 1) for it in fields[4 + count :] if it)
         self.fds = fds
 
     def enter(self, changed):

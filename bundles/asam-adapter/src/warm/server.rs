@@ -1,19 +1,20 @@
 //! The fork server: the interpreter that is forked for each job, as seen by its parent.
 
-use std::collections::VecDeque;
+use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::os::unix::fs::FileExt;
 use std::os::unix::net::UnixStream;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use rustix::fs::{MemfdFlags, SealFlags, fcntl_add_seals, ftruncate, memfd_create};
 use rustix::process::{
-    Pid, PidfdFlags, Signal, WaitId, WaitIdOptions, pidfd_open, pidfd_send_signal, waitid,
+    Pid, PidfdFlags, Signal, WaitId, WaitIdOptions, getppid, pidfd_open, pidfd_send_signal,
+    set_parent_process_death_signal, waitid,
 };
 
 use super::entry::Program;
@@ -40,8 +41,6 @@ const ANSWER: Duration = Duration::from_secs(30);
 pub struct Limits {
     /// Private memory in bytes (`RLIMIT_DATA`).
     pub memory: Option<u64>,
-    /// CPU time in seconds (`RLIMIT_CPU`).
-    pub cpu_seconds: Option<u64>,
     /// Size of a written file in bytes (`RLIMIT_FSIZE`).
     pub file_size: Option<u64>,
 }
@@ -87,14 +86,8 @@ pub enum SpawnError {
 pub struct Server {
     entry: Entry,
     environment: Vec<(OsString, OsString)>,
-    socket: UnixStream,
-    /// Process descriptor. Unlike a process id it cannot refer to another process.
-    process: OwnedFd,
-    pid: u32,
+    interpreter: Interpreter,
     stamps: Stamps,
-    running: Vec<u32>,
-    /// Ends of jobs that arrived during the wait for another answer.
-    ended: VecDeque<(u32, ExitStatus)>,
 }
 
 impl Server {
@@ -113,31 +106,23 @@ impl Server {
     ) -> Result<Server, WhyCold> {
         check_environment(entry, environment)?;
         let begun = stamps::now();
-        let failed = |error: io::Error| {
-            let interpreter = entry.interpreter.display();
-            WhyCold::new(format!("`{interpreter}` cannot be started: {error}"))
-        };
-        let mut starting = Starting::new(entry, environment, limits).map_err(failed)?;
-        let loaded = starting.wait(patience);
-        let files = loaded.inspect_err(|_| starting.stop())?;
-        let meanwhile = |file: std::path::PathBuf| {
+        let (interpreter, errors) =
+            Interpreter::start(entry, environment, limits).map_err(|error| {
+                let interpreter = entry.interpreter.display();
+                WhyCold::new(format!("`{interpreter}` cannot be started: {error}"))
+            })?;
+        let files = interpreter.loaded(patience, &errors)?;
+        let stamps = Stamps::of(files, begun).map_err(|file| {
             let file = file.display();
             WhyCold::new(format!(
                 "`{file}` changed while it was loaded; it would change again at each load"
             ))
-        };
-        let stamps = Stamps::of(files, begun)
-            .map_err(meanwhile)
-            .inspect_err(|_| starting.stop())?;
+        })?;
         Ok(Server {
             entry: entry.clone(),
             environment: environment.to_vec(),
-            socket: starting.socket,
-            process: starting.process,
-            pid: starting.pid,
+            interpreter,
             stamps,
-            running: Vec::new(),
-            ended: VecDeque::new(),
         })
     }
 
@@ -156,58 +141,49 @@ impl Server {
             ));
         }
         let arguments = self.arguments(run)?;
-        wire::ask(&self.socket, run, &arguments).map_err(|error| self.gone(error))?;
+        let asked = wire::ask(&self.interpreter.socket, run, &arguments);
+        asked.map_err(|error| self.gone(error))?;
         loop {
-            match wire::answer(&self.socket).map_err(|error| self.gone(error))? {
-                Answer::Pid(pid) => {
-                    self.running.push(pid);
-                    return Ok(pid);
-                }
+            match self.answer()? {
+                Answer::Pid(pid) => return Ok(pid),
                 Answer::Failed(why) => return Err(WhyCold::new(why).into()),
-                Answer::End(pid, status) => self.note_end(pid, status),
+                // An earlier job was killed, and nobody waits for its end.
+                Answer::End(..) => {}
                 other => return Err(self.strange(&other).into()),
             }
         }
     }
 
     /// Returns a job that has ended and its exit status, without waiting. Call it when
-    /// [`Server::as_fd`] is readable, and after [`Server::spawn`].
+    /// [`Server::as_fd`] is readable. An end that arrives during [`Server::spawn`] is lost.
     ///
     /// # Errors
     ///
-    /// The server has ended. The [`Server::running`] processes then belong to the nearest
-    /// subreaper.
+    /// The server has ended. Its jobs then belong to the nearest subreaper.
     pub fn ended(&mut self) -> io::Result<Option<(u32, ExitStatus)>> {
-        while self.ended.is_empty() && wire::is_readable(self.socket.as_fd())? {
-            match wire::answer(&self.socket).map_err(|error| self.gone(error))? {
-                Answer::End(pid, status) => self.note_end(pid, status),
-                other => return Err(self.strange(&other)),
-            }
+        if !wire::is_readable(self.as_fd())? {
+            return Ok(None);
         }
-        Ok(self.ended.pop_front())
-    }
-
-    /// Returns the jobs that are not known to have ended.
-    #[must_use]
-    pub fn running(&self) -> &[u32] {
-        &self.running
+        match self.answer()? {
+            Answer::End(pid, status) => Ok(Some((pid, ExitStatus::from_raw(status)))),
+            other => Err(self.strange(&other)),
+        }
     }
 
     /// Returns the process id of the interpreter.
     #[must_use]
     pub fn id(&self) -> u32 {
-        self.pid
+        self.interpreter.pid
     }
 
-    fn note_end(&mut self, pid: u32, status: i32) {
-        self.running.retain(|other| *other != pid);
-        self.ended.push_back((pid, ExitStatus::from_raw(status)));
+    fn answer(&self) -> io::Result<Answer> {
+        wire::answer(&self.interpreter.socket).map_err(|error| self.gone(error))
     }
 
     /// Returns the arguments that a shell would pass to the program in the environment of this job.
     fn arguments(&self, run: &Run<'_>) -> Result<Vec<OsString>, WhyCold> {
-        let theirs = plain(run.environment);
-        if let Some(name) = difference(&plain(&self.environment), &theirs) {
+        let (ours, theirs) = (plain(&self.environment), plain(run.environment));
+        if let Some((name, _)) = ours.symmetric_difference(&theirs).next() {
             let name = name.to_string_lossy();
             return Err(WhyCold::new(format!(
                 "${name} of this job differs from its value at load time"
@@ -227,28 +203,18 @@ impl Server {
     }
 
     fn gone(&self, error: io::Error) -> io::Error {
-        let pid = self.pid;
-        let at_end = [
-            io::ErrorKind::UnexpectedEof,
-            io::ErrorKind::BrokenPipe,
-            io::ErrorKind::ConnectionReset,
-        ];
-        if at_end.contains(&error.kind()) {
-            let jobs = self.running.len();
-            let text = format!(
-                "its fork server (process {pid}) has ended, with {jobs} jobs still running"
-            );
-            return io::Error::new(io::ErrorKind::UnexpectedEof, text);
-        }
-        if error.kind() == io::ErrorKind::WouldBlock {
-            let text = format!("its fork server (process {pid}) does not answer");
-            return io::Error::new(io::ErrorKind::TimedOut, text);
-        }
-        error
+        use io::ErrorKind::{BrokenPipe, ConnectionReset, TimedOut, UnexpectedEof, WouldBlock};
+        let (kind, what) = match error.kind() {
+            UnexpectedEof | BrokenPipe | ConnectionReset => (UnexpectedEof, "has ended"),
+            WouldBlock => (TimedOut, "does not answer"),
+            _ => return error,
+        };
+        let pid = self.id();
+        io::Error::new(kind, format!("its fork server (process {pid}) {what}"))
     }
 
     fn strange(&self, answer: &Answer) -> io::Error {
-        let pid = self.pid;
+        let pid = self.id();
         io::Error::other(format!(
             "its fork server (process {pid}) sent an unexpected answer: {answer:?}"
         ))
@@ -257,38 +223,34 @@ impl Server {
 
 impl AsFd for Server {
     fn as_fd(&self) -> BorrowedFd<'_> {
-        self.socket.as_fd()
+        self.interpreter.socket.as_fd()
     }
 }
 
-impl Drop for Server {
-    fn drop(&mut self) {
-        end(&self.process);
-    }
-}
-
-/// Kills an interpreter and reaps it.
-fn end(process: &OwnedFd) {
-    // Both fail only if the process has ended and another wait for children has reaped it.
-    let _ = pidfd_send_signal(process, Signal::KILL);
-    let _ = waitid(WaitId::PidFd(process.as_fd()), WaitIdOptions::EXITED);
-}
-
-/// An interpreter that is loading.
-struct Starting {
+/// The process of an interpreter, which ends when this value is dropped.
+#[derive(Debug)]
+struct Interpreter {
     socket: UnixStream,
+    /// Process descriptor. Unlike a process id it cannot refer to another process.
     process: OwnedFd,
     pid: u32,
-    /// Standard error of the interpreter and of the code that it loads.
-    errors: std::fs::File,
 }
 
-impl Starting {
-    fn new(
+impl Drop for Interpreter {
+    fn drop(&mut self) {
+        // Both fail only if the process has ended and another wait for children has reaped it.
+        let _ = pidfd_send_signal(&self.process, Signal::KILL);
+        let _ = waitid(WaitId::PidFd(self.process.as_fd()), WaitIdOptions::EXITED);
+    }
+}
+
+impl Interpreter {
+    /// Starts an interpreter. Also returns its standard error, which the code that it loads shares.
+    fn start(
         entry: &Entry,
         environment: &[(OsString, OsString)],
         limits: &Limits,
-    ) -> io::Result<Starting> {
+    ) -> io::Result<(Interpreter, std::fs::File)> {
         let (socket, theirs) = UnixStream::pair()?;
         let (prints, errors) = (bounded_file()?, bounded_file()?);
         let (kind, target) = match &entry.program {
@@ -310,29 +272,32 @@ impl Starting {
         die_with_caller(&mut command);
         let child = command.spawn()?;
         let pid = child.id();
-        Ok(Starting {
+        let process = process(child)?;
+        let interpreter = Interpreter {
             socket,
-            process: process(child)?,
+            process,
             pid,
-            errors,
-        })
+        };
+        Ok((interpreter, errors))
     }
 
     /// Waits for the loading and returns the loaded files.
-    fn wait(&mut self, patience: Duration) -> Result<Vec<std::path::PathBuf>, WhyCold> {
+    fn loaded(&self, patience: Duration, errors: &std::fs::File) -> Result<Vec<PathBuf>, WhyCold> {
         let broken = |error: io::Error| {
             WhyCold::new(format!("cannot communicate with its interpreter: {error}"))
         };
-        self.socket
-            .set_read_timeout(Some(patience))
-            .map_err(broken)?;
-        let answer = wire::answer(&self.socket).map_err(|error| self.silence(&error, patience))?;
+        let socket = &self.socket;
+        socket.set_read_timeout(Some(patience)).map_err(broken)?;
+        let answer = wire::answer(socket).map_err(|error| match error.kind() {
+            io::ErrorKind::WouldBlock => {
+                WhyCold::new(format!("it was not loaded within {patience:?}"))
+            }
+            _ => end_of_loading(errors),
+        })?;
         // From here an answer takes milliseconds. A stopped interpreter must not block its caller
         // forever.
-        self.socket.set_read_timeout(Some(ANSWER)).map_err(broken)?;
-        self.socket
-            .set_write_timeout(Some(ANSWER))
-            .map_err(broken)?;
+        socket.set_read_timeout(Some(ANSWER)).map_err(broken)?;
+        socket.set_write_timeout(Some(ANSWER)).map_err(broken)?;
         match answer {
             Answer::Ready(files) => Ok(files),
             Answer::Cold(why) => Err(WhyCold::new(why)),
@@ -341,27 +306,18 @@ impl Starting {
             )))),
         }
     }
+}
 
-    fn silence(&self, error: &io::Error, patience: Duration) -> WhyCold {
-        if error.kind() == io::ErrorKind::WouldBlock {
-            return WhyCold::new(format!("it was not loaded within {patience:?}"));
-        }
-        let mut said = vec![0; REASON];
-        let read = self.errors.read_at(&mut said, 0).unwrap_or_default();
-        said.truncate(read);
-        let said = String::from_utf8_lossy(&said);
-        let last = said.trim_end_matches(['\0', '\n']).lines().next_back();
-        WhyCold::new(match last {
-            Some(last) if !last.is_empty() => {
-                format!("its interpreter ended during loading: {last}")
-            }
-            _ => "its interpreter ended during loading".to_owned(),
-        })
-    }
-
-    fn stop(&self) {
-        end(&self.process);
-    }
+/// Returns the reason why an interpreter has ended during loading: the last line of its errors.
+fn end_of_loading(errors: &std::fs::File) -> WhyCold {
+    let mut said = vec![0; REASON];
+    let read = errors.read_at(&mut said, 0).unwrap_or_default();
+    said.truncate(read);
+    let said = String::from_utf8_lossy(&said);
+    let last = said.trim_end_matches(['\0', '\n']).lines().next_back();
+    let last = last.filter(|it| !it.is_empty());
+    let last = last.map(|it| format!(": {it}")).unwrap_or_default();
+    WhyCold::new(format!("its interpreter ended during loading{last}"))
 }
 
 fn process(mut child: Child) -> io::Result<OwnedFd> {
@@ -389,19 +345,22 @@ fn bounded_file() -> io::Result<std::fs::File> {
 )]
 fn die_with_caller(command: &mut Command) {
     let caller = std::process::id();
-    // SAFETY: only prctl and getppid are called between fork and exec, and both are
-    // async-signal-safe; nothing is allocated and no lock is taken.
+    // SAFETY: only system calls are made between fork and exec; nothing is allocated and no lock is
+    // taken.
     unsafe {
-        command.pre_exec(move || {
-            if libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) != 0 {
-                return Err(io::Error::last_os_error());
-            }
-            // The caller may have died between fork and prctl.
-            if u32::try_from(libc::getppid()) != Ok(caller) {
-                return Err(io::Error::from_raw_os_error(libc::ESRCH));
-            }
-            Ok(())
-        });
+        command.pre_exec(move || die_with(caller));
+    }
+}
+
+/// Makes this process die with its parent. Makes only system calls.
+///
+/// # Errors
+/// System errors; `ESRCH` if the parent has already ended.
+pub(crate) fn die_with(parent: u32) -> io::Result<()> {
+    set_parent_process_death_signal(Some(Signal::KILL))?;
+    match getppid() {
+        Some(pid) if pid.as_raw_nonzero().get().cast_unsigned() == parent => Ok(()),
+        _ => Err(rustix::io::Errno::SRCH.into()),
     }
 }
 
@@ -427,35 +386,16 @@ fn check_environment(entry: &Entry, environment: &[(OsString, OsString)]) -> Res
     Ok(())
 }
 
-/// Returns the variables that are the same for each job, sorted.
-fn plain(environment: &[(OsString, OsString)]) -> Vec<&(OsString, OsString)> {
+/// Returns the variables that are the same for each job.
+fn plain(environment: &[(OsString, OsString)]) -> BTreeSet<&(OsString, OsString)> {
     let of_job = |name: &OsStr| {
         let name = name.as_encoded_bytes();
         name.starts_with(b"ASAM_QC_FRAMEWORK_")
             || name.starts_with(b"QCBUS_")
             || [&b"PWD"[..], b"OLDPWD", b"SHLVL", b"_", b"TMPDIR"].contains(&name)
     };
-    let mut plain: Vec<_> = environment
-        .iter()
-        .filter(|(name, _)| !of_job(name))
-        .collect();
-    plain.sort();
-    plain
-}
-
-fn difference<'e>(
-    ours: &[&'e (OsString, OsString)],
-    theirs: &[&'e (OsString, OsString)],
-) -> Option<&'e OsStr> {
-    let missing = |from: &[&'e (OsString, OsString)], in_: &[&(OsString, OsString)]| {
-        from.iter()
-            .find(|it| !in_.contains(*it))
-            .map(|(name, _)| name.as_os_str())
-    };
-    if ours == theirs {
-        return None;
-    }
-    missing(theirs, ours).or_else(|| missing(ours, theirs))
+    let all = environment.iter();
+    all.filter(|(name, _)| !of_job(name)).collect()
 }
 
 /// Rejects a directory with importable files: `python -m` searches it first.

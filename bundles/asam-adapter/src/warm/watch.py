@@ -32,7 +32,7 @@ for name in ("resource", "select"):
 _, KIND, TARGET, MEMORY = sys.argv
 VARYING = ("ASAM_QC_FRAMEWORK_", "QCBUS_")
 SHELLS = ("PWD", "OLDPWD", "SHLVL", "_", "TMPDIR")
-LIMITS = (resource.RLIMIT_DATA, resource.RLIMIT_CPU, resource.RLIMIT_FSIZE)
+LIMITS = (resource.RLIMIT_DATA, resource.RLIMIT_FSIZE)
 STANDARD = os.path.dirname(os.__file__) + os.sep
 
 

@@ -58,7 +58,7 @@ fn request(run: &Run<'_>, arguments: &[OsString]) -> Vec<u8> {
     let number = |it: Option<u64>| it.map(|it| it.to_string()).unwrap_or_default().into_bytes();
     let limits = &run.limits;
     let mut fields = vec![run.cwd.as_os_str().as_bytes().to_vec()];
-    fields.extend([limits.memory, limits.cpu_seconds, limits.file_size].map(number));
+    fields.extend([limits.memory, limits.file_size].map(number));
     fields.push(arguments.len().to_string().into_bytes());
     fields.extend(arguments.iter().map(|it| it.as_bytes().to_vec()));
     // A shell sets this variable in the same way.
