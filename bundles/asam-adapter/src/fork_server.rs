@@ -169,7 +169,7 @@ fn load(
     let path = environment.iter().find(|(name, _)| name == "PATH");
     let path = path.map(|(_, path)| path.clone()).unwrap_or_default();
     let command = without_going_where_it_is(run.command, run.directory);
-    let entry = recognise(command, &path, Path::new("/"))?;
+    let entry = recognise(command, &path)?;
     Server::start(&entry, environment, limits, PATIENCE)
 }
 

@@ -572,7 +572,7 @@ fn slow_import_times_out() {
         "import time\ntime.sleep(600)\ndef main():\n    pass\n",
     );
     let environment = shop.environment(&[]);
-    let entry = recognise("slow", &environment[0].1, &shop.path("run")).unwrap();
+    let entry = recognise("slow", &environment[0].1).unwrap();
     let patience = Duration::from_millis(300);
     let why = Server::start(&entry, &environment, &Limits::default(), patience).unwrap_err();
     assert_eq!(why.to_string(), "it was not loaded within 300ms");

@@ -20,17 +20,16 @@ pub struct Entry {
     pub(super) options: Vec<String>,
     pub(super) program: Program,
     pub(super) arguments: Vec<Word>,
-    /// The recognised command. `path` and `cwd` are the search path and directory used for it.
+    /// The recognised command, and the search path used for it.
     command: String,
     pub(super) path: OsString,
-    cwd: PathBuf,
 }
 
 impl Entry {
     /// Checks whether the command still runs the same program. A new program may come first on the
     /// PATH.
     pub(super) fn is_current(&self) -> bool {
-        recognise(&self.command, &self.path, &self.cwd).as_ref() == Ok(self)
+        recognise(&self.command, &self.path).as_ref() == Ok(self)
     }
 }
 
@@ -48,13 +47,13 @@ type Parts = (PathBuf, Vec<String>, Program, Vec<Word>);
 /// Number of bytes of a script that are read for its first lines.
 const HEAD: u64 = 4096;
 
-/// Reads a command as a shell would in `cwd`, with programs in the directories of `path`.
+/// Reads a command as a shell would, with programs in the directories of `path`.
 ///
 /// # Errors
 ///
 /// The reason why the command must be run plainly: it needs a shell, its program is not Python, or
 /// the program depends on the directory of each job.
-pub fn recognise(command: &str, path: &OsStr, cwd: &Path) -> Result<Entry, WhyCold> {
+pub fn recognise(command: &str, path: &OsStr) -> Result<Entry, WhyCold> {
     let mut words = words(command)?;
     let arguments = words.split_off(1);
     let Some(first) = words.first().filter(|it| !it.is_builtin()) else {
@@ -63,7 +62,7 @@ pub fn recognise(command: &str, path: &OsStr, cwd: &Path) -> Result<Entry, WhyCo
         ));
     };
     let name = first.fixed().unwrap_or_default();
-    let program = find(&name, path, cwd)?;
+    let program = find(&name, path)?;
     let head = head(&program)?;
     let (interpreter, options, program, arguments) = if head.starts_with(b"\x7fELF") {
         by_interpreter(program, arguments)?
@@ -79,18 +78,16 @@ pub fn recognise(command: &str, path: &OsStr, cwd: &Path) -> Result<Entry, WhyCo
         arguments,
         command: command.to_owned(),
         path: path.to_owned(),
-        cwd: cwd.to_owned(),
     })
 }
 
 /// Finds the file that a shell runs for a name.
-fn find(name: &str, path: &OsStr, cwd: &Path) -> Result<PathBuf, WhyCold> {
+fn find(name: &str, path: &OsStr) -> Result<PathBuf, WhyCold> {
     if name.contains('/') {
         let program = PathBuf::from(name);
         if !program.is_absolute() {
             return Err(WhyCold::new(format!(
-                "`{name}` depends on the working directory ({}); use its absolute path",
-                cwd.display()
+                "`{name}` depends on the working directory; use its absolute path"
             )));
         }
         return runnable(&program)
@@ -230,7 +227,7 @@ fn shebang(program: &Path, head: &[u8], path: &OsStr) -> Result<(PathBuf, Vec<St
         let name =
             argument.filter(|it| it.starts_with("python") && !it.contains([' ', '\t', '/', '=']));
         let name = name.ok_or_else(not_python)?;
-        return Ok((find(name, path, Path::new("/"))?, Vec::new()));
+        return Ok((find(name, path)?, Vec::new()));
     }
     let options = argument.map(|it| option(it.to_owned())).transpose()?;
     Ok((PathBuf::from(interpreter), options.into_iter().collect()))

@@ -105,7 +105,7 @@ impl Workshop {
 
     pub fn start(&self, command: &str) -> Result<Server, WhyCold> {
         let environment = self.environment(&[]);
-        let entry = recognise(command, &environment[0].1, &self.path("run"))?;
+        let entry = recognise(command, &environment[0].1)?;
         Server::start(&entry, &environment, &Limits::default(), WATCHDOG)
     }
 
