@@ -76,15 +76,10 @@ pub(crate) fn of<'d>(subject: &Subject<'d>) -> Result<Files<'d>, String> {
 /// Returns the path that a packed file would have if it were unpacked. ASAM's modules cannot read
 /// packed files. They would report that a valid packed file is not XML.
 fn unpacked(path: &Path) -> Option<PathBuf> {
-    let name = path.file_name()?.to_str().filter(|_| is_packed(path))?;
-    let stem = name.split_at_checked(name.len().checked_sub(".xodrz".len())?);
-    let by_letter = stem.filter(|(_, end)| end.eq_ignore_ascii_case(".xodrz"));
-    let name = match by_letter {
-        Some((stem, _)) => format!("{stem}.xodr"),
-        // The name ends with `.xodr.gz`.
-        None => name.rsplit_once('.')?.0.to_owned(),
-    };
-    Some(path.with_file_name(name))
+    let suffix = Suffix::of_path(path).filter(|it| it.packed)?;
+    let name = path.file_name()?.to_str()?;
+    let stem = name.get(..name.len() - suffix.text.len())?;
+    Some(path.with_file_name(format!("{stem}.{}", suffix.kind.as_str())))
 }
 
 fn is_packed(path: &Path) -> bool {
