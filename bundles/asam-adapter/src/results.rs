@@ -188,23 +188,12 @@ impl Paths {
     }
 
     fn lead_back(&self, text: &str) -> String {
-        let mut text = text.to_owned();
-        for (from, to) in &self.pairs {
-            if text.contains(from.as_str()) {
-                text = text.replace(from.as_str(), to);
-            }
-        }
-        text
+        let pairs = self.pairs.iter();
+        pairs.fold(text.to_owned(), |text, (from, to)| text.replace(from, to))
     }
 
     fn in_place(&self, text: &mut String) {
-        if self
-            .pairs
-            .iter()
-            .any(|(from, _)| text.contains(from.as_str()))
-        {
-            *text = self.lead_back(text);
-        }
+        *text = self.lead_back(text);
     }
 
     fn issue(&self, issue: &mut Issue) {

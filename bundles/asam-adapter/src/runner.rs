@@ -149,15 +149,24 @@ impl Runner<'_> {
             room: text(prepared.room.path()),
             reports: Vec::new(),
         };
-        let result = match &request.report {
-            Some(_) if ran.fault.is_none() => {
+        let result = match (&ran.fault, &request.report) {
+            (Some(_), _) => Vec::new(),
+            (None, Some(_)) => {
                 let written = written::in_directory(&prepared.work, self.hosted.limits.output);
                 let (reports, body) = written.map_err(NotRun::Why)?;
                 ran.reports = reports;
                 body
             }
-            Some(_) => Vec::new(),
-            None => self.collect(&prepared, &mut ran),
+            (None, None) => match self.collect(&prepared) {
+                Ok((application, result)) => {
+                    ran.application = application;
+                    result
+                }
+                Err(fault) => {
+                    ran.fault = Some(fault);
+                    Vec::new()
+                }
+            },
         };
         Ok((ran, result))
     }
@@ -231,34 +240,25 @@ impl Runner<'_> {
         Some(may)
     }
 
-    /// Reads the result file. All processes of the run have ended, so the file cannot change. An
-    /// invalid result is a fault of the run.
-    fn collect(&self, prepared: &Prepared, ran: &mut Ran) -> Vec<u8> {
-        if ran.fault.is_some() {
-            return Vec::new();
-        }
+    /// Reads the result file, and returns it with the name of its section. All processes of the
+    /// run have ended, so the file cannot change.
+    ///
+    /// # Errors
+    /// An invalid result is a fault of the run.
+    fn collect(&self, prepared: &Prepared) -> Result<(Option<String>, Vec<u8>), String> {
         if let Some(changed) = prepared.staged.changed() {
             let changed = changed.display();
-            ran.fault = Some(format!(
+            return Err(format!(
                 "changed its copy of {changed}, so it checked other content"
             ));
-            return Vec::new();
         }
         for (application, result) in &prepared.sections {
             let path = prepared.directory.join(result);
-            match self.read(&path, &prepared.config) {
-                Ok(None) => {}
-                Ok(Some(bytes)) => {
-                    ran.application = Some(application.clone());
-                    return bytes;
-                }
-                Err(why) => {
-                    ran.fault = Some(why);
-                    return Vec::new();
-                }
+            if let Some(bytes) = self.read(&path, &prepared.config)? {
+                return Ok((Some(application.clone()), bytes));
             }
         }
-        Vec::new()
+        Ok((None, Vec::new()))
     }
 
     fn read(&self, path: &Path, config: &Path) -> Result<Option<Vec<u8>>, String> {
