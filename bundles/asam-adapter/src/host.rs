@@ -9,6 +9,7 @@ use qcbus_sdk::run::OwnFiles;
 use crate::bundle::bundle;
 use crate::hosted::{Asked, Hosted, parse};
 use crate::learn::learn;
+use crate::program::Program;
 use crate::runner;
 use crate::runners::Runners;
 
@@ -63,7 +64,7 @@ fn begin(
     arguments: &[OsString],
 ) -> Result<&'static qcbus_sdk::Bundle, String> {
     // The digests are taken before the first run, and each run compares them.
-    hosted.programs.iter_mut().for_each(crate::program::Program::look);
+    hosted.programs.iter_mut().for_each(Program::look);
     let name = hosted.name.clone();
     let runners = Runners::start(count, &hosted, program, arguments)
         .map_err(|error| format!("`{name}` cannot be run: {error}"))?;
