@@ -4,11 +4,12 @@
 //! parent ends. This is independent of its session and process group.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 use qcbus_bus::Process;
+pub use qcbus_confine::descendants::are_listed;
+use qcbus_confine::descendants::{bury, children_of, listed, living_below, signal};
 use qcbus_types::Launch;
-use rustix::process::{Pid, Signal, WaitOptions, kill_process, waitpid};
+use rustix::process::Signal;
 
 use crate::launches::Launches;
 
@@ -33,42 +34,10 @@ pub fn adopt() -> Strangers {
     strangers
 }
 
-/// A process as listed by the kernel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Listed {
-    parent: i32,
-    is_dead: bool,
-}
-
-/// Returns all processes.
-fn processes() -> BTreeMap<i32, Listed> {
-    let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
-    let numbers = entries.filter_map(|entry| entry.file_name().to_str()?.parse::<i32>().ok());
-    numbers
-        .filter_map(|pid| Some((pid, listed(pid)?)))
-        .collect()
-}
-
-fn listed(pid: i32) -> Option<Listed> {
-    let stat =
-        std::fs::read_to_string(Path::new("/proc").join(pid.to_string()).join("stat")).ok()?;
-    // The command is in parentheses and may contain any character. State and parent follow it.
-    let (_, rest) = stat.rsplit_once(')')?;
-    let mut fields = rest.split_whitespace();
-    let state = fields.next()?;
-    let parent = fields.next()?.parse().ok()?;
-    Some(Listed {
-        parent,
-        is_dead: matches!(state, "Z" | "X"),
-    })
-}
-
 /// Kills all descendants of a process. The caller must stop or kill the process itself immediately afterwards.
 pub fn kill_below(process: &Process) {
     // The process must not notice the loss of its children and exit with a misleading code.
-    if let Some(pid) = Pid::from_raw(process.id().cast_signed()) {
-        let _ = kill_process(pid, Signal::STOP);
-    }
+    signal(process.id().cast_signed(), Signal::STOP);
     // A repeated search finds processes that are started meanwhile. The number of attempts is
     // limited, because a hostile process may start new ones for ever.
     for _ in 0..8 {
@@ -78,25 +47,6 @@ pub fn kill_below(process: &Process) {
         }
         living.into_iter().for_each(kill);
     }
-}
-
-/// Returns the living descendants of a process. Uses the kernel's lists of children if they exist, because a search
-/// through all processes takes milliseconds. A list may miss an entry while other entries end. Such a process becomes
-/// a child of the broker when its parent ends, and is found then.
-fn living_below(root: i32) -> Vec<i32> {
-    let is_alive = |pid: &i32| listed(*pid).is_some_and(|it| !it.is_dead);
-    let mut found = BTreeSet::from([root]);
-    let mut open = vec![root];
-    while let Some(parent) = open.pop() {
-        let Some(children) = children_of(&parent.to_string()) else {
-            let all = processes();
-            let below = below(&all, root).into_iter();
-            return below.filter(|it| !all[it].is_dead).collect();
-        };
-        open.extend(children.into_iter().filter(|it| found.insert(*it)));
-    }
-    found.remove(&root);
-    found.into_iter().filter(is_alive).collect()
 }
 
 /// Checks whether a process is a descendant of another one.
@@ -111,21 +61,6 @@ pub fn is_below(pid: u32, root: u32) -> bool {
         }
     }
     false
-}
-
-fn below(all: &BTreeMap<i32, Listed>, root: i32) -> BTreeSet<i32> {
-    let mut found = BTreeSet::from([root]);
-    loop {
-        let children = all
-            .iter()
-            .filter(|(pid, it)| found.contains(&it.parent) && !found.contains(pid));
-        let children: Vec<i32> = children.map(|(pid, _)| *pid).collect();
-        if children.is_empty() {
-            found.remove(&root);
-            return found;
-        }
-        found.extend(children);
-    }
 }
 
 /// Kills and reaps descendants: children of this process that are not in `ours`. Processes left on purpose by a
@@ -162,60 +97,11 @@ pub fn sweep(
     left
 }
 
-/// Checks whether the kernel lists the children of a process.
-pub fn are_listed() -> bool {
-    let own = std::process::id().to_string();
-    Path::new("/proc/self/task")
-        .join(own)
-        .join("children")
-        .exists()
-}
-
 /// Returns all children of this process.
 fn children() -> BTreeSet<i32> {
-    children_of("self").unwrap_or_else(|| {
-        let own = std::process::id().cast_signed();
-        let all = processes().into_iter();
-        all.filter(|(_, it)| it.parent == own)
-            .map(|(pid, _)| pid)
-            .collect()
-    })
+    children_of(std::process::id().cast_signed())
 }
-
-/// Returns all children of a process, from the lists of all its threads. Returns `None` if the
-/// kernel was built without these lists.
-fn children_of(process: &str) -> Option<BTreeSet<i32>> {
-    let threads = Path::new("/proc").join(process).join("task");
-    let threads = std::fs::read_dir(threads).into_iter().flatten().flatten();
-    let lists = threads.map(|thread| std::fs::read_to_string(thread.path().join("children")));
-    let mut found = BTreeSet::new();
-    for list in lists {
-        match list {
-            Ok(list) => found.extend(
-                list.split_whitespace()
-                    .filter_map(|it| it.parse::<i32>().ok()),
-            ),
-            // The thread has ended meanwhile.
-            Err(error) if error.raw_os_error() == Some(ESRCH) => {}
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound && are_listed() => {}
-            Err(_) => return None,
-        }
-    }
-    Some(found)
-}
-
-const ESRCH: i32 = rustix::io::Errno::SRCH.raw_os_error();
 
 fn kill(pid: i32) {
-    if let Some(pid) = Pid::from_raw(pid) {
-        // The process may have ended already.
-        let _ = kill_process(pid, Signal::KILL);
-    }
-}
-
-/// Reaps an ended process. Only for descendants: other processes are reaped by the code that started them.
-fn bury(pid: i32) {
-    if let Some(pid) = Pid::from_raw(pid) {
-        let _ = waitpid(Some(pid), WaitOptions::NOHANG);
-    }
+    signal(pid, Signal::KILL);
 }

@@ -31,8 +31,6 @@ pub struct Settings {
     pub backoff: Duration,
     /// Longest pause.
     pub backoff_max: Duration,
-    /// A child that has run this long counts as healthy, and its pauses start again.
-    pub healthy_after: Duration,
     /// Maximum number of restarts within `restart_window`. Beyond it the broker gives up on a child.
     pub max_restarts: u32,
     /// See `max_restarts`.
@@ -93,7 +91,6 @@ impl Default for Settings {
             collect: Duration::from_millis(500),
             backoff: Duration::from_millis(100),
             backoff_max: Duration::from_secs(30),
-            healthy_after: Duration::from_secs(10),
             max_restarts: 20,
             restart_window: Duration::from_secs(60),
             changes_forgiven: 8,
