@@ -6,8 +6,7 @@
 //! schema_tool validate TABLES            read file names from stdin, print one verdict per line:
 //!                                        file, valid|invalid|ill-formed, row, end row of the tag, byte
 //!                                        offset of the element or attribute value, code, text
-//! schema_tool generate TABLES SEED SIZE  print a document made from the tables
-//! schema_tool load                       time and memory of reading all shipped tables
+//! schema_tool load                       time of reading all shipped tables
 //! schema_tool time TABLES FILE           megabytes per second of validation alone
 //! ```
 #![expect(
@@ -23,7 +22,7 @@ use std::time::Instant;
 
 use qcbus_document::{Attribute, Document, Node};
 use qcbus_ingest::prepare_bytes;
-use qcbus_schema::{Limits, SHIPPED, Schema, compile, generate};
+use qcbus_schema::{Limits, SHIPPED, Schema, compile};
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -31,7 +30,6 @@ fn main() -> ExitCode {
     let outcome = match words.as_slice() {
         ["compile", title, out, files @ ..] => compile_files(title, out, files),
         ["validate", tables] => validate_files(tables),
-        ["generate", tables, seed, size] => generate_one(tables, seed, size),
         ["load"] => load_all(),
         ["time", tables, file] => time(tables, file),
         _ => Err(
@@ -141,20 +139,6 @@ fn time(path: &str, file: &str) -> Result<(), String> {
     Ok(())
 }
 
-fn generate_one(path: &str, seed: &str, size: &str) -> Result<(), String> {
-    let schema = tables(path)?;
-    let seed = seed.parse().map_err(|_| "the seed is no number")?;
-    let size = size.parse().map_err(|_| "the size is no number")?;
-    let root = schema
-        .roots
-        .iter()
-        .position(|root| schema.names.text(root.name).starts_with("Open"));
-    let text = generate::document(&schema, root.unwrap_or(0), seed, size)
-        .ok_or("no document was found")?;
-    print!("{text}");
-    Ok(())
-}
-
 /// Returns the seconds that this process spent on a CPU (Linux). Other processes on the machine do
 /// not count.
 fn on_cpu() -> f64 {
@@ -165,23 +149,19 @@ fn on_cpu() -> f64 {
 
 fn load_all() -> Result<(), String> {
     let mut best = f64::INFINITY;
-    let mut bytes = 0;
     for _ in 0..10 {
         let started = on_cpu();
         let read = SHIPPED
             .iter()
             .map(|one| Schema::from_notation(one.notation));
-        let schemas = read
-            .collect::<Result<Vec<_>, _>>()
+        read.collect::<Result<Vec<_>, _>>()
             .map_err(|error| error.to_string())?;
         best = best.min(on_cpu() - started);
-        bytes = schemas.iter().map(Schema::heap_bytes).sum();
     }
     println!(
-        "{} tables in {:.2} ms on the CPU, {:.2} MB",
+        "{} tables in {:.2} ms on the CPU",
         SHIPPED.len(),
-        best * 1e3,
-        bytes as f64 / 1e6
+        best * 1e3
     );
     Ok(())
 }

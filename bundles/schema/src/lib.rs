@@ -9,8 +9,6 @@ mod check;
 mod compile;
 mod constraint;
 mod defects;
-#[doc(hidden)]
-pub mod generate;
 mod later;
 mod model;
 mod names;
@@ -19,6 +17,8 @@ mod recursion;
 mod regex;
 mod similar;
 mod simple;
+#[cfg(test)]
+mod tests;
 mod typing;
 mod user_schemas;
 mod validate;

@@ -9,8 +9,6 @@ mod children;
 mod frame;
 mod keys;
 mod limit;
-#[cfg(test)]
-mod linear;
 mod memo;
 mod names;
 mod overlay;

@@ -2,11 +2,11 @@
 //! and do not measure time.
 
 use std::fmt::Write as _;
-use std::path::Path;
 
-use qcbus_document::{Document, FileKind};
+use qcbus_document::FileKind;
 
-use crate::generate::Dice;
+use super::generate::Dice;
+use super::{image, open};
 use crate::work::counted;
 use crate::{Limits, SHIPPED, Schema, compile};
 
@@ -22,15 +22,10 @@ const WORDING: u64 = 100_000;
 /// Maximum growth of the steps for a doubled document. Quadratic time would give four.
 const GROWTH: f64 = 2.3;
 
-fn image(name: &str, text: &str) -> Vec<u8> {
-    let bytes = text.as_bytes().to_vec();
-    qcbus_ingest::prepare_bytes(Path::new(name), bytes, &qcbus_ingest::Limits::default()).build()
-}
-
 /// Returns the steps for a document, and the number of its elements and attributes.
 fn work(schema: &Schema, text: &str) -> (u64, u64) {
     let image = image("a.xodr", text);
-    let document = Document::open(&image).expect("an image of our own");
+    let document = open(&image);
     assert!(
         document.is_well_formed(),
         "{}",
@@ -74,7 +69,7 @@ fn try_compiled(body: &str) -> Result<Schema, String> {
     let text =
         format!("<xs:schema xmlns:xs=\"http://www.w3.org/2001/XMLSchema\">{body}</xs:schema>");
     let image = image("a.xsd", &text);
-    let document = Document::open(&image).expect("an image of our own");
+    let document = open(&image);
     compile("made", &[document]).map_err(|error| error.to_string())
 }
 
