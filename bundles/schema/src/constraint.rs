@@ -118,16 +118,4 @@ impl Constraints {
             .get(usize::from(at))
             .map_or(&[], |branch| &branch.hits)
     }
-
-    pub(crate) fn heap_bytes(&self) -> usize {
-        let steps: usize = self
-            .list
-            .iter()
-            .flat_map(|one| &one.paths)
-            .map(Vec::len)
-            .sum();
-        self.list.len() * size_of::<Constraint>()
-            + self.tree.len() * size_of::<Branch>()
-            + steps * 16
-    }
 }

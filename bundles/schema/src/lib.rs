@@ -5,16 +5,18 @@
 //! schemas. They use an own notation, which the compiler writes (`qcbus schema compile`).
 
 mod assertion;
+mod automaton;
 mod check;
 mod compile;
 mod constraint;
 mod defects;
+mod edition;
 mod later;
 mod model;
 mod names;
 mod notation;
+mod pattern;
 mod recursion;
-mod regex;
 mod similar;
 mod simple;
 #[cfg(test)]
@@ -31,10 +33,11 @@ pub use check::{Checked, Fact, Options, Outcome, Override, Severity, Source, che
 pub use compile::{CompileError, Problem, compile};
 #[doc(hidden)]
 pub use defects::known_conditions;
+pub use edition::Edition;
 pub use later::{Later, Thing};
-pub use model::{Edition, Schema};
+pub use model::Schema;
 pub use notation::NotationError;
-pub use regex::{Pattern, PatternError};
+pub use pattern::{Pattern, PatternError};
 pub use similar::closest;
 pub use simple::Expectation;
 pub use typing::{Member, Typing, ValueType, came_with};

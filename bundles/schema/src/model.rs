@@ -6,17 +6,9 @@
 
 use crate::assertion::Assertion;
 use crate::constraint::Constraints;
+use crate::edition::Edition;
 use crate::names::{NameId, Names};
 use crate::simple::SimpleType;
-
-/// Edition of XML Schema that the tables follow where the two editions differ.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Edition {
-    /// XML Schema 1.0.
-    V1_0,
-    /// XML Schema 1.1. The compiler chooses it if the schema has a 1.1 construct.
-    V1_1,
-}
 
 /// One compiled schema.
 #[derive(Clone, Debug)]
@@ -94,14 +86,6 @@ impl Schema {
         }
         homes
     }
-
-    /// Returns the approximate heap size of the tables in bytes.
-    pub fn heap_bytes(&self) -> usize {
-        let complex: usize = self.complex.iter().map(ComplexType::heap_bytes).sum();
-        let simple: usize = self.simple.iter().map(SimpleType::heap_bytes).sum();
-        let roots: usize = self.roots.iter().map(ElementDecl::heap_bytes).sum();
-        complex + simple + roots + self.names.heap_bytes()
-    }
 }
 
 /// The type of an element.
@@ -134,22 +118,6 @@ pub struct ComplexType {
     pub content: Content,
     /// Conditions over the whole element (XSD 1.1).
     pub assertions: Vec<Assertion>,
-}
-
-impl ComplexType {
-    fn heap_bytes(&self) -> usize {
-        let fixed = size_of::<Self>() + self.attributes.len() * size_of::<AttributeUse>();
-        let content = match &self.content {
-            Content::Empty | Content::Text(_) => 0,
-            Content::Children(model) => model.heap_bytes(),
-            Content::All(all) => all
-                .members
-                .iter()
-                .map(ElementDecl::heap_bytes)
-                .sum::<usize>(),
-        };
-        fixed + content + self.assertions.len() * 256
-    }
 }
 
 /// One attribute of a complex type.
@@ -211,16 +179,6 @@ impl Model {
             .get(first..first + usize::from(row.count))
             .unwrap_or(&[])
     }
-
-    fn heap_bytes(&self) -> usize {
-        let tables = self.states.len() * size_of::<State>() + self.edges.len() * size_of::<Edge>();
-        tables
-            + self
-                .children
-                .iter()
-                .map(ElementDecl::heap_bytes)
-                .sum::<usize>()
-    }
 }
 
 /// One state of a [`Model`].
@@ -271,13 +229,6 @@ pub struct ElementDecl {
     pub alternatives: Vec<Alternative>,
     /// Keys and references with this element as their scope.
     pub constraints: Option<Box<Constraints>>,
-}
-
-impl ElementDecl {
-    fn heap_bytes(&self) -> usize {
-        let extra = self.constraints.as_ref().map_or(0, |all| all.heap_bytes());
-        size_of::<Self>() + extra + self.alternatives.len() * 96
-    }
 }
 
 /// A type chosen by a test on the element's attributes.

@@ -41,9 +41,4 @@ impl Names {
     pub fn text(&self, id: NameId) -> &str {
         self.texts.get(usize::from(id.0)).map_or("", |text| text)
     }
-
-    /// Returns the approximate heap size in bytes.
-    pub(crate) fn heap_bytes(&self) -> usize {
-        self.texts.iter().map(|text| 2 * text.len() + 56).sum()
-    }
 }

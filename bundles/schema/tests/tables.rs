@@ -1,5 +1,4 @@
-//! Tests of the shipped tables: they are valid, small, fast to read, and the same after a round
-//! trip.
+//! Tests of the shipped tables: they are valid, and the same after a round trip.
 
 mod support;
 
@@ -15,16 +14,6 @@ fn every_table_is_read_and_written_back_unchanged() {
             .unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(schema.to_notation(), shipped.notation, "{name}");
     }
-}
-
-#[test]
-fn all_tables_together_stay_below_ten_megabytes() {
-    let bytes: usize = SHIPPED
-        .iter()
-        .map(|one| one.schema().expect("sound").heap_bytes())
-        .sum();
-    assert!(bytes > 100_000, "the counted size is too small: {bytes}");
-    assert!(bytes < 10_000_000, "{bytes}");
 }
 
 #[test]

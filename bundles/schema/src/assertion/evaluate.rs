@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use qcbus_document::{Document, Node};
 
 use super::{Assertion, Expr, Path, PathStep, Relation};
-use crate::model::Edition;
+use crate::edition::Edition;
 use crate::names::NameId;
 use crate::simple::{XML_SPACE, float_value, is_float};
 use crate::work;

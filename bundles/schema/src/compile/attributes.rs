@@ -4,7 +4,7 @@ use qcbus_document::Node;
 
 use super::Compiler;
 use super::components::Kind;
-use super::error::{CompileError, Problem, only_attributes, parts, required};
+use super::error::{CompileError, Problem, only_attributes, parts, refuse, required};
 use crate::model::AttributeUse;
 use crate::simple::{Builtin, Variety};
 
@@ -30,7 +30,7 @@ impl<'d> Compiler<'d, '_> {
             });
         }
         if !node.is("attribute") {
-            return Err(CompileError::at(node, Problem::Unsupported));
+            return refuse(node, Problem::Unsupported);
         }
         let declared = self.attribute(node)?;
         all.retain(|have| have.name != declared.0.name);
@@ -47,7 +47,7 @@ impl<'d> Compiler<'d, '_> {
             &["name", "ref", "type", "use", "fixed", "default", "form"],
         )?;
         if node.attr("form").is_some_and(|form| form != "unqualified") {
-            return Err(CompileError::at(node, Problem::Attribute("form".into())));
+            return refuse(node, Problem::Attribute("form".into()));
         }
         let declaration = match node.attr("ref") {
             Some(name) => self
@@ -60,10 +60,7 @@ impl<'d> Compiler<'d, '_> {
             Some("required") => (true, false),
             Some("prohibited") => (false, true),
             Some(other) => {
-                return Err(CompileError::at(
-                    node,
-                    Problem::Value("use", other.to_owned()),
-                ));
+                return refuse(node, Problem::Value("use", other.to_owned()));
             }
         };
         let name = self.name(declaration, required(declaration, "name")?)?;
@@ -89,10 +86,10 @@ impl<'d> Compiler<'d, '_> {
             (Some(name), None) => self.simple_named(node, name),
             (None, Some(inner)) if inner.is("simpleType") => self.simple_of(inner),
             (None, None) => self.builtin(node, Builtin::AnySimple.name()),
-            _ => Err(CompileError::at(
+            _ => refuse(
                 node,
                 Problem::Invalid("an attribute must have exactly one type"),
-            )),
+            ),
         }
     }
 
@@ -109,10 +106,7 @@ impl<'d> Compiler<'d, '_> {
             let ty = &self.schema.simple[attribute.value as usize];
             let comparable = matches!(ty.variety, Variety::Atomic(_));
             if !comparable || !ty.accepts(fixed, &self.schema) {
-                return Err(CompileError::at(
-                    node,
-                    Problem::Value("fixed", fixed.to_string()),
-                ));
+                return refuse(node, Problem::Value("fixed", fixed.to_string()));
             }
         }
         Ok(())

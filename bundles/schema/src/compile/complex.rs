@@ -7,7 +7,7 @@ use qcbus_document::Node;
 use super::Compiler;
 use super::components::{Kind, Resolved};
 use super::content;
-use super::error::{CompileError, Problem, only_attributes, parts, required};
+use super::error::{CompileError, Problem, only_attributes, parts, refuse, required};
 use super::particle::Draft;
 use crate::assertion::Assertion;
 use crate::model::{AttributeUse, ComplexType, Content, TypeRef};
@@ -67,7 +67,7 @@ impl<'d> Compiler<'d, '_> {
             .filter(|attribute| attribute.required)
             .count();
         if body.attributes.len() > 512 {
-            return Err(CompileError::at(node, Problem::TooLarge("attributes", 512)));
+            return refuse(node, Problem::TooLarge("attributes", 512));
         }
         let ty = &mut self.schema.complex[id as usize];
         ty.required = u16::try_from(required).unwrap_or(u16::MAX);
@@ -87,7 +87,7 @@ impl<'d> Compiler<'d, '_> {
         match first.map(|first| first.name()) {
             Some(derivation @ ("simpleContent" | "complexContent")) => {
                 if members.next().is_some() {
-                    return Err(CompileError::at(node, Problem::Unsupported));
+                    return refuse(node, Problem::Unsupported);
                 }
                 let (Some(wrapper), simple) = (first, derivation == "simpleContent") else {
                     return Ok(());
@@ -111,7 +111,7 @@ impl<'d> Compiler<'d, '_> {
         only_attributes(wrapper, if simple { &[] } else { &["mixed"] })?;
         let mut steps = parts(wrapper);
         let (Some(step), None) = (steps.next(), steps.next()) else {
-            return Err(CompileError::at(wrapper, Problem::Unsupported));
+            return refuse(wrapper, Problem::Unsupported);
         };
         only_attributes(step, &["base"])?;
         let base = required(step, "base")?;
@@ -123,7 +123,7 @@ impl<'d> Compiler<'d, '_> {
                 body.draft = Draft::default();
                 body.mixed = false;
             }
-            _ => return Err(CompileError::at(step, Problem::Unsupported)),
+            _ => return refuse(step, Problem::Unsupported),
         }
         body.mixed |= flag(wrapper, "mixed")?.unwrap_or(false);
         self.own(parts(step), body)
@@ -144,22 +144,19 @@ impl<'d> Compiler<'d, '_> {
             return if body.text.is_some() == simple {
                 Ok(())
             } else {
-                Err(CompileError::at(
+                refuse(
                     step,
                     Problem::Invalid(
                         "the base type must have the same kind of content (simple or complex)",
                     ),
-                ))
+                )
             };
         }
         match self.type_ref(step, base)? {
             TypeRef::Simple(id) if simple => body.text = Some(id),
             TypeRef::Any if !simple => {}
             _ => {
-                return Err(CompileError::at(
-                    step,
-                    Problem::Value("base", base.to_owned()),
-                ));
+                return refuse(step, Problem::Value("base", base.to_owned()));
             }
         }
         Ok(())
@@ -188,7 +185,7 @@ impl<'d> Compiler<'d, '_> {
                     body.assertions
                         .push(test.map_err(|error| CompileError::at(member, error))?);
                 }
-                _ => return Err(CompileError::at(member, Problem::Unsupported)),
+                _ => return refuse(member, Problem::Unsupported),
             }
         }
         Ok(())
@@ -214,9 +211,6 @@ pub(super) fn flag(node: Node<'_>, name: &'static str) -> Result<Option<bool>, C
         None => Ok(None),
         Some("true" | "1") => Ok(Some(true)),
         Some("false" | "0") => Ok(Some(false)),
-        Some(other) => Err(CompileError::at(
-            node,
-            Problem::Value(name, other.to_owned()),
-        )),
+        Some(other) => refuse(node, Problem::Value(name, other.to_owned())),
     }
 }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use qcbus_document::{Document, Node};
 
-use super::error::{CompileError, Problem, only_attributes, parts, required};
+use super::error::{CompileError, Problem, only_attributes, parts, refuse, required};
 
 const XSD: &str = "http://www.w3.org/2001/XMLSchema";
 
@@ -79,10 +79,10 @@ impl<'d> Components<'d> {
         )?;
         if let Some(namespace) = root.attr("targetNamespace") {
             if self.namespace.is_some_and(|have| have != namespace) {
-                return Err(CompileError::at(
+                return refuse(
                     root,
                     Problem::Value("targetNamespace", namespace.to_owned()),
-                ));
+                );
             }
             self.namespace = Some(namespace);
         }
@@ -106,7 +106,7 @@ impl<'d> Components<'d> {
             _ => false,
         };
         if other || self.found.insert((kind, name), node).is_some() {
-            return Err(CompileError::at(node, Problem::Twice(name.to_owned())));
+            return refuse(node, Problem::Twice(name.to_owned()));
         }
         self.order.push(node);
         Ok(())
@@ -129,10 +129,7 @@ impl<'d> Components<'d> {
         name: &'d str,
     ) -> Result<Node<'d>, CompileError> {
         let Resolved::Own(local) = self.resolve(from, name)? else {
-            return Err(CompileError::at(
-                from,
-                Problem::Missing(what, name.to_owned()),
-            ));
+            return refuse(from, Problem::Missing(what, name.to_owned()));
         };
         self.find(kind, local)
             .ok_or_else(|| CompileError::at(from, Problem::Missing(what, name.to_owned())))
@@ -151,10 +148,7 @@ impl<'d> Components<'d> {
             Some(XSD) => Ok(Resolved::BuiltIn(local)),
             None if prefix.is_empty() => Ok(Resolved::Own(local)),
             Some(other) if self.namespace == Some(other) => Ok(Resolved::Own(local)),
-            _ => Err(CompileError::at(
-                node,
-                Problem::Missing("namespace of", name.to_owned()),
-            )),
+            _ => refuse(node, Problem::Missing("namespace of", name.to_owned())),
         }
     }
 }
@@ -188,7 +182,7 @@ fn schema_root<'d>(document: &Document<'d>) -> Result<Node<'d>, CompileError> {
     if is_schema {
         Ok(root)
     } else {
-        Err(CompileError::at(root, Problem::NotASchema))
+        refuse(root, Problem::NotASchema)
     }
 }
 
@@ -198,10 +192,7 @@ fn include(node: Node<'_>, names: &[&str]) -> Result<(), CompileError> {
     if names.contains(&file_name(location)) {
         return Ok(());
     }
-    Err(CompileError::at(
-        node,
-        Problem::NotGiven(location.to_owned()),
-    ))
+    refuse(node, Problem::NotGiven(location.to_owned()))
 }
 
 fn file_name(path: &str) -> &str {

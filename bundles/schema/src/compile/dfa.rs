@@ -1,25 +1,26 @@
 //! Conversion of particle trees to minimal deterministic automata.
 //!
-//! Glushkov's construction gives every occurrence of a child a position and lists the positions
-//! that may follow it. The states are sets of positions. Equivalent states are merged (Moore).
+//! A content model is a regular language over children, so `regex-automata` determinizes it like a
+//! pattern: each child is a text of two bytes. Equivalent states are merged (Moore).
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
+
+use regex_syntax::hir::{Hir, Repetition};
 
 use super::particle::Particle;
+use crate::automaton::{Automaton, MAX_MIB};
 use crate::model::{Edge, ElementDecl, Model, State};
 
-const MAX_POSITIONS: usize = 4_096;
-const MAX_FOLLOWS: usize = 500_000;
-const MAX_STATES: usize = 2_048;
+const MAX_STATES: usize = 4_096;
 
 /// An exceeded limit: the limited item and the maximum number.
 pub(super) type TooLarge = (&'static str, usize);
 
 /// Builds the automaton of a content model.
 pub(super) fn build(particle: &Particle, children: Vec<ElementDecl>) -> Result<Model, TooLarge> {
-    let mut positions = Positions::default();
-    let whole = positions.add(particle)?;
-    let raw = positions.states(&whole)?;
+    let automaton = Automaton::new(&language(particle));
+    let automaton = automaton.ok_or(("MiB for the automaton of one content model", MAX_MIB))?;
+    let raw = states(&automaton, children.len())?;
     Ok(merge(&raw, children))
 }
 
@@ -30,206 +31,59 @@ enum Symbol {
     Any,
 }
 
-#[derive(Debug)]
-struct Fragment {
-    nullable: bool,
-    first: Vec<u32>,
-    last: Vec<u32>,
-}
-
-impl Fragment {
-    fn empty() -> Self {
-        Self {
-            nullable: true,
-            first: Vec::new(),
-            last: Vec::new(),
+impl Symbol {
+    fn bytes(self) -> [u8; 2] {
+        match self {
+            Symbol::Child(index) => index.to_be_bytes(),
+            // The compiler limits the number of children far below this.
+            Symbol::Any => u16::MAX.to_be_bytes(),
         }
     }
 }
 
-#[derive(Default)]
-struct Positions {
-    symbols: Vec<Symbol>,
-    follow: Vec<Vec<u32>>,
-    follows: usize,
+fn language(particle: &Particle) -> Hir {
+    match particle {
+        Particle::Child(index) => Hir::literal(Symbol::Child(*index).bytes()),
+        Particle::Any => Hir::literal(Symbol::Any.bytes()),
+        Particle::Sequence(parts) => Hir::concat(parts.iter().map(language).collect()),
+        Particle::Choice(parts) if parts.is_empty() => Hir::empty(),
+        Particle::Choice(parts) => Hir::alternation(parts.iter().map(language).collect()),
+        Particle::Repeat { what, min, max } => Hir::repetition(Repetition {
+            min: *min,
+            max: *max,
+            greedy: true,
+            sub: Box::new(language(what)),
+        }),
+    }
 }
 
-impl Positions {
-    fn add(&mut self, particle: &Particle) -> Result<Fragment, TooLarge> {
-        match particle {
-            Particle::Child(index) => self.position(Symbol::Child(*index)),
-            Particle::Any => self.position(Symbol::Any),
-            Particle::Sequence(parts) => {
-                parts.iter().try_fold(Fragment::empty(), |before, part| {
-                    let part = self.add(part)?;
-                    self.join(before, part)
-                })
-            }
-            Particle::Choice(parts) if parts.is_empty() => Ok(Fragment::empty()),
-            Particle::Choice(parts) => {
-                let mut whole = Fragment {
-                    nullable: false,
-                    first: Vec::new(),
-                    last: Vec::new(),
-                };
-                for part in parts {
-                    let part = self.add(part)?;
-                    whole.nullable |= part.nullable;
-                    whole.first.extend(part.first);
-                    whole.last.extend(part.last);
-                }
-                Ok(whole)
-            }
-            Particle::Repeat { what, min, max } => self.repeat(what, *min, *max),
-        }
-    }
-
-    fn position(&mut self, symbol: Symbol) -> Result<Fragment, TooLarge> {
-        if self.symbols.len() >= MAX_POSITIONS {
-            return Err(("positions in one content model", MAX_POSITIONS));
-        }
-        let at = u32::try_from(self.symbols.len()).unwrap_or(u32::MAX);
-        self.symbols.push(symbol);
-        self.follow.push(Vec::new());
-        Ok(Fragment {
-            nullable: false,
-            first: vec![at],
-            last: vec![at],
-        })
-    }
-
-    fn connect(&mut self, from: &[u32], to: &[u32]) -> Result<(), TooLarge> {
-        for &position in from {
-            self.follow[position as usize].extend_from_slice(to);
-        }
-        self.follows += from.len() * to.len();
-        if self.follows > MAX_FOLLOWS {
-            Err(("transitions in one content model", MAX_FOLLOWS))
-        } else {
-            Ok(())
-        }
-    }
-
-    fn join(&mut self, mut before: Fragment, after: Fragment) -> Result<Fragment, TooLarge> {
-        self.connect(&before.last, &after.first)?;
-        if before.nullable {
-            before.first.extend_from_slice(&after.first);
-        }
-        let mut last = after.last;
-        if after.nullable {
-            last.extend(before.last);
-        }
-        Ok(Fragment {
-            nullable: before.nullable && after.nullable,
-            first: before.first,
-            last,
-        })
-    }
-
-    fn repeat(
-        &mut self,
-        what: &Particle,
-        min: u32,
-        max: Option<u32>,
-    ) -> Result<Fragment, TooLarge> {
-        let mut tail = match max {
-            None => {
-                let turns = self.add(what)?;
-                self.connect(&turns.last, &turns.first)?;
-                Fragment {
-                    nullable: turns.nullable || min == 0,
-                    ..turns
-                }
-            }
-            Some(max) => {
-                let mut optional = Fragment::empty();
-                for _ in min..max {
-                    let once = self.add(what)?;
-                    optional = self.join(once, optional)?;
-                    optional.nullable = true;
-                    if optional.last.is_empty() {
-                        break; // an empty body stays empty, so further repetitions change nothing
-                    }
-                }
-                optional
-            }
-        };
-        let needed = if max.is_none() {
-            min.saturating_sub(1)
-        } else {
-            min
-        };
-        for _ in 0..needed {
-            let once = self.add(what)?;
-            if once.last.is_empty() {
-                break;
-            }
-            tail = self.join(once, tail)?;
-        }
-        Ok(tail)
-    }
-
-    /// Runs the subset construction. A named child takes precedence over a wildcard.
-    fn states(&self, whole: &Fragment) -> Result<Vec<Raw>, TooLarge> {
-        let mut known: HashMap<Vec<u32>, usize> = HashMap::new();
-        let mut sets: Vec<Vec<u32>> = vec![Vec::new()];
-        let is_last: Vec<bool> = {
-            let mut flags = vec![false; self.symbols.len()];
-            whole
-                .last
-                .iter()
-                .for_each(|&position| flags[position as usize] = true);
-            flags
-        };
-        let mut raw = Vec::new();
-        while let Some(set) = sets.get(raw.len()).cloned() {
-            let start = raw.is_empty();
-            let accepts = if start {
-                whole.nullable
-            } else {
-                set.iter().any(|&position| is_last[position as usize])
+/// Returns the states that are reachable by whole symbols, in order of first use.
+fn states(automaton: &Automaton, children: usize) -> Result<Vec<Raw>, TooLarge> {
+    let children = u16::try_from(children).unwrap_or(u16::MAX);
+    let symbols = || (0..children).map(Symbol::Child).chain([Symbol::Any]);
+    let mut order = vec![automaton.start()];
+    let mut numbers = HashMap::from([(order[0], 0)]);
+    let mut raw = Vec::new();
+    while let Some(&state) = order.get(raw.len()) {
+        let mut edges = Vec::new();
+        for symbol in symbols() {
+            let Some(to) = automaton.after(state, &symbol.bytes()) else {
+                continue;
             };
-            let next = if start {
-                self.by_symbol(&whole.first)
-            } else {
-                self.by_symbol(&self.following(&set))
-            };
-            let mut edges = Vec::with_capacity(next.len());
-            for (symbol, target) in next {
-                let fresh = sets.len();
-                let id = *known.entry(target.clone()).or_insert(fresh);
-                if id == fresh {
-                    sets.push(target);
-                }
-                edges.push((symbol, id));
+            let fresh = order.len();
+            let number = *numbers.entry(to).or_insert(fresh);
+            if number == fresh {
+                order.push(to);
             }
-            raw.push(Raw { accepts, edges });
-            if sets.len() > MAX_STATES {
-                return Err(("states in one content model", MAX_STATES));
-            }
+            edges.push((symbol, number));
         }
-        Ok(raw)
-    }
-
-    fn following(&self, set: &[u32]) -> Vec<u32> {
-        set.iter()
-            .flat_map(|&position| self.follow[position as usize].iter().copied())
-            .collect()
-    }
-
-    fn by_symbol(&self, positions: &[u32]) -> BTreeMap<Symbol, Vec<u32>> {
-        let mut next: BTreeMap<Symbol, Vec<u32>> = BTreeMap::new();
-        for &position in positions {
-            next.entry(self.symbols[position as usize])
-                .or_default()
-                .push(position);
+        let accepts = automaton.accepts(state);
+        raw.push(Raw { accepts, edges });
+        if order.len() > MAX_STATES {
+            return Err(("states in one content model", MAX_STATES));
         }
-        for set in next.values_mut() {
-            set.sort_unstable();
-            set.dedup();
-        }
-        next
     }
+    Ok(raw)
 }
 
 #[derive(Debug)]

@@ -5,7 +5,7 @@ use qcbus_document::Node;
 use super::Compiler;
 use super::complex::flag;
 use super::components::Kind;
-use super::error::{CompileError, Problem, only_attributes, parts, required};
+use super::error::{CompileError, Problem, only_attributes, parts, refuse, required};
 use crate::assertion::Assertion;
 use crate::model::{Alternative, ElementDecl, TypeRef};
 
@@ -48,7 +48,7 @@ impl<'d> Compiler<'d, '_> {
                 }
                 "alternative" => alternatives.push(self.alternative(part)?),
                 "key" | "unique" | "keyref" => constraints.push(part),
-                _ => return Err(CompileError::at(part, Problem::Unsupported)),
+                _ => return refuse(part, Problem::Unsupported),
             }
         }
         let constraints = self.constraints(node, &constraints)?;

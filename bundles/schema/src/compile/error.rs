@@ -3,7 +3,7 @@
 use qcbus_document::{Node, Position};
 
 use crate::assertion::XPathProblem;
-use crate::regex::PatternError;
+use crate::pattern::PatternError;
 
 /// Reason and position of a compile error.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -164,13 +164,18 @@ impl CompileError {
     }
 }
 
+/// Returns the error at a construct as a result.
+pub(crate) fn refuse<T>(node: Node<'_>, problem: impl Into<Problem>) -> Result<T, CompileError> {
+    Err(CompileError::at(node, problem))
+}
+
 /// Checks that a construct has only the listed attributes, or foreign ones with a prefix.
 pub(crate) fn only_attributes(node: Node<'_>, known: &[&str]) -> Result<(), CompileError> {
     for attribute in node.attributes() {
         let name = attribute.name();
         let foreign = name.contains(':') && !name.starts_with("vc:");
         if name != "id" && !foreign && name != "xmlns" && !known.contains(&name) {
-            return Err(CompileError::at(node, Problem::Attribute(name.to_owned())));
+            return refuse(node, Problem::Attribute(name.to_owned()));
         }
     }
     Ok(())

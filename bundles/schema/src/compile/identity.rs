@@ -3,7 +3,7 @@
 use qcbus_document::Node;
 
 use super::Compiler;
-use super::error::{CompileError, Problem, only_attributes, parts, required};
+use super::error::{CompileError, Problem, only_attributes, parts, refuse, required};
 use crate::constraint::{Constraint, ConstraintKind, Constraints, Step};
 
 impl<'d> Compiler<'d, '_> {
@@ -49,10 +49,10 @@ impl<'d> Compiler<'d, '_> {
         let mut members = parts(node);
         let (Some(selector), Some(field), None) = (members.next(), members.next(), members.next())
         else {
-            return Err(CompileError::at(
+            return refuse(
                 node,
                 Problem::Invalid("only one selector and one field are supported"),
-            ));
+            );
         };
         let paths = self.selector(selector)?;
         let field = self.field(field)?;
@@ -76,10 +76,7 @@ impl<'d> Compiler<'d, '_> {
                     "*" => steps.push(Step::Any),
                     name if is_step(name) => steps.push(Step::Child(self.name(node, local(name))?)),
                     _ => {
-                        return Err(CompileError::at(
-                            node,
-                            Problem::Value("xpath", text.to_owned()),
-                        ));
+                        return refuse(node, Problem::Value("xpath", text.to_owned()));
                     }
                 }
             }
@@ -93,10 +90,7 @@ impl<'d> Compiler<'d, '_> {
         let text = required(node, "xpath")?.trim();
         match text.strip_prefix('@') {
             Some(name) if node.is("field") && is_step(name) => self.name(node, name),
-            _ => Err(CompileError::at(
-                node,
-                Problem::Value("xpath", text.to_owned()),
-            )),
+            _ => refuse(node, Problem::Value("xpath", text.to_owned())),
         }
     }
 }

@@ -20,8 +20,10 @@ use qcbus_document::{Document, Node};
 
 pub use error::{CompileError, Problem};
 
-use crate::model::{Edition, Schema, TypeRef};
+use crate::edition::Edition;
+use crate::model::{Schema, TypeRef};
 use components::{Components, Kind};
+use error::refuse;
 
 /// Compiles a set of XSD documents that belong together (a schema and its includes).
 ///
@@ -106,7 +108,7 @@ impl<'d, 'c> Compiler<'d, 'c> {
         inner: impl FnOnce(&mut Self) -> Result<T, CompileError>,
     ) -> Result<T, CompileError> {
         if self.depth >= MAX_DEPTH {
-            return Err(CompileError::at(node, Problem::TooDeep));
+            return refuse(node, Problem::TooDeep);
         }
         self.depth += 1;
         let result = inner(self);
@@ -135,10 +137,7 @@ impl<'d, 'c> Compiler<'d, 'c> {
                     return self.simple_of(found).map(TypeRef::Simple);
                 }
                 let Some(found) = self.components.find(Kind::Complex, local) else {
-                    return Err(CompileError::at(
-                        node,
-                        Problem::Missing("type", local.to_owned()),
-                    ));
+                    return refuse(node, Problem::Missing("type", local.to_owned()));
                 };
                 self.complex_of(found).map(TypeRef::Complex)
             }

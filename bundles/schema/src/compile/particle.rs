@@ -4,7 +4,7 @@ use qcbus_document::Node;
 
 use super::Compiler;
 use super::components::Kind;
-use super::error::{CompileError, Problem, only_attributes, parts, required};
+use super::error::{CompileError, Problem, only_attributes, parts, refuse, required};
 use crate::model::ElementDecl;
 
 /// A content model before it becomes an automaton.
@@ -54,7 +54,7 @@ impl<'d> Compiler<'d, '_> {
     ) -> Result<(), CompileError> {
         if let Some(all) = self.top_level_all(node, draft)? {
             if draft.particle.is_some() || draft.all.is_some() {
-                return Err(CompileError::at(node, Problem::Unsupported));
+                return refuse(node, Problem::Unsupported);
             }
             draft.all = Some(all);
             return Ok(());
@@ -63,7 +63,7 @@ impl<'d> Compiler<'d, '_> {
             return Ok(());
         };
         if draft.all.is_some() {
-            return Err(CompileError::at(node, Problem::Unsupported));
+            return refuse(node, Problem::Unsupported);
         }
         draft.particle = Some(match draft.particle.take() {
             Some(before) => Particle::Sequence(vec![before, own]),
@@ -88,7 +88,7 @@ impl<'d> Compiler<'d, '_> {
                 _ => return Ok(None),
             }
             if occurs(node)? != (1, Some(1)) {
-                return Err(CompileError::at(node, Problem::Unsupported));
+                return refuse(node, Problem::Unsupported);
             }
         }
         if !all.is("all") {
@@ -98,14 +98,14 @@ impl<'d> Compiler<'d, '_> {
         let optional = match occurs(all)? {
             (1, Some(1)) => false,
             (0, Some(1)) => true,
-            _ => return Err(CompileError::at(all, Problem::Unsupported)),
+            _ => return refuse(all, Problem::Unsupported),
         };
         let mut members = Vec::new();
         for part in parts(all) {
             members.push(self.all_member(part, draft)?);
         }
         if members.len() > 64 {
-            return Err(CompileError::at(all, Problem::TooLarge("members", 64)));
+            return refuse(all, Problem::TooLarge("members", 64));
         }
         Ok(Some(AllDraft { members, optional }))
     }
@@ -116,19 +116,16 @@ impl<'d> Compiler<'d, '_> {
         draft: &mut Draft,
     ) -> Result<(u16, bool), CompileError> {
         if !node.is("element") {
-            return Err(CompileError::at(node, Problem::Unsupported));
+            return refuse(node, Problem::Unsupported);
         }
         let required = match occurs(node)? {
             (min, Some(1)) => min > 0,
-            _ => return Err(CompileError::at(node, Problem::Unsupported)),
+            _ => return refuse(node, Problem::Unsupported),
         };
         let known = draft.children.len();
         let child = self.child(node, draft)?;
         if usize::from(child) < known {
-            return Err(CompileError::at(
-                node,
-                Problem::Invalid("an all group names a child twice"),
-            ));
+            return refuse(node, Problem::Invalid("an all group names a child twice"));
         }
         Ok((child, required))
     }
@@ -140,10 +137,7 @@ impl<'d> Compiler<'d, '_> {
     ) -> Result<Option<Particle>, CompileError> {
         draft.met += 1;
         if draft.met > MAX_PARTICLES {
-            return Err(CompileError::at(
-                node,
-                Problem::TooLarge("particles", MAX_PARTICLES),
-            ));
+            return refuse(node, Problem::TooLarge("particles", MAX_PARTICLES));
         }
         let (min, max) = occurs(node)?;
         let what = self.deeper(node, |this| this.once(node, draft))?;
@@ -177,10 +171,10 @@ impl<'d> Compiler<'d, '_> {
                     (Some(body), None) if !body.is("all") => self
                         .particle(body, draft)
                         .map(|inner| inner.unwrap_or(Particle::Sequence(Vec::new()))),
-                    _ => Err(CompileError::at(group, Problem::Unsupported)),
+                    _ => refuse(group, Problem::Unsupported),
                 }
             }
-            _ => Err(CompileError::at(node, Problem::Unsupported)),
+            _ => refuse(node, Problem::Unsupported),
         }
     }
 
@@ -207,7 +201,7 @@ impl<'d> Compiler<'d, '_> {
             let known = &draft.children[index];
             if known.ty != declared.ty || known.alternatives.len() != declared.alternatives.len() {
                 let name = self.schema.names.text(declared.name).to_owned();
-                return Err(CompileError::at(node, Problem::Inconsistent(name)));
+                return refuse(node, Problem::Inconsistent(name));
             }
             return Ok(u16::try_from(index).unwrap_or(u16::MAX));
         }
@@ -224,17 +218,11 @@ fn any(node: Node<'_>) -> Result<Particle, CompileError> {
     )?;
     if node.attr("processContents") != Some("skip") {
         let value = node.attr("processContents").unwrap_or("strict").to_owned();
-        return Err(CompileError::at(
-            node,
-            Problem::Only("processContents", value, "skip"),
-        ));
+        return refuse(node, Problem::Only("processContents", value, "skip"));
     }
     match node.attr("namespace") {
         None | Some("##any") => Ok(Particle::Any),
-        Some(other) => Err(CompileError::at(
-            node,
-            Problem::Value("namespace", other.to_owned()),
-        )),
+        Some(other) => refuse(node, Problem::Value("namespace", other.to_owned())),
     }
 }
 
@@ -257,10 +245,7 @@ pub(super) fn occurs(node: Node<'_>) -> Result<(u32, Option<u32>), CompileError>
         None => Some(1),
     };
     if max.is_some_and(|max| max < min) {
-        return Err(CompileError::at(
-            node,
-            Problem::Invalid("maxOccurs is less than minOccurs"),
-        ));
+        return refuse(node, Problem::Invalid("maxOccurs is less than minOccurs"));
     }
     Ok((min, max))
 }

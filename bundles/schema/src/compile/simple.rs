@@ -5,9 +5,9 @@ use std::collections::{HashMap, HashSet};
 use qcbus_document::Node;
 
 use super::Compiler;
-use super::error::{CompileError, Problem, only_attributes, parts, required};
+use super::error::{CompileError, Problem, only_attributes, parts, refuse, required};
 use crate::model::TypeRef;
-use crate::regex::Pattern;
+use crate::pattern::Pattern;
 use crate::simple::{
     Bound, Builtin, Facets, Order, SimpleType, Variety, float_value, is_decimal, is_float,
     is_integer,
@@ -28,7 +28,7 @@ impl<'d> Compiler<'d, '_> {
     /// Returns the number of a built-in type.
     pub(super) fn builtin(&mut self, node: Node<'d>, local: &str) -> Result<u32, CompileError> {
         let Some(builtin) = Builtin::find(local) else {
-            return Err(CompileError::at(node, Problem::Builtin(local.to_owned())));
+            return refuse(node, Problem::Builtin(local.to_owned()));
         };
         if let Some(&id) = self.simple.builtins.get(&builtin) {
             return Ok(id);
@@ -44,7 +44,7 @@ impl<'d> Compiler<'d, '_> {
             return Ok(id);
         }
         if !self.simple.open.insert(node) {
-            return Err(CompileError::at(node, Problem::Circular));
+            return refuse(node, Problem::Circular);
         }
         let id = self.deeper(node, |this| this.define_simple(node))?;
         self.simple.open.remove(&node);
@@ -61,10 +61,10 @@ impl<'d> Compiler<'d, '_> {
         only_attributes(node, &["name", "final"])?;
         let mut bodies = parts(node);
         let (Some(body), None) = (bodies.next(), bodies.next()) else {
-            return Err(CompileError::at(
+            return refuse(
                 node,
                 Problem::Invalid("a simple type needs exactly one definition"),
-            ));
+            );
         };
         let plain =
             node.attr("name").is_none() && body.is("restriction") && parts(body).next().is_none();
@@ -77,7 +77,7 @@ impl<'d> Compiler<'d, '_> {
             "restriction" => self.restriction(body)?,
             "union" => self.union(body)?,
             "list" => self.list(body)?,
-            _ => return Err(CompileError::at(body, Problem::Unsupported)),
+            _ => return refuse(body, Problem::Unsupported),
         };
         defined.name = node.attr("name").map(Into::into);
         Ok(self.push_simple(defined))
@@ -87,10 +87,7 @@ impl<'d> Compiler<'d, '_> {
     pub(super) fn simple_named(&mut self, node: Node<'d>, name: &str) -> Result<u32, CompileError> {
         match self.type_ref(node, name)? {
             TypeRef::Simple(id) => Ok(id),
-            _ => Err(CompileError::at(
-                node,
-                Problem::Missing("simple type", name.to_owned()),
-            )),
+            _ => refuse(node, Problem::Missing("simple type", name.to_owned())),
         }
     }
 
@@ -104,10 +101,10 @@ impl<'d> Compiler<'d, '_> {
             members.push(self.anonymous(part)?);
         }
         if members.is_empty() {
-            return Err(CompileError::at(
+            return refuse(
                 node,
                 Problem::Invalid("a union needs at least one member type"),
-            ));
+            );
         }
         Ok(SimpleType {
             name: None,
@@ -122,10 +119,7 @@ impl<'d> Compiler<'d, '_> {
             (Some(name), None) => self.simple_named(node, name)?,
             (None, Some(part)) => self.anonymous(part)?,
             _ => {
-                return Err(CompileError::at(
-                    node,
-                    Problem::Invalid("a list needs exactly one item type"),
-                ));
+                return refuse(node, Problem::Invalid("a list needs exactly one item type"));
             }
         };
         Ok(SimpleType {
@@ -139,7 +133,7 @@ impl<'d> Compiler<'d, '_> {
         if node.is("simpleType") {
             self.simple_of(node)
         } else {
-            Err(CompileError::at(node, Problem::Unsupported))
+            refuse(node, Problem::Unsupported)
         }
     }
 
@@ -150,10 +144,10 @@ impl<'d> Compiler<'d, '_> {
             (Some(name), None) => self.simple_named(node, name)?,
             (None, Some(inner)) => self.anonymous(inner)?,
             _ => {
-                return Err(CompileError::at(
+                return refuse(
                     node,
                     Problem::Invalid("a restriction needs exactly one base"),
-                ));
+                );
             }
         };
         let mut simple = self.schema.simple[base as usize].clone();
@@ -198,10 +192,7 @@ fn read_facet(node: Node<'_>, base: &SimpleType, own: &mut Own) -> Result<(), Co
     let unsupported = || CompileError::at(node, Problem::Unsupported);
     match node.name() {
         "enumeration" if own.values.len() >= MAX_VALUES => {
-            return Err(CompileError::at(
-                node,
-                Problem::TooLarge("values", MAX_VALUES),
-            ));
+            return refuse(node, Problem::TooLarge("values", MAX_VALUES));
         }
         "enumeration" => own.values.push(value.into()),
         "pattern" => {
@@ -245,7 +236,7 @@ fn read_digits(
     let decimal =
         matches!(base.variety, Variety::Atomic(builtin) if builtin.order() == Order::Decimal);
     if !decimal {
-        return Err(CompileError::at(node, Problem::Unsupported));
+        return refuse(node, Problem::Unsupported);
     }
     let count = Some(count(node, value)?);
     if node.is("totalDigits") {
@@ -261,11 +252,11 @@ fn bound(node: Node<'_>, base: &SimpleType, text: &str) -> Result<Bound, Compile
         Variety::Atomic(builtin) => builtin.order(),
         _ => Order::Text,
     };
-    let edition = crate::model::Edition::V1_0;
+    let edition = crate::edition::Edition::V1_0;
     let fits = match order {
         Order::Decimal => is_integer(text) || is_decimal(text),
         Order::Float => is_float(text, edition),
-        _ => return Err(CompileError::at(node, Problem::Unsupported)),
+        _ => return refuse(node, Problem::Unsupported),
     };
     let value = float_value(text).filter(|_| fits);
     let value =

@@ -6,12 +6,13 @@ use super::line::{Line, Parsed};
 use super::{HEADER, NotationError};
 use crate::assertion::Assertion;
 use crate::constraint::{Constraint, ConstraintKind, Constraints, Step};
+use crate::edition::Edition;
 use crate::model::{
-    AllModel, Alternative, AttributeUse, ComplexType, Content, Edge, Edition, ElementDecl, Model,
-    Schema, State, TypeRef,
+    AllModel, Alternative, AttributeUse, ComplexType, Content, Edge, ElementDecl, Model, Schema,
+    State, TypeRef,
 };
 use crate::names::{NameId, Names};
-use crate::regex::Pattern;
+use crate::pattern::Pattern;
 use crate::simple::{Bound, Builtin, Facets, SimpleType, Variety, float_value};
 
 impl Schema {

@@ -4,7 +4,8 @@ use std::fmt::{self, Write};
 
 use super::HEADER;
 use crate::constraint::{Constraint, ConstraintKind, Constraints, Step};
-use crate::model::{ComplexType, Content, Edition, ElementDecl, Model, Schema, TypeRef};
+use crate::edition::Edition;
+use crate::model::{ComplexType, Content, ElementDecl, Model, Schema, TypeRef};
 use crate::simple::{Facets, SimpleType, Variety};
 
 impl Schema {

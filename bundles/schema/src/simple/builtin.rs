@@ -1,7 +1,10 @@
 //! The built-in types and their lexical rules.
 
+use std::sync::OnceLock;
+
 use super::number::{in_bounds, is_decimal, is_float, is_integer};
-use crate::model::Edition;
+use crate::edition::Edition;
+use crate::pattern::Pattern;
 
 macro_rules! builtins {
     ($($variant:ident $name:literal)*) => {
@@ -101,67 +104,124 @@ impl Builtin {
             | Self::NormalizedString
             | Self::Token
             | Self::AnyUri => true,
-            Self::Language => is_language(text),
-            Self::NmToken => !text.is_empty() && text.chars().all(is_name_char),
-            Self::Name => is_name(text),
-            Self::NcName => is_name(text) && !text.contains(':'),
             Self::Boolean => matches!(text, "true" | "false" | "1" | "0"),
             Self::Decimal => is_decimal(text),
             Self::Float | Self::Double => is_float(text, edition),
-            Self::DateTime => super::time::is_date_time(text),
-            Self::Date => super::time::is_date(text),
-            Self::Time => super::time::is_time(text),
-            Self::HexBinary => {
-                text.len().is_multiple_of(2) && text.bytes().all(|byte| byte.is_ascii_hexdigit())
-            }
-            Self::Base64 => is_base64(text),
+            Self::DateTime | Self::Date => self.matches(text) && is_in_calendar(text),
+            _ if self.pattern().is_some() => self.matches(text),
             _ => is_integer(text) && self.range().is_none_or(|range| in_bounds(text, range)),
         }
     }
-}
 
-fn is_language(text: &str) -> bool {
-    text.split('-').enumerate().all(|(index, part)| {
-        let letters = if index == 0 {
-            part.bytes().all(|byte| byte.is_ascii_alphabetic())
-        } else {
-            part.bytes().all(|byte| byte.is_ascii_alphanumeric())
-        };
-        letters && (1..=8).contains(&part.len())
-    })
-}
-
-fn is_base64(text: &str) -> bool {
-    let mut digits = 0usize;
-    let mut padding = 0usize;
-    for byte in text.bytes() {
-        match byte {
-            b' ' => continue,
-            b'=' => padding += 1,
-            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'+' | b'/' if padding == 0 => {}
-            _ => return false,
-        }
-        digits += 1;
+    /// Returns the pattern of the values of a type that has one.
+    fn pattern(self) -> Option<&'static str> {
+        Some(match self {
+            Self::Language => "[a-zA-Z]{1,8}(-[a-zA-Z0-9]{1,8})*",
+            Self::NmToken => r"\c+",
+            Self::Name => r"\i\c*",
+            Self::NcName => r"[\i-[:]][\c-[:]]*",
+            Self::DateTime => concat!(
+                r"-?([1-9][0-9]{3,}|0([1-9][0-9]{2}|0[1-9][0-9]|00[1-9]))",
+                r"-(0[1-9]|1[0-2])-(0[1-9]|[12][0-9]|3[01])",
+                r"T(([01][0-9]|2[0-3])(:[0-5][0-9]){2}(\.[0-9]+)?|24:00:00(\.0+)?)",
+                r"(Z|[+\-]((0[0-9]|1[0-3]):[0-5][0-9]|14:00))?",
+            ),
+            Self::Date => concat!(
+                r"-?([1-9][0-9]{3,}|0([1-9][0-9]{2}|0[1-9][0-9]|00[1-9]))",
+                r"-(0[1-9]|1[0-2])-(0[1-9]|[12][0-9]|3[01])",
+                r"(Z|[+\-]((0[0-9]|1[0-3]):[0-5][0-9]|14:00))?",
+            ),
+            Self::Time => concat!(
+                r"(([01][0-9]|2[0-3])(:[0-5][0-9]){2}(\.[0-9]+)?|24:00:00(\.0+)?)",
+                r"(Z|[+\-]((0[0-9]|1[0-3]):[0-5][0-9]|14:00))?",
+            ),
+            Self::HexBinary => "([0-9a-fA-F]{2})*",
+            Self::Base64 => {
+                "(( *[A-Za-z0-9+/]){4})*( *[A-Za-z0-9+/] *[A-Za-z0-9+/]( *=| *[A-Za-z0-9+/]) *=)? *"
+            }
+            _ => return None,
+        })
     }
-    padding <= 2 && digits.is_multiple_of(4)
+
+    fn matches(self, text: &str) -> bool {
+        static COMPILED: [OnceLock<Option<Pattern>>; Builtin::ALL.len()] =
+            [const { OnceLock::new() }; Builtin::ALL.len()];
+        let slot = COMPILED.get(self as usize);
+        let compiled = slot.map(|slot| slot.get_or_init(|| Pattern::new(self.pattern()?).ok()));
+        compiled.is_some_and(|it| it.as_ref().is_some_and(|pattern| pattern.matches(text)))
+    }
 }
 
-fn is_name(text: &str) -> bool {
-    text.chars().next().is_some_and(is_name_start) && text.chars().all(is_name_char)
+/// Checks that the month of a date has the day, if the date has the form of one.
+fn is_in_calendar(text: &str) -> bool {
+    let mut parts = text.trim_start_matches('-').split('-');
+    let (Some(year), Some(month), Some(day)) = (parts.next(), parts.next(), parts.next()) else {
+        return false;
+    };
+    match (month, day.get(..2)) {
+        ("02", Some("29")) => {
+            // The calendar repeats every 400 years, so the last four digits decide.
+            let year = year
+                .len()
+                .checked_sub(4)
+                .and_then(|at| year[at..].parse().ok());
+            year.is_some_and(|year: u32| {
+                year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400))
+            })
+        }
+        ("02", Some("30" | "31")) | ("04" | "06" | "09" | "11", Some("31")) => false,
+        _ => true,
+    }
 }
 
-/// Checks for XML 1.0, fifth edition, production `NameStartChar`.
-pub(crate) fn is_name_start(c: char) -> bool {
-    matches!(c, ':' | '_' | 'A'..='Z' | 'a'..='z' | '\u{C0}'..='\u{D6}' | '\u{D8}'..='\u{F6}'
-        | '\u{F8}'..='\u{2FF}' | '\u{370}'..='\u{37D}' | '\u{37F}'..='\u{1FFF}'
-        | '\u{200C}'..='\u{200D}' | '\u{2070}'..='\u{218F}' | '\u{2C00}'..='\u{2FEF}'
-        | '\u{3001}'..='\u{D7FF}' | '\u{F900}'..='\u{FDCF}' | '\u{FDF0}'..='\u{FFFD}'
-        | '\u{10000}'..='\u{EFFFF}')
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Checks for XML 1.0, fifth edition, production `NameChar`.
-pub(crate) fn is_name_char(c: char) -> bool {
-    is_name_start(c)
-        || matches!(c, '-' | '.' | '0'..='9' | '\u{B7}' | '\u{300}'..='\u{36F}'
-            | '\u{203F}'..='\u{2040}')
+    fn accepts(builtin: Builtin, text: &str) -> bool {
+        builtin.accepts(text, Edition::V1_0)
+    }
+
+    #[test]
+    fn date_times_follow_calendar_and_clock() {
+        for good in [
+            "2024-02-29T12:00:00",
+            "2020-03-20T12:00:00Z",
+            "2020-01-01T24:00:00",
+            "2020-01-01T00:00:00.25+01:00",
+            "-0001-12-31T23:59:59-14:00",
+            "12020-01-01T00:00:00",
+        ] {
+            assert!(accepts(Builtin::DateTime, good), "{good}");
+        }
+        for bad in [
+            "2023-02-29T12:00:00",
+            "2020-03-20",
+            "2020-13-01T00:00:00",
+            "2020-01-01T24:00:01",
+            "2020-01-01T00:00",
+            "0000-01-01T00:00:00",
+            "2020-01-01T00:00:00+15:00",
+            "2020-01-01T00:00:00.",
+            "20-01-01T00:00:00",
+            "2020-01-01 00:00:00",
+            "2020-01-01T00:00:00+ä1:0",
+            "",
+        ] {
+            assert!(!accepts(Builtin::DateTime, bad), "{bad}");
+        }
+        for (builtin, good, bad) in [
+            (Builtin::Date, "2020-01-31Z", "2020-04-31"),
+            (Builtin::Time, "23:59:59.5-02:30", "23:60:00"),
+            (Builtin::Language, "en-GB", "en-"),
+            (Builtin::NmToken, "-1", ""),
+            (Builtin::Name, "a:ä", "1a"),
+            (Builtin::NcName, "a.b", "a:b"),
+            (Builtin::HexBinary, "0aF1", "0aF"),
+            (Builtin::Base64, "TWF u TQ = =", "TWFuTQ="),
+        ] {
+            assert!(accepts(builtin, good), "{good}");
+            assert!(!accepts(builtin, bad), "{bad}");
+        }
+    }
 }

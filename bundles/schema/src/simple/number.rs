@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use crate::model::Edition;
+use crate::edition::Edition;
 
 /// `[+-]?[0-9]+`
 pub(crate) fn is_integer(text: &str) -> bool {
