@@ -72,11 +72,6 @@ pub struct Checked<'a> {
     pub version: Option<Version>,
     /// Whether that version is newer than the newest known schema. That schema is used then.
     pub newer: bool,
-    /// Whether the tags of modular scenarios were allowed.
-    pub modular: bool,
-    /// Default namespace of the root. It is ignored, because the published schemas have none, or
-    /// one that no file uses.
-    pub namespace: Option<&'a str>,
     /// Features of later versions that the document uses. Many violations have this one cause.
     /// Violations that the later version allows are left out of the list.
     pub later: Option<Later<'a>>,
@@ -187,8 +182,7 @@ fn checked<'a>(
     (schema, sources): (&Schema, Arc<[Source]>),
     (version, newer): (Option<Version>, bool),
 ) -> Checked<'a> {
-    let modular = kind != FileKind::Xodr && is_modular(document);
-    let overlay = if modular {
+    let overlay = if kind != FileKind::Xodr && is_modular(document) {
         Overlay::ModularScenario
     } else {
         Overlay::None
@@ -212,17 +206,11 @@ fn checked<'a>(
             }
         },
     };
-    let namespace = document
-        .root()
-        .and_then(|root| root.attr("xmlns"))
-        .filter(|namespace| !namespace.is_empty());
     Checked {
         schema: schema.title.to_string(),
         sources,
         version,
         newer,
-        modular,
-        namespace,
         later,
         violations,
         rest,

@@ -134,12 +134,8 @@ pub(crate) fn condition(node: Node<'_>, condition: &str) -> Option<&'static str>
 }
 
 /// Returns the defect of the schema with this title that causes a missing child, if any.
-pub(crate) fn missing_child(
-    parent: Node<'_>,
-    names: &[String],
-    title: &str,
-) -> Option<&'static str> {
-    if names.iter().any(|name| name == "_OpenDriveElement") {
+pub(crate) fn missing_child(parent: Node<'_>, names: &[&str], title: &str) -> Option<&'static str> {
+    if names.contains(&"_OpenDriveElement") {
         return Some(
             "it requires a child <_OpenDriveElement>, which is the name of an internal base type and not meant \
              for files",

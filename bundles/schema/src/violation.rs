@@ -91,12 +91,6 @@ pub struct Violation<'a> {
     pub node: Node<'a>,
     /// The attribute concerned.
     pub attribute: Option<Attribute<'a>>,
-    /// Name or value that was found; empty if something is missing.
-    pub found: String,
-    /// Names or values that are valid here.
-    pub expected: Vec<String>,
-    /// The name or value that was probably meant.
-    pub suggestion: Option<String>,
     /// Reason why the schema is wrong and not the file, if that is known.
     pub known_schema_defect: Option<&'static str>,
     /// The whole message.

@@ -6,20 +6,18 @@
 //! know (perhaps misspelt). In each case the automaton changes to the state that fits the remaining
 //! children best. So one cause gives one violation.
 
-use std::collections::{HashMap, HashSet, VecDeque};
+use std::collections::HashMap;
 
 use qcbus_document::Node;
 
 use super::frame::{Body, Frame, Number};
 use super::memo::{Meant, Memo};
+use super::way::needed;
 use super::{Walk, wording};
 use crate::model::{AllModel, ElementDecl, Model};
 use crate::names::NameId;
 use crate::violation::Code;
 use crate::work::steps;
-
-/// Maximum number of visited states in the search for an expected child.
-const MAX_SEARCH: usize = 256;
 
 impl<'a, 's> Walk<'a, 's> {
     /// Returns the declaration of an element in its parent, or `None` if its content is not
@@ -185,7 +183,7 @@ impl<'a, 's> Walk<'a, 's> {
             u32::from(node.name_number()) | 1 << 16,
         );
         self.reporter.add(Code::UnexpectedElement, key, node, || {
-            wording::unexpected_child(node, parent, model, state, suggestion, schema)
+            wording::unexpected_child(node, parent, (model, state), suggestion, schema)
         });
         let frame = self.stack.last_mut()?;
         let found = here
@@ -309,60 +307,4 @@ impl<'a, 's> Walk<'a, 's> {
             wording::missing_children(node, &needed, &expected, self.schema)
         });
     }
-}
-
-/// A path through a model: the target state and the skipped children.
-pub(super) type Way = (u16, Vec<NameId>);
-
-/// Returns the shortest path from `state` to a target that `found` accepts. The target is an edge
-/// with a child's name, or a state with the flag whether the element may end there.
-pub(super) fn way_to(
-    model: &Model,
-    state: u16,
-    found: impl Fn(Option<NameId>, bool) -> bool,
-) -> Option<Way> {
-    way_without(model, state, None, &found)
-}
-
-/// Returns the skipped children that are on every path. These are certainly missing.
-fn needed(
-    model: &Model,
-    state: u16,
-    skipped: &[NameId],
-    found: impl Fn(Option<NameId>, bool) -> bool,
-) -> Vec<NameId> {
-    let only_way = |name: &&NameId| way_without(model, state, Some(**name), &found).is_none();
-    skipped.iter().filter(only_way).copied().collect()
-}
-
-fn way_without(
-    model: &Model,
-    state: u16,
-    avoided: Option<NameId>,
-    found: &impl Fn(Option<NameId>, bool) -> bool,
-) -> Option<Way> {
-    let mut visited = HashSet::from([state]);
-    let mut queue = VecDeque::from([(state, Vec::new())]);
-    while let Some((at, path)) = queue.pop_front() {
-        let edges = model.edges(at);
-        steps(1 + 2 * edges.len() + path.len());
-        if let Some(edge) = edges.iter().find(|edge| found(Some(edge.name), false)) {
-            return Some((edge.to, path));
-        }
-        let accepts = model
-            .states
-            .get(usize::from(at))
-            .is_some_and(|row| row.accepts);
-        if !path.is_empty() && found(None, accepts) {
-            return Some((at, path));
-        }
-        for edge in edges.iter().filter(|edge| Some(edge.name) != avoided) {
-            if visited.len() < MAX_SEARCH && visited.insert(edge.to) {
-                let mut longer = path.clone();
-                longer.push(edge.name);
-                queue.push_back((edge.to, longer));
-            }
-        }
-    }
-    None
 }

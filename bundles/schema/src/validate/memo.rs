@@ -5,8 +5,8 @@ use std::rc::Rc;
 
 use qcbus_document::Node;
 
-use super::children::{Way, way_to};
 use super::limit;
+use super::way::{Way, way_to};
 use crate::model::{AllModel, Model, Schema};
 use crate::names::NameId;
 use crate::similar::closest;

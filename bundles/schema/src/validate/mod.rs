@@ -15,6 +15,7 @@ mod overlay;
 mod reporter;
 mod text;
 mod types;
+mod way;
 mod wording;
 
 use qcbus_document::{Document, Node};

@@ -5,6 +5,9 @@ use qcbus_document::{Attribute, Document, Node};
 use crate::model::Schema;
 use crate::names::NameId;
 
+/// Namespace of `xsi:type` and the like.
+pub(super) const XSI: &str = "http://www.w3.org/2001/XMLSchema-instance";
+
 /// Meaning of an attribute's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum AttributeName {

@@ -111,24 +111,12 @@ impl<'a, 's> Reporter<'a, 's> {
             return;
         }
         tally.listed += 1;
-        let Wording {
-            found,
-            expected,
-            suggestion,
-            defect,
-            text,
-        } = match known {
-            Some(_) => word().excused(known),
-            None => word(),
-        };
+        let Wording { text, defect } = word().excused(known);
         tally.defect &= defect.is_some();
         let violation = Violation {
             code,
             node,
             attribute,
-            found,
-            expected,
-            suggestion,
             known_schema_defect: defect,
             text,
         };

@@ -4,14 +4,12 @@ use std::collections::HashMap;
 
 use qcbus_document::Node;
 
-use super::names::AttributeName;
+use super::names::{AttributeName, XSI};
 use super::{Walk, wording};
 use crate::assertion::Scope;
 use crate::model::{ComplexType, ElementDecl, TypeRef};
 use crate::violation::Code;
 use crate::work::steps;
-
-pub(super) const XSI: &str = "http://www.w3.org/2001/XMLSchema-instance";
 
 /// The type of an element.
 #[derive(Clone, Copy, Debug)]

@@ -3,44 +3,33 @@
 use qcbus_document::{Attribute, Node};
 
 use super::memo::Memo;
-use super::types::XSI;
+use super::names::XSI;
 use crate::assertion::Assertion;
 use crate::constraint::{Constraint, Step};
 use crate::defects;
 use crate::model::{AttributeUse, ElementDecl, Model, Schema};
 use crate::names::NameId;
 use crate::similar::closest;
-use crate::simple::{EXPRESSION, SimpleType};
+use crate::simple::{EXPRESSION, Expectation, SimpleType};
 use crate::work::steps;
 
-/// A violation without its position.
-#[derive(Debug, Default)]
+/// The text of a violation, and the schema defect that causes it, if one is known.
+#[derive(Debug)]
 pub(super) struct Wording {
-    pub(super) found: String,
-    pub(super) expected: Vec<String>,
-    pub(super) suggestion: Option<String>,
-    pub(super) defect: Option<&'static str>,
     pub(super) text: String,
+    pub(super) defect: Option<&'static str>,
+}
+
+impl From<String> for Wording {
+    fn from(text: String) -> Self {
+        Self { text, defect: None }
+    }
 }
 
 impl Wording {
-    fn new(found: &str, text: String) -> Self {
-        Self {
-            found: found.to_owned(),
-            text,
-            ..Self::default()
-        }
-    }
-
-    fn expecting(mut self, expected: Vec<String>) -> Self {
-        self.expected = expected;
-        self
-    }
-
     fn suggesting(mut self, suggestion: Option<&str>) -> Self {
         if let Some(meant) = suggestion {
             self.text += &format!("; did you mean \"{meant}\"?");
-            self.suggestion = Some(meant.to_owned());
         }
         self
     }
@@ -65,61 +54,46 @@ fn quote(text: &str) -> String {
     format!("\"{short}\"")
 }
 
-fn elements(names: &[String]) -> String {
+fn elements(names: &[&str]) -> String {
     const SHOWN: usize = 12;
-    let mut list: Vec<String> = names
-        .iter()
-        .take(SHOWN)
-        .map(|name| format!("<{name}>"))
-        .collect();
+    let shown = names.iter().take(SHOWN);
+    let mut list: Vec<String> = shown.map(|name| format!("<{name}>")).collect();
     if names.len() > SHOWN {
         list.push(format!("{} more", names.len() - SHOWN));
     }
     list.join(", ")
 }
 
-fn texts(names: impl Iterator<Item = NameId>, schema: &Schema) -> Vec<String> {
-    let mut all: Vec<String> = Vec::new();
+fn texts(names: impl Iterator<Item = NameId>, schema: &Schema) -> Vec<&str> {
+    let mut all: Vec<&str> = Vec::new();
     for name in names {
         let text = schema.names.text(name);
-        if !all.iter().any(|have| have == text) {
-            all.push(text.to_owned());
+        if !all.contains(&text) {
+            all.push(text);
         }
     }
     all
 }
 
-/// Returns the text "expected <a> or the end of <b>".
-fn expected_here(
-    model: &Model,
-    state: u16,
-    parent: Node<'_>,
-    schema: &Schema,
-) -> (Vec<String>, String) {
+/// Returns the text "<a> or the end of <b>".
+fn expected_here(model: &Model, state: u16, parent: Node<'_>, schema: &Schema) -> String {
     let names = texts(model.edges(state).iter().map(|edge| edge.name), schema);
-    let may_end = model
-        .states
-        .get(usize::from(state))
-        .is_some_and(|row| row.accepts);
+    let row = model.states.get(usize::from(state));
     let end = format!("the end of <{}>", parent.name());
-    let words = match (names.is_empty(), may_end) {
+    match (names.is_empty(), row.is_some_and(|row| row.accepts)) {
         (true, _) => end,
         (false, true) => format!("{} or {end}", elements(&names)),
         (false, false) => elements(&names),
-    };
-    (names, words)
+    }
 }
 
 pub(super) fn unknown_root(root: Node<'_>, known: &[&str], title: &str) -> Wording {
-    let names: Vec<String> = known.iter().map(|name| (*name).to_owned()).collect();
     let text = format!(
         "the root element <{}> is not defined in {title}; expected {}",
         root.name(),
-        elements(&names)
+        elements(known)
     );
-    Wording::new(root.name(), text)
-        .expecting(names)
-        .suggesting(closest(root.name(), known.iter().copied()))
+    Wording::from(text).suggesting(closest(root.name(), known.iter().copied()))
 }
 
 pub(super) fn repeated(node: Node<'_>, parent: Node<'_>, count: u32, most: u32) -> Wording {
@@ -132,19 +106,16 @@ pub(super) fn repeated(node: Node<'_>, parent: Node<'_>, count: u32, most: u32) 
         node.name(),
         parent.name()
     );
-    Wording::new(node.name(), text).expecting(vec![limit])
+    text.into()
 }
 
 pub(super) fn no_children(node: Node<'_>, parent: Node<'_>, title: &str) -> Wording {
-    Wording::new(
-        node.name(),
-        format!(
-            "<{}> may not contain elements, but contains <{}>",
-            parent.name(),
-            node.name()
-        ),
-    )
-    .excused(defects::children_of_none(parent, title))
+    let text = format!(
+        "<{}> may not contain elements, but contains <{}>",
+        parent.name(),
+        node.name()
+    );
+    Wording::from(text).excused(defects::children_of_none(parent, title))
 }
 
 /// Maximum number of siblings examined to explain the place of a child.
@@ -171,9 +142,7 @@ pub(super) fn missing_before(
     } else {
         format!("<{parent_name}> lacks {list}, which must come before <{name}>")
     };
-    Wording::new(node.name(), text)
-        .expecting(names)
-        .excused(defect)
+    Wording::from(text).excused(defect)
 }
 
 /// Sibling that makes a child misplaced.
@@ -228,7 +197,6 @@ pub(super) fn misplaced<'s>(
     schema: &Schema,
     memo: &mut Memo<'s>,
 ) -> Wording {
-    let (expected, words) = expected_here(model, state, parent, schema);
     let (name, parent_name) = (node.name(), parent.name());
     let text = match obstacle(node, parent, model, schema, memo) {
         Some(Obstacle::Before(later)) => {
@@ -238,36 +206,22 @@ pub(super) fn misplaced<'s>(
             "<{name}> cannot occur together with <{other}>: <{parent_name}> takes one or the other"
         ),
         None => format!(
-            "<{name}> may occur in <{parent_name}>, but not here: children have a fixed order, expected here: {words}"
+            "<{name}> may occur in <{parent_name}>, but not here: children have a fixed order, expected here: {}",
+            expected_here(model, state, parent, schema)
         ),
     };
-    Wording::new(name, text)
-        .expecting(expected)
-        .excused(defects::misplaced_child(node, parent, &schema.title))
+    Wording::from(text).excused(defects::misplaced_child(node, parent, &schema.title))
 }
 
 pub(super) fn unexpected_child(
     node: Node<'_>,
     parent: Node<'_>,
-    model: &Model,
-    state: u16,
+    (model, state): (&Model, u16),
     suggestion: Option<&str>,
     schema: &Schema,
 ) -> Wording {
-    let (expected, words) = expected_here(model, state, parent, schema);
-    let text = format!(
-        "<{}> has no child <{}>, expected here: {words}",
-        parent.name(),
-        node.name()
-    );
-    let home = if suggestion.is_none() {
-        homes(node.name(), schema)
-    } else {
-        String::new()
-    };
-    Wording::new(node.name(), text + &home)
-        .expecting(expected)
-        .suggesting(suggestion)
+    let words = expected_here(model, state, parent, schema);
+    unknown_child(node, parent, &format!("here: {words}"), suggestion, schema)
 }
 
 pub(super) fn unexpected_member(
@@ -278,20 +232,23 @@ pub(super) fn unexpected_member(
     schema: &Schema,
 ) -> Wording {
     let names = texts(members.iter().map(|member| member.name), schema);
-    let list = elements(&names);
-    let text = format!(
-        "<{}> has no child <{}>, expected in any order: {list}",
-        parent.name(),
-        node.name()
-    );
-    let home = if suggestion.is_none() {
-        homes(node.name(), schema)
-    } else {
-        String::new()
-    };
-    Wording::new(node.name(), text + &home)
-        .expecting(names)
-        .suggesting(suggestion)
+    let words = format!("in any order: {}", elements(&names));
+    unknown_child(node, parent, &words, suggestion, schema)
+}
+
+fn unknown_child(
+    node: Node<'_>,
+    parent: Node<'_>,
+    expected: &str,
+    suggestion: Option<&str>,
+    schema: &Schema,
+) -> Wording {
+    let (name, parent) = (node.name(), parent.name());
+    let mut text = format!("<{parent}> has no child <{name}>, expected {expected}");
+    if suggestion.is_none() {
+        text += &homes(name, schema);
+    }
+    Wording::from(text).suggesting(suggestion)
 }
 
 /// Returns "; it belongs in <a>" for a name that the schema knows elsewhere.
@@ -299,11 +256,7 @@ fn homes(name: &str, schema: &Schema) -> String {
     let Some(id) = schema.names.find(name) else {
         return String::new();
     };
-    let found: Vec<String> = schema
-        .parents_of(id)
-        .into_iter()
-        .map(str::to_owned)
-        .collect();
+    let found = schema.parents_of(id);
     if found.is_empty() {
         String::new()
     } else {
@@ -322,8 +275,7 @@ pub(super) fn missing_children(
     let defect = defects::missing_child(node, &needed, &schema.title);
     if needed.is_empty() {
         let list = elements(&names);
-        let text = format!("<{}> is incomplete, expected next: {list}", node.name());
-        return Wording::new("", text).expecting(names);
+        return format!("<{}> is incomplete, expected next: {list}", node.name()).into();
     }
     let there = match &*needed {
         [one] => node.children_named(one).count(),
@@ -337,7 +289,7 @@ pub(super) fn missing_children(
             elements(&needed)
         ),
     };
-    Wording::new("", text).expecting(needed).excused(defect)
+    Wording::from(text).excused(defect)
 }
 
 pub(super) fn invalid_value(
@@ -353,21 +305,16 @@ pub(super) fn invalid_value(
         expectation.values = vec![fixed.to_string()];
         expectation.words.clear();
     }
-    let suggestion =
-        closest(value.trim(), expectation.values.iter().map(String::as_str)).map(str::to_owned);
-    let text = format!(
-        "{}={} of <{}> is invalid; it must be {}{}",
-        attribute.name(),
-        quote(value),
-        node.name(),
-        expectation.sentence(),
-        foreign_to_expressions(value, &expectation.words)
-    );
-    let mut expected = expectation.values;
-    expected.extend(expectation.words);
-    Wording::new(value, text)
-        .expecting(expected)
-        .suggesting(suggestion.as_deref())
+    let subject = format!("{}={} of <{}>", attribute.name(), quote(value), node.name());
+    let hint = foreign_to_expressions(value, &expectation.words);
+    invalid(&subject, value, &expectation, &hint)
+}
+
+fn invalid(subject: &str, value: &str, expectation: &Expectation, hint: &str) -> Wording {
+    let suggestion = closest(value.trim(), expectation.values.iter().map(String::as_str));
+    let expected = expectation.sentence();
+    let text = format!("{subject} is invalid; it must be {expected}{hint}");
+    Wording::from(text).suggesting(suggestion)
 }
 
 /// Returns the reason why an intended expression of OpenSCENARIO is invalid.
@@ -394,20 +341,8 @@ pub(super) fn invalid_text(
     ty: &SimpleType,
     schema: &Schema,
 ) -> Wording {
-    let expectation = ty.expectation(schema);
-    let suggestion =
-        closest(value.trim(), expectation.values.iter().map(String::as_str)).map(str::to_owned);
-    let text = format!(
-        "the text {} of <{}> is invalid; it must be {}",
-        quote(value),
-        node.name(),
-        expectation.sentence()
-    );
-    let mut expected = expectation.values;
-    expected.extend(expectation.words);
-    Wording::new(value, text)
-        .expecting(expected)
-        .suggesting(suggestion.as_deref())
+    let subject = format!("the text {} of <{}>", quote(value), node.name());
+    invalid(&subject, value, &ty.expectation(schema), "")
 }
 
 /// Checks whether `written` is the beginning of `name`: `from` of `fromLane`.
@@ -442,29 +377,24 @@ pub(super) fn unexpected_attribute(
             one.name() == name
         })
     };
-    let free = declared
-        .iter()
-        .map(|one| schema.names.text(one.name))
-        .filter(|name| !used(name));
-    let free: Vec<String> = free.map(str::to_owned).collect();
+    let names = declared.iter().map(|one| schema.names.text(one.name));
+    let free: Vec<&str> = names.filter(|name| !used(name)).collect();
     let text = format!(
         "{} defines no attribute `{}` for `{}`",
         schema.title,
         attribute.name(),
         node.name()
     );
-    let suggestion = closest(attribute.name(), free.iter().map(String::as_str)).map(str::to_owned);
+    let suggestion = closest(attribute.name(), free.iter().copied());
     let longer = || {
         free.iter()
             .find(|name| is_short_for(attribute.name(), name))
-            .cloned()
     };
     let shorter = || {
         free.iter()
             .find(|name| is_abbreviation(name, attribute.name()))
-            .cloned()
     };
-    let suggestion = suggestion.or_else(longer).or_else(shorter);
+    let suggestion = suggestion.or_else(|| longer().or_else(shorter).copied());
     let list = match (&suggestion, free.as_slice()) {
         (Some(_), _) => String::new(),
         (None, []) if declared.is_empty() => ", which has no attributes".to_owned(),
@@ -474,30 +404,24 @@ pub(super) fn unexpected_attribute(
             format!("; further allowed attributes are {}", free.join(", "))
         }
     };
-    Wording::new(attribute.name(), text + &list)
-        .expecting(free)
-        .suggesting(suggestion.as_deref())
+    Wording::from(text + &list).suggesting(suggestion)
 }
 
 /// Returns the allowed attributes of an element. A long list is cut.
 fn names_of(declared: &[AttributeUse], schema: &Schema) -> String {
     const SHOWN: usize = 8;
     let names = declared.iter().map(|one| schema.names.text(one.name));
-    let mut list: Vec<String> = names.take(SHOWN).map(str::to_owned).collect();
-    if let Some(more) = declared.len().checked_sub(SHOWN).filter(|more| *more > 0) {
-        list.push(format!("{more} more"));
+    let list: Vec<&str> = names.take(SHOWN).collect();
+    match declared.len().saturating_sub(SHOWN) {
+        0 => list.join(", "),
+        more => format!("{}, {more} more", list.join(", ")),
     }
-    list.join(", ")
 }
 
 /// Reports an attribute such as `xsi:type` with a prefix that has another meaning or none.
 pub(super) fn unbound_prefix(node: Node<'_>, attribute: Attribute<'_>, prefix: &str) -> Wording {
-    let text = format!(
-        "{} of <{}> has no meaning: xmlns:{prefix} must be \"{XSI}\"",
-        attribute.name(),
-        node.name()
-    );
-    Wording::new(attribute.name(), text).expecting(vec![XSI.to_owned()])
+    let (name, of) = (attribute.name(), node.name());
+    format!("{name} of <{of}> has no meaning: xmlns:{prefix} must be \"{XSI}\"").into()
 }
 
 pub(super) fn missing_attribute(
@@ -510,33 +434,21 @@ pub(super) fn missing_attribute(
     let value = ty
         .map(|ty| ty.expectation(schema).sentence())
         .unwrap_or_default();
-    let text = format!(
+    format!(
         "<{}> lacks the attribute {name}, which must be {value}",
         node.name()
-    );
-    Wording::new("", text).expecting(vec![name.to_owned()])
+    )
+    .into()
 }
 
 pub(super) fn unexpected_text(node: Node<'_>, text: &str) -> Wording {
-    let trimmed = text.trim();
-    Wording::new(
-        trimmed,
-        format!(
-            "<{}> may not contain text, but contains {}",
-            node.name(),
-            quote(trimmed)
-        ),
-    )
+    let (name, text) = (node.name(), quote(text.trim()));
+    format!("<{name}> may not contain text, but contains {text}").into()
 }
 
 pub(super) fn blank_text(node: Node<'_>) -> Wording {
-    Wording::new(
-        "",
-        format!(
-            "<{}> must be empty, but contains white space between its tags",
-            node.name()
-        ),
-    )
+    let name = node.name();
+    format!("<{name}> must be empty, but contains white space between its tags").into()
 }
 
 pub(super) fn no_type(
@@ -550,30 +462,21 @@ pub(super) fn no_type(
         .iter()
         .filter_map(|one| one.test.as_ref());
     let tests: Vec<String> = tests.map(|test| test.notation(&schema.names)).collect();
+    let name = node.name();
     let text = if undecided && !tests.is_empty() {
         format!(
-            "the allowed content of <{}> is undefined; one of these conditions must hold: {}",
-            node.name(),
+            "the allowed content of <{name}> is undefined; one of these conditions must hold: {}",
             tests.join(", ")
         )
     } else {
-        format!(
-            "the schema defines only an abstract type for <{}>",
-            node.name()
-        )
+        format!("the schema defines only an abstract type for <{name}>")
     };
-    Wording::new("", text).expecting(tests)
+    text.into()
 }
 
 pub(super) fn bad_xsi_type(node: Node<'_>, written: &str) -> Wording {
-    Wording::new(
-        written,
-        format!(
-            "xsi:type names {}, which is not a valid type for <{}>",
-            quote(written),
-            node.name()
-        ),
-    )
+    let (name, written) = (node.name(), quote(written));
+    format!("xsi:type names {written}, which is not a valid type for <{name}>").into()
 }
 
 pub(super) fn condition_failed(node: Node<'_>, assertion: &Assertion, schema: &Schema) -> Wording {
@@ -586,27 +489,18 @@ pub(super) fn condition_failed(node: Node<'_>, assertion: &Assertion, schema: &S
             node.name()
         ),
     };
-    Wording::new("", text)
-        .expecting(vec![condition])
-        .excused(known)
+    Wording::from(text).excused(known)
 }
 
 pub(super) fn duplicate(attribute: Attribute<'_>, key: &str) -> Wording {
-    let text = format!(
-        "{} {} of <{}> occurs twice, but must be unique (key {key})",
-        attribute.name(),
-        quote(attribute.value()),
-        attribute.node().name()
-    );
-    Wording::new(attribute.value(), text)
+    let (name, value) = (attribute.name(), quote(attribute.value()));
+    let of = attribute.node().name();
+    format!("{name} {value} of <{of}> occurs twice, but must be unique (key {key})").into()
 }
 
 pub(super) fn missing_key(node: Node<'_>, field: &str, key: &str) -> Wording {
-    let text = format!(
-        "<{}> needs the attribute {field}, which identifies it (key {key})",
-        node.name()
-    );
-    Wording::new("", text).expecting(vec![field.to_owned()])
+    let name = node.name();
+    format!("<{name}> needs the attribute {field}, which identifies it (key {key})").into()
 }
 
 pub(super) fn dangling(
@@ -619,21 +513,12 @@ pub(super) fn dangling(
         Step::Child(name) => Some(*name),
         Step::Any => None,
     });
-    let targets: Vec<String> = texts(targets, schema)
-        .iter()
-        .map(|name| format!("<{name}>"))
-        .collect();
-    let what = if targets.is_empty() {
-        "element".to_owned()
-    } else {
-        targets.join(" or ")
+    let what = match texts(targets, schema) {
+        none if none.is_empty() => "element".to_owned(),
+        names => format!("<{}>", names.join("> or <")),
     };
     let field = key.map_or("key", |key| schema.names.text(key.field));
-    let text = format!(
-        "{} {} of <{}> is not defined: no {what} has it as its {field}",
-        attribute.name(),
-        quote(attribute.value()),
-        attribute.node().name()
-    );
-    Wording::new(attribute.value(), text)
+    let (name, value) = (attribute.name(), quote(attribute.value()));
+    let of = attribute.node().name();
+    format!("{name} {value} of <{of}> is not defined: no {what} has it as its {field}").into()
 }
