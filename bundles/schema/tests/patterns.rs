@@ -1,5 +1,10 @@
 //! Tests of patterns: each line has a pattern, texts that match, and texts that do not.
 
+#![expect(
+    clippy::expect_used,
+    reason = "a test panics if its data is not as expected"
+)]
+
 use qcbus_schema::{Pattern, PatternError};
 
 /// Pattern, matching texts, other texts. The sign `␣` separates the texts, and `∅` means none.
@@ -226,7 +231,9 @@ fn hostile_sizes_are_refused_with_the_limit() {
 }
 
 fn matches(pattern: &str, text: &str) -> bool {
-    Pattern::new(pattern).unwrap().matches(text)
+    Pattern::new(pattern)
+        .expect("the pattern is valid")
+        .matches(text)
 }
 
 #[test]
