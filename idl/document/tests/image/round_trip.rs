@@ -1,7 +1,5 @@
 //! Tests that an image returns its input: any tree, any values, any position.
 
-#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
-
 use proptest::prelude::*;
 use qcbus_document::fuzzing::{Child, Tree};
 use qcbus_document::{Document, Node, XPaths};

@@ -1,7 +1,5 @@
 //! Tests of positions (files, rows and columns), XPaths, and numbers in attributes.
 
-#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
-
 use qcbus_document::fuzzing::Tree;
 use qcbus_document::{BuildError, Capacities, Document, FaultCode, ImageBuilder};
 
