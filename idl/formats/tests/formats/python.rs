@@ -2,18 +2,11 @@
 //! package `asam-qc-baselib`. If one of them is not available, they print a message and are
 //! skipped.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "tests and their helpers fail by panicking"
-)]
-
-mod common;
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{bundle, checker, full, input, issue};
+use crate::common::{bundle, checker, full, input, issue, xml_place};
 use qcbus_formats::config::Config;
 use qcbus_formats::pool::{NoPlaces, PoolInput, pool};
 use qcbus_formats::xqar::{Dialect, Level, Results, write};
@@ -88,7 +81,7 @@ fn results() -> Vec<Results> {
     );
     odd.rule_uid = "no rule at all".into();
     odd.locations = vec![
-        common::xml_place("/a[@b=\"c\"]"),
+        xml_place("/a[@b=\"c\"]"),
         qcbus_formats::xqar::Locations::default(),
     ];
     let mut silent = checker("c", vec![odd, issue(Level::Information, "removed")]);

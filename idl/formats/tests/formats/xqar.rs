@@ -1,8 +1,6 @@
 //! Tests of result files: the written form, and the accepted forms.
 
-mod common;
-
-use common::{full, issue};
+use crate::common::{full, issue};
 use qcbus_formats::xqar::{
     Checker, CheckerBundle, Dialect, Level, Location, Locations, Results, Status, read, write,
 };

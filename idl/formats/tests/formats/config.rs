@@ -1,13 +1,6 @@
 //! Tests of configurations: accepted content, reported content, rejected content.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "tests and their helpers fail by panicking"
-)]
-
-mod common;
-
-use common::param;
+use crate::common::param;
 use qcbus_formats::config::{
     Config, Known, KnownBundle, KnownChecker, KnownParam, Levels, Oddity, ParamType, Parsed,
     Selected, Selection, same_bundle, same_reporter,

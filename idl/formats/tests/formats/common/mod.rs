@@ -1,7 +1,5 @@
 //! Common helpers of the tests.
 
-#![allow(dead_code, reason = "each test file uses a part of it")]
-
 use qcbus_formats::pool::{BundleOutcome, CheckerOutcome, Ending, PoolInput, Scope};
 use qcbus_formats::xqar::{
     Checker, CheckerBundle, DomainInfo, InfoElement, Issue, Level, Location, Locations, Metadata,

@@ -1,13 +1,6 @@
 //! Tests of pooling: every loss is reported, and the bytes are always the same.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "tests and their helpers fail by panicking"
-)]
-
-mod common;
-
-use common::{UID, bundle, checker, input, issue, param, xml_place};
+use crate::common::{UID, bundle, checker, input, issue, param, xml_place};
 use qcbus_formats::Verdict;
 use qcbus_formats::config::Config;
 use qcbus_formats::pool::{

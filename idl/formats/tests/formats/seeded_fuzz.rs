@@ -1,11 +1,11 @@
 //! Runs the fuzz targets' bodies on stable, with good files that a fixed pseudo-random sequence
 //! damages.
 
-mod common;
-
 use fastrand::Rng;
 use qcbus_formats::fuzzing;
 use qcbus_formats::xqar::{Dialect, write};
+
+use crate::common::full;
 
 const CONFIG: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <Config><Param name="InputFile" value="a.xodr"/>
@@ -68,7 +68,7 @@ fn mutated_configurations_make_no_parser_panic() {
 
 #[test]
 fn mutated_results_make_no_parser_panic() {
-    let full = common::full();
+    let full = full();
     let seeds = [
         write(&full, Dialect::Current),
         write(&full, Dialect::Qc4Openx),
