@@ -1,7 +1,5 @@
 //! Modular scenarios: their expansion, and its robustness against arbitrary archives.
 
-#![expect(clippy::panic, reason = "a test that cannot continue panics")]
-
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
 use qcbus_ingest::fuzzing::{self, Outcome};

@@ -1,7 +1,5 @@
 //! Malicious input: it ends in an error or in faults, soon, and within bounds.
 
-#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
-
 use std::fs;
 use std::io::Write;
 use std::path::Path;

@@ -1,7 +1,5 @@
 //! The set of documents of a file, and the reports about missing ones.
 
-#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
-
 use std::collections::HashMap;
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,5 @@
 //! Files of other projects, if they are available: each builds, and faults are at their places.
 
-#![expect(clippy::print_stdout, reason = "a skipped test is reported")]
-
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,5 @@
 //! A construct that XML 1.0 forbids is a fault with its place. An allowed construct is none.
 
-#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
-
 use std::path::Path;
 
 use qcbus_document::{Document, FaultCode};

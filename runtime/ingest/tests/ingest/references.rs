@@ -1,7 +1,5 @@
 //! References of a scenario to other files.
 
-#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
-
 use std::fs;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};

@@ -1,8 +1,6 @@
 //! `<include>` of OpenDRIVE: it is spliced at its place, and each failure is a fault with its
 //! place.
 
-#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
-
 use std::fs;
 use std::path::Path;
 
