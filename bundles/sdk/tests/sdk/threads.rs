@@ -1,15 +1,6 @@
 //! Tests that the findings do not depend on the number of threads.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "tests fail by panicking, and rules for tests"
-)]
-
-mod common;
-#[path = "common/roads.rs"]
-mod roads;
-
+use crate::common;
 use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -18,12 +9,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::ThreadId;
 use std::time::{Duration, Instant};
 
+use crate::roads::Roads;
 use qcbus_document::Document;
 use qcbus_formats::xqar::{Issue, Status};
 use qcbus_sdk::{
     AnyRule, Bundle, Listener, Loaded, MAX_ISSUES, Outcome, Permits, Plan, Rule, Sink, check_with,
 };
-use roads::Roads;
 
 /// Number of roads in the file.
 const ROADS: usize = 300;

@@ -1,18 +1,9 @@
 //! Tests of a bundle as a daemon, against the bus's own host: join, job, missing document, drain.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "tests and their helpers fail by panicking"
-)]
-
-mod common;
-#[path = "common/on_bus.rs"]
-mod on_bus;
-
 use std::time::Duration;
 
-use on_bus::CONFIG;
+use crate::common;
+use crate::on_bus::{self, CONFIG};
 use qcbus_bus::{Host, HostEvent};
 use qcbus_document::Document;
 use qcbus_formats::xqar::Status;

@@ -1,17 +1,12 @@
 //! Tests of rules that check one part of the model after the other.
 
-#![expect(clippy::unwrap_used, reason = "tests fail by panicking")]
-
-mod common;
-#[path = "common/roads.rs"]
-mod roads;
-
+use crate::common;
 use std::path::Path;
 use std::sync::Mutex;
 
+use crate::roads::Roads;
 use qcbus_formats::xqar::{Issue, Status};
 use qcbus_sdk::{AnyRule, Bundle, Listener, Loaded, Outcome, Plan, Rule, Sink, check};
-use roads::Roads;
 
 static FINDS: Rule<Roads> = Rule {
     id: "finds",

@@ -1,20 +1,11 @@
 //! Tests of several parallel jobs in one bundle, against the bus's own host.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "tests and their helpers fail by panicking"
-)]
-
-mod common;
-#[path = "common/on_bus.rs"]
-mod on_bus;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use on_bus::CONFIG;
+use crate::common;
+use crate::on_bus::{self, CONFIG};
 use qcbus_bus::{Host, HostEvent, PeerId};
 use qcbus_document::Document;
 use qcbus_messages::{DocId, FromPeer, JobId, ToPeer};

@@ -1,13 +1,6 @@
 //! Tests of gates, preconditions, panics, backports and limits, with rules made for them.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "tests and their helpers fail by panicking"
-)]
-
-mod common;
-
+use crate::common;
 use std::path::Path;
 
 use qcbus_document::Document;

@@ -1,13 +1,6 @@
 //! Tests of the models that a bundle caches for a map from one job to the next.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "tests and their helpers fail by panicking"
-)]
-
-mod common;
-
+use crate::common;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
