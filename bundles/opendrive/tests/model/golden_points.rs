@@ -1,7 +1,5 @@
 //! Compares points with those of ASAM's own bundle, if its cases are available.
 
-#![expect(clippy::expect_used, clippy::panic, reason = "test helpers may panic")]
-
 use std::path::{Path, PathBuf};
 
 use qcbus_document::Document;

@@ -1,10 +1,6 @@
 //! Tests of connected road ends and lane ends, in a junction with a road that enters it twice.
 
-#![expect(clippy::unwrap_used, reason = "test helpers may panic")]
-
-mod common;
-
-use common::with_map;
+use crate::common::with_map;
 use qcbus_opendrive::{ContactPoint, RoadEnd, RoadMap};
 
 /// Road `in` meets junction `j` at its end, road `out` at its start. Road `c` connects them. Road

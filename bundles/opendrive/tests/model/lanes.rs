@@ -1,10 +1,6 @@
 //! Tests of sections, borders and surfaces of hand-written roads with known numbers.
 
-#![expect(clippy::expect_used, reason = "test helpers may panic")]
-
-mod common;
-
-use common::with_map;
+use crate::common::with_map;
 use qcbus_opendrive::{ContactPoint, Edge, LayerKind, RoadMap, Side, Station};
 
 const ROAD: &str = r#"

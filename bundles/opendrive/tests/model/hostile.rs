@@ -1,8 +1,6 @@
 //! Tests of maps with hostile numbers and links. All queries must end and must not panic.
 
-mod common;
-
-use common::with_map;
+use crate::common::with_map;
 use proptest::prelude::*;
 use qcbus_opendrive::{ContactPoint, Edge, RoadMap, Side, Station};
 

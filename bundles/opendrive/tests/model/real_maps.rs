@@ -1,11 +1,5 @@
 //! Checks that the model understands the maps of other projects, if they are available.
 
-#![expect(
-    clippy::expect_used,
-    clippy::print_stdout,
-    reason = "test helpers may panic and print the reason"
-)]
-
 use std::path::{Path, PathBuf};
 
 use qcbus_document::Document;
