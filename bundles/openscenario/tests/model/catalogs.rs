@@ -1,9 +1,7 @@
 //! Tests that references to catalogs are followed, and that an entry is read with the assigned
 //! parameters of the reference.
 
-mod common;
-
-use common::{with_catalogs, with_scenario};
+use crate::common::{with_catalogs, with_scenario};
 use qcbus_openscenario::{EntityKind, Resolution, Scenario, StoryKind};
 
 const VEHICLES: &str = "<CatalogLocations><VehicleCatalog><Directory path=\"v\"/></VehicleCatalog>\

@@ -1,8 +1,6 @@
 //! Tests that attributes are read in their context.
 
-mod common;
-
-use common::with_scenario;
+use crate::common::with_scenario;
 use qcbus_openscenario::{Form, Reading, Scenario, ValueFaultKind};
 
 /// Returns one declaration for each entry of name, type and value.
