@@ -1,12 +1,10 @@
 //! Checks that documents made from the tables are valid, and that a violating edit is always found.
 
-mod support;
-
+use crate::support::{image, name_of, open};
 use proptest::prelude::*;
 use qcbus_document::{Document, Node};
 use qcbus_schema::generate::{Dice, document};
 use qcbus_schema::{Limits, SHIPPED, Schema};
-use support::{image, name_of, open};
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 240, ..ProptestConfig::default() })]

@@ -1,16 +1,14 @@
 //! Tests of user schemas: the files that make one schema, the files that it is for, and the errors
 //! for unusable ones.
 
-mod support;
-
 use std::path::Path;
 
+use crate::support::{image, open};
 use qcbus_document::FileKind;
 use qcbus_schema::{
     Options, Outcome, Override, SHIPPED, UserSchemaContent, UserSchemaFile, Version, check,
     user_schemas,
 };
-use support::{image, open};
 
 /// Makes schemas from files, given as path below the directory and text.
 fn made(files: &[(&str, &str)]) -> Result<Vec<Override>, String> {

@@ -26,7 +26,6 @@ pub fn open(image: &[u8]) -> Document<'_> {
     Document::open(image).expect("the image is valid")
 }
 
-#[allow(dead_code, reason = "not every test uses tables")]
 /// Returns the name of a shipped table's file.
 pub fn name_of(shipped: &Shipped) -> String {
     let kind = if shipped.kind == FileKind::Xodr {
@@ -37,7 +36,6 @@ pub fn name_of(shipped: &Shipped) -> String {
     format!("{kind}-{}", shipped.version)
 }
 
-#[allow(dead_code, reason = "not every test uses tables")]
 /// Returns a shipped table by name, e.g. `xodr-1.7`.
 pub fn table(name: &str) -> &'static Schema {
     let found = SHIPPED.iter().find(|one| name_of(one) == name);
@@ -48,14 +46,12 @@ pub fn table(name: &str) -> &'static Schema {
 }
 
 /// Compiles the text of one XSD.
-#[allow(dead_code, reason = "not every test compiles a schema")]
 pub fn compiled(text: &str) -> Result<Schema, String> {
     let image = image("test.xsd", text);
     qcbus_schema::compile("Test", &[open(&image)]).map_err(|error| error.to_string())
 }
 
 /// Returns the codes and texts of all violations of a document.
-#[allow(dead_code, reason = "not every test needs the texts")]
 pub fn violations(schema: &Schema, name: &str, text: &str) -> Vec<(&'static str, String)> {
     let image = image(name, text);
     let report = schema.validate(&open(&image), qcbus_schema::Limits::default());

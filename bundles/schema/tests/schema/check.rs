@@ -1,12 +1,10 @@
 //! Tests of the choice of the schema for a file, and of the deviations that are allowed.
 
-mod support;
-
 use std::sync::Arc;
 
+use crate::support::{compiled, image, open, table, violations};
 use qcbus_document::FileKind;
 use qcbus_schema::{Options, Outcome, Override, Severity, SkipReason, Version, check};
-use support::{compiled, image, open};
 
 fn map(header: &str, namespace: &str) -> String {
     format!(
@@ -235,7 +233,7 @@ fn message_gives_place_of_late_child_and_intended_attribute() {
     )
     .expect("the schema is valid");
     let found = |text: &str| -> Vec<String> {
-        let all = support::violations(&schema, "a.xodr", text);
+        let all = violations(&schema, "a.xodr", text);
         all.into_iter().map(|(_, text)| text).collect()
     };
     assert_eq!(
@@ -364,7 +362,7 @@ fn features_of_later_version_are_not_reported_as_typos() {
 
 #[test]
 fn light_types_of_openscenario_1_2_are_alternatives() {
-    let schema = support::table("xosc-1.2");
+    let schema = table("xosc-1.2");
     let scenario = |light: &str| {
         format!(
             "<OpenSCENARIO><FileHeader revMajor=\"1\" revMinor=\"2\" date=\"2026-01-01T00:00:00\" description=\"\" \

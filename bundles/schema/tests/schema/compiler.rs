@@ -1,9 +1,7 @@
 //! Tests of the compiler with small schemas: constructs that it accepts, and constructs that it
 //! rejects with name and line.
 
-mod support;
-
-use support::{compiled, violations};
+use crate::support::{compiled, image, open, table, violations};
 
 fn schema(body: &str) -> String {
     format!("<xs:schema xmlns:xs=\"http://www.w3.org/2001/XMLSchema\">\n{body}\n</xs:schema>")
@@ -173,7 +171,7 @@ fn misplaced_children_get_distinct_messages() {
 
 #[test]
 fn violation_messages_suggest_the_correction() {
-    let table = support::table("xodr-1.7");
+    let table = table("xodr-1.7");
     let road = |inner: &str| {
         format!("<OpenDRIVE><header revMajor=\"1\" revMinor=\"7\"/>{inner}</OpenDRIVE>")
     };
@@ -234,7 +232,7 @@ fn violation_messages_suggest_the_correction() {
 
 #[test]
 fn single_cause_gives_single_violation() {
-    let table = support::table("xosc-1.3");
+    let table = table("xosc-1.3");
     let scenario = |bounds: &str| {
         format!(
             "<OpenSCENARIO><FileHeader author=\"a\" date=\"2024-05-01T00:00:00\" description=\"d\" revMajor=\"1\" revMinor=\"3\"/>\
@@ -257,7 +255,7 @@ fn single_cause_gives_single_violation() {
 
 #[test]
 fn duplicate_key_is_reported() {
-    let table = support::table("xodr-1.7");
+    let table = table("xodr-1.7");
     let text = |second: &str| {
         let road = |id: &str| {
             format!(
@@ -282,7 +280,7 @@ fn duplicate_key_is_reported() {
 
 #[test]
 fn known_schema_defect_is_marked_in_violation() {
-    let table = support::table("xodr-1.8");
+    let table = table("xodr-1.8");
     let notation = table.to_notation();
     for condition in qcbus_schema::known_conditions() {
         assert!(
@@ -291,8 +289,8 @@ fn known_schema_defect_is_marked_in_violation() {
         );
     }
     let text = "<OpenDRIVE><header revMajor=\"1\" revMinor=\"8\"/><vmsGroup id=\"1\"><vmsBoardReference/></vmsGroup></OpenDRIVE>";
-    let image = support::image("t.xodr", text);
-    let report = table.validate(&support::open(&image), qcbus_schema::Limits::default());
+    let image = image("t.xodr", text);
+    let report = table.validate(&open(&image), qcbus_schema::Limits::default());
     let defect = report
         .violations
         .iter()

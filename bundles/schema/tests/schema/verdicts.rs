@@ -2,18 +2,11 @@
 //! `tests/schema/differential.py` recorded them: each line names a document, a splice, and whether
 //! the other validators accept the result.
 
-#![expect(
-    clippy::expect_used,
-    reason = "a test panics if its data is not as expected"
-)]
-
-mod support;
-
 use std::collections::HashMap;
 use std::path::Path;
 
+use crate::support::{image, open, table};
 use qcbus_schema::Limits;
-use support::{image, open, table};
 
 #[test]
 fn verdicts_match_recorded_reference_verdicts() {

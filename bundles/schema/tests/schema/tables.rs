@@ -1,10 +1,8 @@
 //! Tests of the shipped tables: they are valid, small, fast to read, and the same after a round
 //! trip.
 
-mod support;
-
+use crate::support::name_of;
 use qcbus_schema::{SHIPPED, Schema};
-use support::name_of;
 
 #[test]
 fn every_table_is_read_and_written_back_unchanged() {
