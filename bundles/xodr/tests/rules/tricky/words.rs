@@ -1,7 +1,7 @@
 //! Tests of values and attributes that old schemas do not restrict, and of content that only looks
 //! wrong.
 
-use crate::Row;
+use super::Row;
 
 /// Returns a straight road of 100 m with the given elements before its lanes and after them.
 fn road(version: &str, head: &str, tail: &str) -> String {
@@ -50,7 +50,7 @@ fn unknown_words_give_expected_findings() {
             &[],
         ),
     ];
-    crate::run_files(&rows);
+    super::run_files(&rows);
 }
 
 #[test]
@@ -84,5 +84,5 @@ fn missing_attributes_give_expected_findings() {
             &["error attributes_are_given"],
         ),
     ];
-    crate::run_files(&rows);
+    super::run_files(&rows);
 }

@@ -1,7 +1,7 @@
 //! Tests of the positions of signals and objects, of their content and of their controllers.
 
-use crate::Row;
-use crate::build::{CENTER, Road, lane, section};
+use super::Row;
+use super::build::{CENTER, Road, lane, section};
 
 /// Returns a road with two lanes on each side.
 fn with(tail: &str) -> String {
@@ -151,7 +151,7 @@ fn object_and_signal_positions_give_expected_findings() {
             &["warning road_roadside_clear_of_lanes"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -184,7 +184,7 @@ fn duplicate_signs_give_expected_findings() {
             &["error ids_id_unique_in_class"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -233,7 +233,7 @@ fn speed_signs_give_expected_findings() {
             &[],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -282,7 +282,7 @@ fn signal_controllers_give_expected_findings() {
             one,
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -386,7 +386,7 @@ fn outline_shapes_give_expected_findings() {
             &["warning road_object_crosswalk_crosses_lanes"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -417,7 +417,7 @@ fn validity_lanes_give_expected_findings() {
             &["warning road_validity_lanes_exist"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -491,7 +491,7 @@ fn repeated_objects_give_expected_findings() {
             &["warning road_roadside_near_road"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -536,5 +536,5 @@ fn degenerate_outlines_give_expected_findings() {
             &[],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }

@@ -1,7 +1,7 @@
 //! Tests of lane sections, lane numbers, widths and borders.
 
-use crate::Row;
-use crate::build::{CENTER, Road, WIDTH, lane, lane_with, section};
+use super::Row;
+use super::build::{CENTER, Road, WIDTH, lane, lane_with, section};
 
 fn lanes(lanes: &str) -> String {
     Road {
@@ -73,7 +73,7 @@ fn lane_numbers_give_expected_findings() {
             ],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -128,7 +128,7 @@ fn lane_sections_give_expected_findings() {
             &["error road_lane_center_elem_definition"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -245,5 +245,5 @@ fn lane_widths_and_borders_give_expected_findings() {
             &["error road_lane_border_exclusive_width_border"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }

@@ -1,7 +1,7 @@
 //! Tests of lane links within a road.
 
-use crate::Row;
-use crate::build::{Road, lane, lane_with, section};
+use super::Row;
+use super::build::{Road, lane, lane_with, section};
 
 fn split(first: &str, second: &str) -> String {
     let lanes = format!(
@@ -112,5 +112,5 @@ fn lane_links_between_sections_give_expected_findings() {
             &["error road_lane_link_no_link"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }

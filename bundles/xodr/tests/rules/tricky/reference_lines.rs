@@ -1,7 +1,7 @@
 //! Tests of reference lines and profiles along the road.
 
-use crate::Row;
-use crate::build::{LINE, PI, Road, file, geometry};
+use super::Row;
+use super::build::{LINE, PI, Road, file, geometry};
 
 fn two(second: [&str; 4]) -> String {
     let [s, x, y, hdg] = second;
@@ -114,7 +114,7 @@ fn geometries_give_expected_findings() {
             &["error road_geometry_one_geom_elem_per_spec"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -143,7 +143,7 @@ fn elevation_records_give_expected_findings() {
             &["error lane_smoothness_profile_no_vertical_gaps"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 /// An alternative encoding of a file.
@@ -192,9 +192,9 @@ fn equivalent_spellings_of_file_give_same_findings() {
         ),
     ];
     for (what, spell) in spellings {
-        let nothing = crate::findings(&plan, &spell(&good));
+        let nothing = super::findings(&plan, &spell(&good));
         assert!(nothing.is_empty(), "{what}: {nothing:?}");
-        let found = crate::findings(&plan, &spell(&bad));
+        let found = super::findings(&plan, &spell(&bad));
         assert!(found.iter().eq(fault.iter()), "{what}: {found:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! Tests of values, sizes and shapes that are not numbers or not intended.
 
-use crate::Row;
-use crate::build::{LINE, Road, geometry, lane, lane_with, section};
+use super::Row;
+use super::build::{LINE, Road, geometry, lane, lane_with, section};
 
 fn width(a: &str, b: &str) -> String {
     format!(r#"<width sOffset="0" a="{a}" b="{b}" c="0" d="0"/>"#)
@@ -100,7 +100,7 @@ fn non_finite_numbers_give_expected_findings() {
             &["warning numbers_computable"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -173,7 +173,7 @@ fn implausible_sizes_give_expected_findings() {
             &["warning road_geometry_hdg_in_radians"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 fn curve(shape: &str, length: &str, left: &str, right: &str) -> String {
@@ -217,5 +217,5 @@ fn folded_lanes_give_expected_findings() {
             &[],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }

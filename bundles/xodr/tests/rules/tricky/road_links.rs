@@ -1,7 +1,7 @@
 //! Tests of links between roads, in all combinations of contact points.
 
-use crate::Row;
-use crate::build::{PI, Road, lane, link, section};
+use super::Row;
+use super::build::{PI, Road, lane, link, section};
 
 /// Two roads of 100 m with a lane on each side, end to end.
 struct Pair<'a> {
@@ -207,7 +207,7 @@ fn links_between_two_roads_give_expected_findings() {
             ],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -219,7 +219,7 @@ fn self_following_road_gives_expected_findings() {
         lanes: &lanes,
         ..Road::default()
     };
-    let circle = crate::build::geometry(
+    let circle = super::build::geometry(
         "0",
         "0",
         "0",
@@ -243,7 +243,7 @@ fn self_following_road_gives_expected_findings() {
             ],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -294,5 +294,5 @@ fn lanes_far_from_reference_lines_give_expected_findings() {
         ),
         ("neither lines nor roads", row("30", "2"), LINES),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }

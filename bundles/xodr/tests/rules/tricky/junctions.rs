@@ -1,7 +1,7 @@
 //! Tests of junctions of all types.
 
-use crate::Row;
-use crate::build::{PI, Road, lane, link, section};
+use super::Row;
+use super::build::{PI, Road, lane, link, section};
 
 fn connection(id: &str, roads: [&str; 2], contact: &str, links: [&str; 2], to: &str) -> String {
     format!(
@@ -230,7 +230,7 @@ fn common_junctions_give_expected_findings() {
             ],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 /// Returns a road of two lanes and the roads that it splits into.
@@ -290,7 +290,7 @@ fn direct_junctions_give_expected_findings() {
             ],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -323,5 +323,5 @@ fn virtual_junctions_give_expected_findings() {
             &["error junctions_virtual_only_one_start_end"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }

@@ -1,7 +1,7 @@
 //! Tests of the content of the header.
 
-use crate::Row;
-use crate::build::{LINE, Road, geometry};
+use super::Row;
+use super::build::{LINE, Road, geometry};
 
 /// Returns a whole file with this header.
 fn with_header(attributes: &str, content: &str, roads: &str) -> String {
@@ -117,7 +117,7 @@ fn geographic_references_give_expected_findings() {
             FLAWED,
         ),
     ];
-    crate::run_files(&rows);
+    super::run_files(&rows);
 }
 
 #[test]
@@ -179,7 +179,7 @@ fn header_bounds_give_expected_findings() {
             &[],
         ),
     ];
-    crate::run_files(&rows);
+    super::run_files(&rows);
 }
 
 #[test]
@@ -196,5 +196,5 @@ fn header_offsets_give_expected_findings() {
         ("a quarter turn in degrees", offset("0", "-90"), far),
         ("beside the Earth", offset("6.05e11", "0"), far),
     ];
-    crate::run_files(&rows);
+    super::run_files(&rows);
 }

@@ -4,35 +4,19 @@
 //! The pages show the plain cases. These tests contain the cases that a careless implementation
 //! gets wrong.
 
-#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
-
-#[path = "tricky/beyond.rs"]
 mod beyond;
-#[path = "tricky/build.rs"]
 mod build;
-#[path = "tricky/header.rs"]
 mod header;
-#[path = "tricky/junctions.rs"]
 mod junctions;
-#[path = "tricky/lane_links.rs"]
 mod lane_links;
-#[path = "tricky/lanes.rs"]
 mod lanes;
-#[path = "tricky/numbers.rs"]
 mod numbers;
-#[path = "tricky/reference_lines.rs"]
 mod reference_lines;
-#[path = "tricky/road_links.rs"]
 mod road_links;
-#[path = "tricky/roadside.rs"]
 mod roadside;
-#[path = "tricky/slight.rs"]
 mod slight;
-#[path = "tricky/stands.rs"]
 mod stands;
-#[path = "tricky/topology.rs"]
 mod topology;
-#[path = "tricky/words.rs"]
 mod words;
 
 use std::collections::BTreeSet;

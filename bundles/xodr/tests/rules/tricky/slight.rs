@@ -1,7 +1,7 @@
 //! Tests of differences without a meaning, and of faults that look as small.
 
-use crate::Row;
-use crate::build::{CENTER, LINE, Road, WIDTH, geometry, lane, lane_with, link, section};
+use super::Row;
+use super::build::{CENTER, LINE, Road, WIDTH, geometry, lane, lane_with, link, section};
 
 fn profiles(profiles: &str) -> String {
     Road {
@@ -91,7 +91,7 @@ fn slight_length_and_width_errors_give_expected_findings() {
             &["error road_lane_width_lane_width_validity"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn shape_order_and_flat_shapes_give_expected_findings() {
             &["error road_shape_t_definition_coverage"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -176,7 +176,7 @@ fn road_marks_at_same_place_give_expected_findings() {
             &[],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -193,7 +193,7 @@ fn superfluous_link_attributes_give_expected_findings() {
             &[],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -244,7 +244,7 @@ fn late_profile_records_give_expected_findings() {
         ),
         ("lanes on one side", lanes(&one_sided("")), &[]),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -274,7 +274,7 @@ fn geometry_lengths_give_expected_findings() {
             &["error road_length_sum_geometries"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -290,5 +290,5 @@ fn lane_offset_rounding_steps_give_expected_findings() {
     };
     let equal: &[&str] = &["warning road_lanes_lane_offset_elem_asc_order"];
     let rows: Vec<Row> = vec![("the one listed later counts", offsets("20"), equal)];
-    crate::run(&rows);
+    super::run(&rows);
 }

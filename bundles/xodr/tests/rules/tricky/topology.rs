@@ -1,7 +1,7 @@
 //! Tests of connections of roads and lanes around junctions, and in the whole map.
 
-use crate::Row;
-use crate::build::{PI, Road, lane, link, section};
+use super::Row;
+use super::build::{PI, Road, lane, link, section};
 
 /// Road 1 into junction 7, road 2 through it, road 3 out of it, and further elements.
 struct Way<'a> {
@@ -116,7 +116,7 @@ fn lanes_entering_junctions_give_expected_findings() {
             &[TWO],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -195,7 +195,7 @@ fn lanes_leaving_junctions_give_expected_findings() {
             &[TWO, "warning junctions_connecting_lane_linked"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -243,5 +243,5 @@ fn touching_road_ends_give_expected_findings() {
             &[],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }

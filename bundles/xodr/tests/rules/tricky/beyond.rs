@@ -1,8 +1,8 @@
 //! Tests of two layers of lanes, separate sides, loops, places within roads, and data of other
 //! vendors.
 
-use crate::Row;
-use crate::build::{CENTER, Road, WIDTH, lane, link, section};
+use super::Row;
+use super::build::{CENTER, Road, WIDTH, lane, link, section};
 
 /// Returns a lane of one of the layers, with `links` of the form `<predecessor id layer>`:
 /// `p-1 permanent`.
@@ -87,7 +87,7 @@ fn temporary_lanes_give_expected_findings() {
             ],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -142,7 +142,7 @@ fn section_sides_loops_and_inner_links_give_expected_findings() {
             &["error road_linkage_both_sides_consistency"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -189,7 +189,7 @@ fn foreign_user_data_gives_expected_findings() {
             &[],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -228,5 +228,5 @@ fn outline_and_corner_ids_give_expected_findings() {
         ),
         ("a corner of this outline", object("3", "1"), &[]),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }

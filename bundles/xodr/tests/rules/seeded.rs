@@ -1,5 +1,5 @@
 //! Tests with real maps, broken as authors and tools break them, and changed within the allowed
-//! range. See `qcbus_rule_tests::mutate::seeded` and `tests/seeded/README.md`.
+//! range. See `qcbus_rule_tests::mutate::seeded` and `tests/rules/seeded/README.md`.
 
 use std::path::Path;
 
@@ -34,7 +34,12 @@ fn faults_are_found_and_harmless_variants_are_not_rejected() {
         include_str!("seeded/faults.txt"),
         include_str!("seeded/harmless.txt"),
     ];
-    run("bundles/xodr/tests/seeded", lists, "seeded-maps.md", 95);
+    run(
+        "bundles/xodr/tests/rules/seeded",
+        lists,
+        "seeded-maps.md",
+        95,
+    );
 }
 
 #[test]
@@ -43,7 +48,12 @@ fn held_out_faults_are_found() {
         include_str!("held-out/faults.txt"),
         include_str!("held-out/harmless.txt"),
     ];
-    run("bundles/xodr/tests/held-out", lists, "held-out-maps.md", 90);
+    run(
+        "bundles/xodr/tests/rules/held-out",
+        lists,
+        "held-out-maps.md",
+        90,
+    );
 }
 
 #[test]
@@ -52,5 +62,5 @@ fn unseen_fresh_faults_are_found() {
         include_str!("fresh/faults.txt"),
         include_str!("fresh/harmless.txt"),
     ];
-    run("bundles/xodr/tests/fresh", lists, "fresh-maps.md", 80);
+    run("bundles/xodr/tests/rules/fresh", lists, "fresh-maps.md", 80);
 }

@@ -1,7 +1,7 @@
 //! Tests of signals, controllers and objects.
 
-use crate::Row;
-use crate::build::{Road, lane, section};
+use super::Row;
+use super::build::{Road, lane, section};
 
 fn with(tail: &str, rule: &str) -> String {
     let lanes = section(
@@ -93,7 +93,7 @@ fn signals_and_controllers_give_expected_findings() {
             ],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
 
 #[test]
@@ -159,5 +159,5 @@ fn objects_give_expected_findings() {
             &["error road_records_within_extent"],
         ),
     ];
-    crate::run(&rows);
+    super::run(&rows);
 }
