@@ -1,5 +1,5 @@
 //! Tests with real scenarios, broken as authors and tools break them, and changed within the
-//! allowed range. See `qcbus_rule_tests::mutate::seeded` and `tests/seeded/README.md`.
+//! allowed range. See `qcbus_rule_tests::mutate::seeded` and `tests/rules/seeded/README.md`.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ fn faults_are_found_and_harmless_variants_are_not_rejected() {
         key: "name",
         faults: include_str!("seeded/faults.txt"),
         harmless: include_str!("seeded/harmless.txt"),
-        place: "bundles/xosc/tests/seeded",
+        place: "bundles/xosc/tests/rules/seeded",
         shared: &root.join("../shared/cases/real"),
         fetched: "QCBUS_SCENARIOS",
         page: &root.join("docs/evidence/seeded-scenarios.md"),

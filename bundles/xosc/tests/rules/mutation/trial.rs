@@ -10,7 +10,7 @@ use qcbus_xosc::BUNDLE;
 
 use super::list::{Entry, Mutation};
 
-pub const WORLD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/mutation/world");
+pub const WORLD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/rules/mutation/world");
 
 /// A scenario without faults.
 pub struct Base {

@@ -63,8 +63,8 @@ fn no_rule_fails_on_broken_real_scenarios() {
 /// they are written.
 #[test]
 fn no_rule_fails_on_broken_expanded_scenario() {
-    const MAIN: &str = include_str!("../../../tests/farm/modular/convoy.xosc");
-    const LIBRARY: &str = include_str!("../../../tests/farm/modular/moves.xosc");
+    const MAIN: &str = include_str!("../../../../tests/farm/modular/convoy.xosc");
+    const LIBRARY: &str = include_str!("../../../../tests/farm/modular/moves.xosc");
     let twists = [
         ("value=\"8\"", "value=\"-8\""),
         ("value=\"8\"", "value=\"${$p}\""),

@@ -2,21 +2,13 @@
 //! violated rule fire at the place of the edit. No other rule may fire, except those that the list
 //! of edits allows.
 //!
-//! The scenarios, their map and their catalogs are in `tests/mutation/world`, the edits in
-//! `tests/mutation/edits.txt`. `QCBUS_BLESS=1` writes `docs/evidence/mutation-openscenario.md`.
+//! The scenarios, their map and their catalogs are in `tests/rules/mutation/world`, the edits in
+//! `tests/rules/mutation/edits.txt`. `QCBUS_BLESS=1` writes `docs/evidence/mutation-openscenario.md`.
 //! `QCBUS_MUTATE=NAME` tries the edits of the rules whose name contains it, and prints the results
 //! of each.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "a test may panic and report what it tried"
-)]
-
-#[path = "mutation/list.rs"]
 mod list;
-#[path = "mutation/page.rs"]
 mod page;
-#[path = "mutation/trial.rs"]
 mod trial;
 
 use std::collections::BTreeSet;

@@ -1,8 +1,6 @@
 //! Tests of expressions from simulators' own tests, in scenarios. The whole bundle reports each
 //! faulty expression exactly once, wherever it is, and does not report the good one.
 
-#![expect(clippy::unwrap_used, reason = "a panic fails the test")]
-
 use std::path::Path;
 
 use qcbus_sdk::{Issue, Level, Listener, Loaded, Outcome, Plan, check};
