@@ -1,13 +1,6 @@
 //! Tests of cases with known results of the reference tool. If the tool is right, the expansion has
 //! the same canonical form. If it is wrong, the check for this fault fires.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "a test that cannot continue panics"
-)]
-#![expect(clippy::print_stdout, reason = "a skipped test is reported")]
-
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};

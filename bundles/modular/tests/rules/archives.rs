@@ -2,7 +2,6 @@
 //! that a packer refuses, and faults that must be reported only once.
 
 #![expect(
-    clippy::unwrap_used,
     clippy::needless_pass_by_value,
     reason = "test helpers take their arguments by value"
 )]

@@ -31,10 +31,10 @@ const ROBUST: Robust = Robust {
     ],
 };
 
-const MAIN: &str = include_str!("../../../tests/farm/modular/convoy.xosc");
-const LIBRARY: &str = include_str!("../../../tests/farm/modular/moves.xosc");
+const MAIN: &str = include_str!("../../../../tests/farm/modular/convoy.xosc");
+const LIBRARY: &str = include_str!("../../../../tests/farm/modular/moves.xosc");
 /// A library that itself takes a group.
-const FURTHER: &str = include_str!("../../../tests/farm/faulty/misassembled.xosc");
+const FURTHER: &str = include_str!("../../../../tests/farm/faulty/misassembled.xosc");
 
 #[test]
 fn no_rule_fails_on_truncated_examples() {

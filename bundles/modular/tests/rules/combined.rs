@@ -1,7 +1,5 @@
 //! Tests of combined scenarios and library files, beyond the examples of the pages.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot continue panics")]
-
 use std::path::PathBuf;
 
 use qcbus_sdk::{Loaded, Plan, examine};
