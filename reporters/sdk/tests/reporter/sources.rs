@@ -1,11 +1,5 @@
 //! Tests of source lines of files on disk.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "a test that cannot continue panics"
-)]
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -1,14 +1,6 @@
 //! Tests of the JUnit of whole reports.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "a test that cannot continue panics"
-)]
-
-mod common;
-
-use common::{blocked, checker, endings, issue, markup, report, result, sections};
+use crate::common::{blocked, checker, endings, issue, markup, report, result, sections};
 use qcbus_formats::location::OtherPlace;
 use qcbus_formats::xqar::{Level, Location, Locations, Param, Status};
 use qcbus_messages::Verdict;

@@ -1,10 +1,8 @@
 //! Tests of maps with hostile numbers. No road is lost, and drawing ends.
 
-mod support;
-
+use crate::support::{TWO_LANES, decode, line, plan, road, with_map};
 use proptest::prelude::*;
 use qcbus_plan::{Locator, Plan, Said};
-use support::{TWO_LANES, decode, line, plan, road, with_map};
 
 const CANNOT_BE_DRAWN: u64 = 2;
 

@@ -1,7 +1,5 @@
 //! Tests of the format with one line for each finding.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot continue panics")]
-
 use qcbus_formats::location::OtherPlace;
 use qcbus_formats::pool::BLOCKED;
 use qcbus_formats::xqar::{Checker, Issue, Level, Metadata, Param, Status};

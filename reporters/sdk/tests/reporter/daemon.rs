@@ -1,12 +1,5 @@
 //! Tests of a reporter on a real bus, with a simulated broker.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "a test that cannot continue panics"
-)]
-
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::path::Path;

@@ -1,6 +1,5 @@
 //! Maps made from text, and a decoder of their plans that is based only on `docs/html-report.md`.
 
-#![allow(dead_code, reason = "each test uses only a part of it")]
 #![expect(clippy::expect_used, clippy::panic, reason = "test helpers may panic")]
 
 use std::path::Path;
@@ -124,6 +123,7 @@ pub struct Junction {
 #[derive(Debug)]
 pub struct Signal {
     pub names: [String; 4],
+    #[expect(dead_code, reason = "the decoder reads whole records")]
     pub road: usize,
     pub s: u64,
     pub t: i64,

@@ -1,7 +1,5 @@
 //! Tests of a report on an existing result file.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot continue panics")]
-
 use std::path::Path;
 
 use qcbus_formats::xqar::Param;

@@ -1,12 +1,10 @@
 //! Tests with the maps of other projects, if they are available. Drawn lines must match the model.
 
-mod support;
-
 use std::path::{Path, PathBuf};
 
+use crate::support::{Border, Decoded, decode, with_bytes};
 use qcbus_opendrive::{Edge, RoadMap, SectionRef};
 use qcbus_plan::{Locator, Plan, Said};
-use support::{Border, Decoded, decode, with_bytes};
 
 /// Returns all maps below a directory, in a fixed order.
 fn maps(directory: &Path) -> Vec<PathBuf> {

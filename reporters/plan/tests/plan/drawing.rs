@@ -1,10 +1,8 @@
 //! Tests of the plan of a map, decoded from its bytes.
 
-mod support;
-
 use std::f64::consts::FRAC_PI_2;
 
-use support::{Border, Decoded, TWO_LANES, line, plan, road};
+use crate::support::{Border, Decoded, TWO_LANES, decode, line, plan, road, with_map};
 
 fn places(border: &Border) -> Vec<[i64; 2]> {
     border.places()
@@ -129,8 +127,8 @@ fn spirals_and_cubics_stay_within_two_centimetres() {
         let wide = "<laneOffset s='0' a='0.5' b='0' c='0.002' d='-0.00002'/>\
             <laneSection s='0'><center><lane id='0'/></center><right><lane id='-1'>\
             <width sOffset='0' a='2' b='0' c='0.004' d='-0.00003'/></lane></right></laneSection>";
-        support::with_map(&road("1", "", 80.0, &geometry, wide), |map| {
-            let plan = support::decode(&qcbus_plan::Plan::of(map).bytes());
+        with_map(&road("1", "", 80.0, &geometry, wide), |map| {
+            let plan = decode(&qcbus_plan::Plan::of(map).bytes());
             let section = map.sections().next().unwrap();
             let lane = section.lane(-1).unwrap();
             let drawn = places(&plan.roads[0].sections[0].right[0].border);

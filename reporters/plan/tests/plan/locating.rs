@@ -1,9 +1,7 @@
 //! Tests of the places of findings.
 
-mod support;
-
+use crate::support::{TWO_LANES, line, road, with_map};
 use qcbus_plan::{How, Locator, Said, Spot, Target};
-use support::{line, road, with_map};
 
 /// Returns two roads with the same id, 100 m long, side by side, and two junctions, one of them
 /// with an outline.
@@ -255,7 +253,7 @@ fn ten_thousand_findings_are_located_on_their_roads() {
     let roads: String = (0..500)
         .map(|id| {
             let geometry = line(0.0, 0.0, f64::from(id), 0.0, 100.0);
-            road(&format!("r{id}"), "", 100.0, &geometry, support::TWO_LANES)
+            road(&format!("r{id}"), "", 100.0, &geometry, TWO_LANES)
         })
         .collect();
     with_map(&roads, |map| {

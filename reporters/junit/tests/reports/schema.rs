@@ -3,17 +3,9 @@
 //! `QCBUS_JUNIT_XSD` names a copy of `junit-10.xsd`, and `xmllint` validates the reports. If either
 //! is missing, the test checks nothing and prints a message.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "a test that cannot continue panics"
-)]
-
-mod common;
-
 use std::process::Command;
 
-use common::{blocked, checker, endings, issue, report, result};
+use crate::common::{blocked, checker, endings, issue, report, result};
 use qcbus_formats::xqar::{Level, Param, Status};
 
 #[test]
