@@ -1,11 +1,5 @@
 //! Python modules run in a fork server, and this does not change the result.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stderr,
-    reason = "a test that cannot continue panics, and a skipped test is reported"
-)]
-
 use std::os::unix::fs::PermissionsExt as _;
 use std::process::{Command, Stdio};
 
@@ -56,7 +50,7 @@ fn says(deed: &str, more: &[&str]) -> Option<String> {
     std::fs::write(&program, text).unwrap();
     std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
     let file = dir.path().join("real.xodr");
-    std::fs::write(&file, include_str!("../src/samples/sample.xodr")).unwrap();
+    std::fs::write(&file, include_str!("../../src/samples/sample.xodr")).unwrap();
     let command = format!("{} -c $ASAM_QC_FRAMEWORK_CONFIG_FILE", program.display());
     let scratch = dir.path().join("scratch");
     let output = Command::new(env!("CARGO_BIN_EXE_qcbus-asam-adapter"))
