@@ -1,7 +1,7 @@
 //! Chaos: processes die at random, but every file gets exactly one complete verdict for its exact
 //! bytes.
 //!
-//! `QCBUS_CHAOS_SECONDS` makes the storm longer (20 by default), `QCBUS_CHAOS_SEED` repeats one,
+//! `QCBUS_CHAOS_SECONDS` makes the storm longer (8 by default), `QCBUS_CHAOS_SEED` repeats one,
 //! `QCBUS_MANY_FILES` sets how many files are dropped at once (1,500 by default).
 
 #![allow(
@@ -36,7 +36,7 @@ fn nothing_is_lost_whatever_dies() {
     }
     // The zoo is built first, because nothing is built inside.
     zoo();
-    match run_inside("nothing_is_lost_whatever_dies", SMALL_SHM) {
+    match run_inside(module_path!(), "nothing_is_lost_whatever_dies", SMALL_SHM) {
         Some(status) => assert!(status.success(), "see above"),
         // Without a private shared memory the storm does not fill it. The rest is the same.
         None => storm::rage(seed(), storm::seconds()),

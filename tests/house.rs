@@ -10,6 +10,8 @@
 mod documents;
 #[path = "house/sizes.rs"]
 mod sizes;
+#[path = "house/targets.rs"]
+mod targets;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

@@ -32,7 +32,7 @@ use crate::{end, report};
 
 /// Returns the length of the storm in seconds.
 pub fn seconds() -> u64 {
-    crate::number_from("QCBUS_CHAOS_SECONDS", 20)
+    crate::number_from("QCBUS_CHAOS_SECONDS", 8)
 }
 
 /// Limit for the broker's peak private memory. A higher peak means that its memory is not bounded.

@@ -8,7 +8,8 @@ use rustix::fs::{CWD, RenameFlags, renameat_with};
 
 use super::driver::Driver;
 use crate::support::cli::files_below;
-use crate::support::farm::{Farm, copy_program};
+use crate::support::farm::Farm;
+use crate::support::programs::copy_program;
 
 impl Driver {
     /// Removes a result, a verdict file or a published file.

@@ -12,7 +12,7 @@ use super::verdicts::JUDGE;
 use crate::support::farm::zoo;
 
 /// Shell functions of well-behaved modules.
-const MANNERS: &str = include_str!("../../bundles/asam-adapter/tests/guests/manners.sh");
+const MANNERS: &str = include_str!("../../bundles/asam-adapter/tests/modules/guests/manners.sh");
 
 impl Driver {
     pub fn animal(&mut self) {

@@ -335,17 +335,6 @@ pub fn shm_segments(prefix: &str) -> Vec<String> {
     names.filter(|name| name.starts_with(prefix)).collect()
 }
 
-/// Copies a program by another process. If this process had the copy open for writing, a child of
-/// another test could inherit it. The program could then not be run ("text file busy").
-pub fn copy_program(from: &Path, to: &Path) {
-    let copied = Command::new("cp").arg(from).arg(to).status();
-    assert!(
-        copied.unwrap().success(),
-        "{} must be copied",
-        from.display()
-    );
-}
-
 /// Returns the end of a log.
 pub fn tail(log: &str) -> String {
     let lines: Vec<&str> = log.lines().collect();

@@ -26,14 +26,30 @@ pub fn refused() -> Option<String> {
 }
 
 /// Runs one test of this executable again inside a namespace, after the shell command `prepare`.
-/// Returns `None` if this is not possible; the reason is printed.
-pub fn run_inside(test: &str, prepare: &str) -> Option<ExitStatus> {
+/// `module` is the `module_path!()` of the test. Returns `None` if this is not possible; the reason
+/// is printed.
+///
+/// # Panics
+/// Panics if there is no such test, because running no test would succeed.
+pub fn run_inside(module: &str, test: &str, prepare: &str) -> Option<ExitStatus> {
     if let Some(why) = refused() {
         skip(test, &why);
         return None;
     }
+    let name = match module.split_once("::") {
+        Some((_, module)) => format!("{module}::{test}"),
+        None => test.to_owned(),
+    };
     let itself = std::env::current_exe().unwrap();
-    let arguments = [&itself.to_string_lossy(), "--exact", test, "--nocapture"];
+    let listed = Command::new(&itself)
+        .args(["--list", "--exact", &name])
+        .output()
+        .unwrap();
+    assert!(
+        listed.stdout.starts_with(name.as_bytes()),
+        "there is no test {name}"
+    );
+    let arguments = [&itself.to_string_lossy(), "--exact", &name, "--nocapture"];
     let status = namespace(prepare, &arguments)
         .env(INSIDE, "1")
         .status()

@@ -13,6 +13,7 @@ pub mod farm;
 pub mod inside;
 pub mod judge;
 pub mod processes;
+pub mod programs;
 pub mod reports;
 pub mod tracer;
 pub mod watchdog;

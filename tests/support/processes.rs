@@ -97,6 +97,14 @@ fn all() -> impl Iterator<Item = Process> {
         })
 }
 
+/// Returns the parent of a process. The parent of a confined bundle is the launcher that the broker
+/// has started.
+pub fn parent_of(pid: u32) -> u32 {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
+    let (_, rest) = stat.rsplit_once(')').unwrap();
+    rest.split_whitespace().nth(1).unwrap().parse().unwrap()
+}
+
 /// Returns the value of a field in `/proc/PID/status` that counts KiB.
 pub fn memory_kib(pid: u32, field: &str) -> Option<u64> {
     let path = PathBuf::from(format!("/proc/{pid}/status"));

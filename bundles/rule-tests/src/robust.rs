@@ -1,5 +1,5 @@
 //! Damages files for tests in every way that authors and tools do. No damaged file may make a rule
-//! panic. `QCBUS_FUZZ_ROUNDS` sets the number of mutations of examples (3,000), `QCBUS_FUZZ_FILES`
+//! panic. `QCBUS_FUZZ_ROUNDS` sets the number of mutations of examples (1,000), `QCBUS_FUZZ_FILES`
 //! that of other files (200). `QCBUS_FUZZ_PLACES` sets at how many places those files are cut (2).
 //! `QCBUS_FUZZ_SEED` sets another seed.
 //!
@@ -64,7 +64,7 @@ impl Robust {
         let plan = Plan::by_default(self.bundle);
         let documents = evidence::documents(self.bundle);
         let mut dice = dice();
-        for round in 0..setting("QCBUS_FUZZ_ROUNDS", 3_000) {
+        for round in 0..setting("QCBUS_FUZZ_ROUNDS", 1_000) {
             let shown = &documents[round % documents.len()];
             let mut text = shown.text.clone().into_bytes();
             self.mutate(&mut text, &mut dice);
@@ -83,7 +83,7 @@ impl Robust {
         let folder = tempfile::tempdir().unwrap();
         let mut dice = dice();
         // A round costs ten times as much as one with a single file in memory.
-        for _ in 0..setting("QCBUS_FUZZ_ROUNDS", 3_000) / 10 {
+        for _ in 0..setting("QCBUS_FUZZ_ROUNDS", 1_000) / 10 {
             let mut mutated: Vec<Vec<u8>> = Vec::new();
             let victim = dice.below(files.len());
             for (index, (_, text)) in files.iter().enumerate() {

@@ -88,7 +88,7 @@ fn add(spots: &mut Spots, file: &Path, rows: Rows) {
 }
 
 impl Edit {
-    /// Parses `SELECTOR | EDIT`. The words are described in `bundles/xosc/tests/seeded/README.md`.
+    /// Parses `SELECTOR | EDIT`. The words are described in `bundles/xosc/tests/rules/seeded/README.md`.
     ///
     /// # Errors
     /// Returns an error for text that cannot be parsed.

@@ -50,7 +50,7 @@ pub type Edited = (String, BTreeSet<u64>);
 type Splices = Vec<(Range<usize>, String)>;
 
 impl Action {
-    /// Parses an edit as described in `bundles/xosc/tests/seeded/README.md`.
+    /// Parses an edit as described in `bundles/xosc/tests/rules/seeded/README.md`.
     ///
     /// # Errors
     /// Returns an error for text that cannot be parsed.

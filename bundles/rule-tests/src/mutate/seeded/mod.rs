@@ -1,6 +1,6 @@
 //! Study with real files. Some are broken as authors and tools break them; others are changed in
 //! allowed ways. The faults must be found at their places, and the rest must have no findings.
-//! `bundles/xosc/tests/seeded/README.md` describes the lists.
+//! `bundles/xosc/tests/rules/seeded/README.md` describes the lists.
 //!
 //! Some of the files are among the shared cases. The others are below a directory named by an
 //! environment variable. Missing files are skipped. `QCBUS_BLESS=1` writes the study's page if all

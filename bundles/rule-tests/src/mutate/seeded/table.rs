@@ -1,4 +1,4 @@
-//! Parser of the lists of faults and of harmless variants. `bundles/xosc/tests/seeded/README.md`
+//! Parser of the lists of faults and of harmless variants. `bundles/xosc/tests/rules/seeded/README.md`
 //! describes their format.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,0 +1,9 @@
+//! Tests of the model of a scenario.
+
+mod common;
+
+mod catalogs;
+mod expressions;
+mod expressions_hostile;
+mod expressions_oracle;
+mod values;

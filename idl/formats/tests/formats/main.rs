@@ -1,0 +1,13 @@
+//! Tests of the file formats: configurations, manifests, results, pooling.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot continue panics")]
+
+mod common;
+
+mod config;
+mod manifest;
+mod pool;
+mod python;
+mod round_trip;
+mod seeded_fuzz;
+mod xqar;
