@@ -150,21 +150,24 @@ fn coloured_line(text: &str) -> String {
 /// Sends log events to stderr. `QCBUS_LOG` sets the filter (`info`, `qcbus_bus=debug`, …) and
 /// `QCBUS_LOG_FORMAT=json` the format.
 pub fn log(default: &str) {
-    use tracing_subscriber::EnvFilter;
-    let filter = EnvFilter::try_from_env("QCBUS_LOG").unwrap_or_else(|_| EnvFilter::new(default));
-    let builder = tracing_subscriber::fmt()
-        .with_env_filter(filter)
+    use tracing::subscriber::set_global_default;
+    use tracing_subscriber::filter::Targets;
+    use tracing_subscriber::layer::SubscriberExt;
+    use tracing_subscriber::{fmt, registry};
+    let asked = std::env::var("QCBUS_LOG").ok();
+    let asked = asked.and_then(|it| it.parse::<Targets>().ok());
+    let filter = asked.or_else(|| default.parse().ok()).unwrap_or_default();
+    let lines = fmt::layer()
         // A failed write to stderr cannot be reported and is no reason to end.
         .log_internal_errors(false)
         .with_writer(|| LogLines);
     let json = std::env::var("QCBUS_LOG_FORMAT").is_ok_and(|it| it == "json");
     // A second subscriber cannot be set; the first one remains.
     let _ = if json {
-        tracing::subscriber::set_global_default(builder.json().finish())
+        set_global_default(registry().with(lines.json()).with(filter))
     } else {
-        tracing::subscriber::set_global_default(
-            builder.with_ansi(io::stderr().is_terminal()).finish(),
-        )
+        let lines = lines.with_ansi(io::stderr().is_terminal());
+        set_global_default(registry().with(lines).with(filter))
     };
 }
 
