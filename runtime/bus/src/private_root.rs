@@ -16,6 +16,7 @@ use iceoryx2_cal::dynamic_storage::file::Storage;
 use iceoryx2_cal::event::trigger::State;
 use iceoryx2_cal::event::trigger::unix_datagram_socket::GenericUnixDatagramSocketTrigger;
 use iceoryx2_cal::resizable_shared_memory::dynamic::DynamicMemory;
+use iceoryx2_cal::serialize::postcard::Postcard;
 use iceoryx2_cal::shared_memory::file::Memory;
 use iceoryx2_cal::shm_allocator::bump_allocator::BumpAllocator;
 use iceoryx2_cal::shm_allocator::pool_allocator::PoolAllocator;
@@ -30,7 +31,8 @@ pub(crate) struct PrivateRoot {}
 impl Service for PrivateRoot {
     type ServiceNameHasher = <Ipc as Service>::ServiceNameHasher;
     type StaticStorage = <Ipc as Service>::StaticStorage;
-    type ConfigSerializer = <Ipc as Service>::ConfigSerializer;
+    /// TOML, the usual choice, takes a third of the machine code of this crate.
+    type ConfigSerializer = Postcard;
     type PersistentDynamicStorage<T: Debug + Send + Sync + ZeroCopySend + 'static> = Storage<T>;
     type Bag = <Ipc as Service>::Bag;
     type DynamicStorage<T: Debug + Send + Sync + ZeroCopySend + 'static> = Storage<T>;
