@@ -5,8 +5,9 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 /// Version of the messages in this crate. Peers of another version are refused by name. Raise it
-/// with every change of a message, because old messages would be decoded as different ones.
-pub const PROTOCOL_VERSION: u32 = 5;
+/// with every change of a message, because old messages would be decoded as different ones, and with
+/// every change of the format in which services on the bus are described.
+pub const PROTOCOL_VERSION: u32 = 6;
 
 /// One check of one file's bytes under one configuration; unique within a broker generation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
