@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use qcbus_control::ask_broker;
+use qcbus_control::{AskError, ask_broker};
 use qcbus_messages::CheckerInfo;
 use qcbus_messages::control::{Offer, Request, Response};
 use qcbus_messages::shown;
@@ -36,6 +36,10 @@ impl Offered {
         let (offers, why_not) = match ask_broker(instance.dir(), &request) {
             Ok(Response::Offers { offers }) => (offers, None),
             Ok(other) => (Vec::new(), Some(format!("unexpected answer: {other:?}"))),
+            Err(AskError::NoBroker { .. }) => {
+                let why = format!("no broker runs as instance `{}`", instance.name());
+                (Vec::new(), Some(why))
+            }
             Err(error) => (Vec::new(), Some(error.to_string())),
         };
         let why_not = why_not.map(|it| format!("only rules that come with qcbus are known: {it}"));
