@@ -138,7 +138,7 @@ fn unknown(id: &str, offered: &Offered) -> Exit {
     }
     let hint = standard::hint(id);
     let why = offered.why_not.as_deref();
-    let why = why.map(|it| format!("; {it}")).unwrap_or_default();
+    let why = why.map(|it| format!(" ({it})")).unwrap_or_default();
     talk::fail(&format!("rule `{id}` not found; {hint}{why}"));
     Exit::Usage
 }
