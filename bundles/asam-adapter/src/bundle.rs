@@ -31,7 +31,7 @@ struct Host {
 }
 
 /// The part of a result that a rule reports.
-enum Part {
+enum RuleKind {
     /// A checker of the module.
     Checker(&'static Known),
     /// All checkers without a rule of their own.
@@ -40,7 +40,7 @@ enum Part {
 
 struct HostedRule {
     facts: Facts,
-    part: Part,
+    kind: RuleKind,
     host: &'static Host,
 }
 
@@ -68,11 +68,11 @@ pub(crate) fn bundle(hosted: Hosted, learned: Learned, runners: Runners) -> &'st
     });
     let learned = &host.learned;
     let known = learned.checkers.iter();
-    let rules = known.map(|it| (facts_of(it), Part::Checker(it)));
-    let rules = rules.chain([(module_facts(), Part::Rest)]);
+    let rules = known.map(|it| (facts_of(it), RuleKind::Checker(it)));
+    let rules = rules.chain([(module_facts(), RuleKind::Rest)]);
     let rules: Vec<&'static dyn AnyRule> = rules
-        .map(|(facts, part)| {
-            let rule = leak(HostedRule { facts, part, host });
+        .map(|(facts, kind)| {
+            let rule = leak(HostedRule { facts, kind, host });
             rule as &'static dyn AnyRule
         })
         .collect();
@@ -222,9 +222,9 @@ impl<'d> Built<'d> for Run<'d> {
         let Some(rule) = rule.as_any().downcast_ref::<HostedRule>() else {
             return;
         };
-        match rule.part {
-            Part::Checker(known) => self.told(known, found),
-            Part::Rest => self.told_besides(rule.host, found),
+        match rule.kind {
+            RuleKind::Checker(known) => self.told(known, found),
+            RuleKind::Rest => self.told_besides(rule.host, found),
         }
     }
 }
