@@ -31,7 +31,7 @@ pub(crate) struct PrivateRoot {}
 impl Service for PrivateRoot {
     type ServiceNameHasher = <Ipc as Service>::ServiceNameHasher;
     type StaticStorage = <Ipc as Service>::StaticStorage;
-    /// TOML, the usual choice, takes a third of the machine code of this crate.
+    /// The usual choice is TOML. Its readers were the largest functions of this crate.
     type ConfigSerializer = Postcard;
     type PersistentDynamicStorage<T: Debug + Send + Sync + ZeroCopySend + 'static> = Storage<T>;
     type Bag = <Ipc as Service>::Bag;
