@@ -242,9 +242,9 @@ mod tests {
             ("run 2>/dev/null more", &["run"]),
             (
                 "$CARGO_PKG_NAME/run ${CARGO_PKG_NAME}x",
-                &["qcbus-broker/run", "qcbus-brokerx"],
+                &["qcbus-configuration/run", "qcbus-configurationx"],
             ),
-            ("\"$CARGO_PKG_NAME\"", &["qcbus-broker"]),
+            ("\"$CARGO_PKG_NAME\"", &["qcbus-configuration"]),
             ("$no_such_variable_here/run", &[]),
             ("${CARGO_PKG_NAME:-x}", &[]),
             ("$1 x", &[]),
