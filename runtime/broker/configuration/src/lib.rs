@@ -43,7 +43,7 @@ pub struct Sources {
     pub lasting: bool,
     /// Directory of manifests.
     pub bundles_d: Option<PathBuf>,
-    /// Selection among the required checkers.
+    /// Selection among the demanded checkers.
     pub choice: Choice,
     /// Whether the verdict on a file is independent of the verdicts on the files that it depends on.
     pub own_verdicts: bool,

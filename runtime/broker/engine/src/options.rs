@@ -38,7 +38,7 @@ pub struct Options {
     pub state: Option<PathBuf>,
     /// Retention time of the job history.
     pub retention: Duration,
-    /// Selection among the required checkers.
+    /// Selection among the demanded checkers.
     pub choice: Choice,
     /// Dialect of the results.
     pub dialect: Dialect,

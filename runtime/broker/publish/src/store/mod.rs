@@ -47,7 +47,7 @@ pub use trial::TrialResults;
 pub struct Store {
     /// Paths of the results.
     pub places: ResultPaths,
-    /// Selection among the required checkers.
+    /// Selection among the demanded checkers.
     pub choice: Choice,
     /// Dialect of the results.
     pub dialect: Dialect,

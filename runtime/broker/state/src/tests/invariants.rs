@@ -122,7 +122,7 @@ impl World {
         );
         for bundle in job.bundles.iter().filter(|it| it.catalogue.is_some()) {
             let said = bundle.said();
-            assert_eq!(said.checkers.len(), 2, "every required checker is present");
+            assert_eq!(said.checkers.len(), 2, "every demanded checker is present");
             let mut checkers = said.checkers.iter();
             assert!(
                 checkers.all(|it| it.issues.len() <= 2),
