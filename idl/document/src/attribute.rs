@@ -1,10 +1,12 @@
-//! One attribute and its position.
+//! One attribute, its position and its value as a number.
+
+use std::fmt;
 
 use crate::document::Document;
 use crate::layout::{AttributeRecord, NodeRecord, Section};
 use crate::node::Node;
-use crate::source::Position;
-use crate::value::{self, ValueError};
+use crate::position::Position;
+use crate::value::{NumberKind, Shown, Wrong, parse_double, parse_integer, trim};
 
 /// An attribute of an element.
 #[derive(Clone, Copy)]
@@ -114,7 +116,7 @@ impl<'a> Attribute<'a> {
     /// # Errors
     /// Fails if it is not a number, or is outside the range of a double.
     pub fn f64(&self) -> Result<f64, ValueError<'a>> {
-        value::parse_f64(*self)
+        parse_double(trim(self.value())).map_err(|wrong| self.error(wrong, NumberKind::Double))
     }
 
     /// Returns the value as an integer; see [`Node::i64`].
@@ -122,7 +124,21 @@ impl<'a> Attribute<'a> {
     /// # Errors
     /// Fails if it is not an integer, or does not fit into 64 bits.
     pub fn i64(&self) -> Result<i64, ValueError<'a>> {
-        value::parse_i64(*self)
+        parse_integer(trim(self.value())).map_err(|wrong| self.error(wrong, NumberKind::Integer))
+    }
+
+    fn error(&self, wrong: Wrong, expected: NumberKind) -> ValueError<'a> {
+        let attribute = *self;
+        match wrong {
+            Wrong::Spelling => ValueError::Malformed {
+                attribute,
+                expected,
+            },
+            Wrong::Range => ValueError::OutOfRange {
+                attribute,
+                expected,
+            },
+        }
     }
 
     /// Returns the position of its name.
@@ -137,11 +153,109 @@ impl<'a> Attribute<'a> {
     }
 }
 
-impl std::fmt::Debug for Attribute<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl fmt::Debug for Attribute<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}={:?} of {:?}", self.name(), self.value(), self.node)
     }
 }
+
+/// Reason why an attribute gives no number. Its text names the element and the attribute;
+/// [`node`](ValueError::node) and [`offset`](ValueError::offset) lead to the place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ValueError<'a> {
+    /// The element has no such attribute.
+    Missing {
+        /// The element.
+        node: Node<'a>,
+        /// The missing attribute.
+        name: &'a str,
+    },
+    /// The value is not a valid spelling of a number of that kind.
+    Malformed {
+        /// The attribute.
+        attribute: Attribute<'a>,
+        /// The expected kind of number.
+        expected: NumberKind,
+    },
+    /// The value is spelt correctly but too large for the type.
+    OutOfRange {
+        /// The attribute.
+        attribute: Attribute<'a>,
+        /// The expected kind of number.
+        expected: NumberKind,
+    },
+}
+
+impl<'a> ValueError<'a> {
+    /// Returns the element that should have the attribute.
+    pub fn node(&self) -> Node<'a> {
+        match self {
+            ValueError::Missing { node, .. } => *node,
+            ValueError::Malformed { attribute, .. } | ValueError::OutOfRange { attribute, .. } => {
+                attribute.node()
+            }
+        }
+    }
+
+    /// Returns the name of the requested attribute.
+    pub fn attribute_name(&self) -> &'a str {
+        match self {
+            ValueError::Missing { name, .. } => name,
+            ValueError::Malformed { attribute, .. } | ValueError::OutOfRange { attribute, .. } => {
+                attribute.name()
+            }
+        }
+    }
+
+    /// Returns the offset to point at: that of the attribute, or of the element that lacks it.
+    pub fn offset(&self) -> u32 {
+        match self {
+            ValueError::Missing { node, .. } => node.offset(),
+            ValueError::Malformed { attribute, .. } | ValueError::OutOfRange { attribute, .. } => {
+                attribute.offset()
+            }
+        }
+    }
+
+    /// Checks whether the attribute is missing rather than wrong.
+    pub fn is_missing(&self) -> bool {
+        matches!(self, ValueError::Missing { .. })
+    }
+}
+
+impl fmt::Display for ValueError<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let element = self.node().name();
+        let name = self.attribute_name();
+        match self {
+            ValueError::Missing { .. } => write!(f, "<{element}> has no attribute '{name}'"),
+            ValueError::Malformed {
+                attribute,
+                expected,
+            } => {
+                write!(
+                    f,
+                    "attribute '{name}' of <{element}> is {}, ",
+                    Shown(attribute.value())
+                )?;
+                expected.teach_spelling(attribute.value(), f)
+            }
+            ValueError::OutOfRange {
+                attribute,
+                expected,
+            } => {
+                write!(
+                    f,
+                    "attribute '{name}' of <{element}> is {}, ",
+                    Shown(attribute.value())
+                )?;
+                f.write_str(expected.range())
+            }
+        }
+    }
+}
+
+impl std::error::Error for ValueError<'_> {}
 
 /// The attributes of an element; created by [`Node::attributes`].
 #[derive(Clone)]
@@ -160,8 +274,8 @@ impl<'a> Attributes<'a> {
     }
 }
 
-impl std::fmt::Debug for Attributes<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl fmt::Debug for Attributes<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_list().entries(self.clone()).finish()
     }
 }

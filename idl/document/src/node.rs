@@ -4,11 +4,10 @@ use std::borrow::Cow;
 use std::cmp::Ordering;
 use std::hash::{Hash, Hasher};
 
-use crate::attribute::{Attribute, Attributes};
+use crate::attribute::{Attribute, Attributes, ValueError};
 use crate::document::{Document, NameMatcher};
 use crate::layout::{ELEMENT, NodeRecord, RESOLVED_TEXT, Section, TEXT};
-use crate::source::Position;
-use crate::value::{self, ValueError};
+use crate::position::Position;
 
 /// A node of a document. It is an element unless [`is_element`](Node::is_element) returns `false`;
 /// the navigation below leads to elements only.
@@ -150,7 +149,7 @@ impl<'a> Node<'a> {
     /// # Errors
     /// The attribute is missing, is not a number, or is outside the range of a double.
     pub fn f64(&self, name: &'a str) -> Result<f64, ValueError<'a>> {
-        value::parse_f64(self.required(name)?)
+        self.required(name)?.f64()
     }
 
     /// Returns the attribute's value as an integer. The value must be spelt as in XML Schema. XML
@@ -159,7 +158,7 @@ impl<'a> Node<'a> {
     /// # Errors
     /// The attribute is missing, is not an integer, or needs more than 64 bits.
     pub fn i64(&self, name: &'a str) -> Result<i64, ValueError<'a>> {
-        value::parse_i64(self.required(name)?)
+        self.required(name)?.i64()
     }
 
     fn required(&self, name: &'a str) -> Result<Attribute<'a>, ValueError<'a>> {

@@ -2,36 +2,6 @@
 
 use std::fmt;
 
-use crate::attribute::Attribute;
-use crate::node::Node;
-
-/// Reason why an attribute gives no number. Its text names the element and the attribute;
-/// [`node`](ValueError::node) and [`offset`](ValueError::offset) lead to the place.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ValueError<'a> {
-    /// The element has no such attribute.
-    Missing {
-        /// The element.
-        node: Node<'a>,
-        /// The missing attribute.
-        name: &'a str,
-    },
-    /// The value is not a valid spelling of a number of that kind.
-    Malformed {
-        /// The attribute.
-        attribute: Attribute<'a>,
-        /// The expected kind of number.
-        expected: NumberKind,
-    },
-    /// The value is spelt correctly but too large for the type.
-    OutOfRange {
-        /// The attribute.
-        attribute: Attribute<'a>,
-        /// The expected kind of number.
-        expected: NumberKind,
-    },
-}
-
 /// The kinds of numbers that a caller can ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NumberKind {
@@ -41,79 +11,8 @@ pub enum NumberKind {
     Integer,
 }
 
-impl<'a> ValueError<'a> {
-    /// Returns the element that should have the attribute.
-    pub fn node(&self) -> Node<'a> {
-        match self {
-            ValueError::Missing { node, .. } => *node,
-            ValueError::Malformed { attribute, .. } | ValueError::OutOfRange { attribute, .. } => {
-                attribute.node()
-            }
-        }
-    }
-
-    /// Returns the name of the requested attribute.
-    pub fn attribute_name(&self) -> &'a str {
-        match self {
-            ValueError::Missing { name, .. } => name,
-            ValueError::Malformed { attribute, .. } | ValueError::OutOfRange { attribute, .. } => {
-                attribute.name()
-            }
-        }
-    }
-
-    /// Returns the offset to point at: that of the attribute, or of the element that lacks it.
-    pub fn offset(&self) -> u32 {
-        match self {
-            ValueError::Missing { node, .. } => node.offset(),
-            ValueError::Malformed { attribute, .. } | ValueError::OutOfRange { attribute, .. } => {
-                attribute.offset()
-            }
-        }
-    }
-
-    /// Checks whether the attribute is missing rather than wrong.
-    pub fn is_missing(&self) -> bool {
-        matches!(self, ValueError::Missing { .. })
-    }
-}
-
-impl fmt::Display for ValueError<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let element = self.node().name();
-        let name = self.attribute_name();
-        match self {
-            ValueError::Missing { .. } => write!(f, "<{element}> has no attribute '{name}'"),
-            ValueError::Malformed {
-                attribute,
-                expected,
-            } => {
-                write!(
-                    f,
-                    "attribute '{name}' of <{element}> is {}, ",
-                    Shown(attribute.value())
-                )?;
-                expected.teach_spelling(attribute.value(), f)
-            }
-            ValueError::OutOfRange {
-                attribute,
-                expected,
-            } => {
-                write!(
-                    f,
-                    "attribute '{name}' of <{element}> is {}, ",
-                    Shown(attribute.value())
-                )?;
-                f.write_str(expected.range())
-            }
-        }
-    }
-}
-
-impl std::error::Error for ValueError<'_> {}
-
 impl NumberKind {
-    fn teach_spelling(self, value: &str, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    pub(crate) fn teach_spelling(self, value: &str, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let value = trim(value);
         if value.is_empty() {
             return f.write_str("but a number is expected");
@@ -141,7 +40,7 @@ impl NumberKind {
         }
     }
 
-    fn range(self) -> &'static str {
+    pub(crate) fn range(self) -> &'static str {
         match self {
             NumberKind::Double => "which is beyond the largest double, about 1.8e308",
             NumberKind::Integer => {
@@ -152,7 +51,7 @@ impl NumberKind {
 }
 
 /// A value in quotes, truncated when it is long.
-struct Shown<'a>(&'a str);
+pub(crate) struct Shown<'a>(pub(crate) &'a str);
 
 impl fmt::Display for Shown<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -167,37 +66,17 @@ impl fmt::Display for Shown<'_> {
     }
 }
 
-pub(crate) fn parse_f64(attribute: Attribute<'_>) -> Result<f64, ValueError<'_>> {
-    parse_double(trim(attribute.value())).map_err(|wrong| wrong.of(attribute, NumberKind::Double))
-}
-
-pub(crate) fn parse_i64(attribute: Attribute<'_>) -> Result<i64, ValueError<'_>> {
-    parse_integer(trim(attribute.value())).map_err(|wrong| wrong.of(attribute, NumberKind::Integer))
-}
-
+/// What is wrong with a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Wrong {
+pub(crate) enum Wrong {
+    /// Its spelling.
     Spelling,
+    /// Its size.
     Range,
 }
 
-impl Wrong {
-    fn of(self, attribute: Attribute<'_>, expected: NumberKind) -> ValueError<'_> {
-        match self {
-            Wrong::Spelling => ValueError::Malformed {
-                attribute,
-                expected,
-            },
-            Wrong::Range => ValueError::OutOfRange {
-                attribute,
-                expected,
-            },
-        }
-    }
-}
-
 /// Trims white space as XML defines it; Unicode defines more characters as white space.
-fn trim(value: &str) -> &str {
+pub(crate) fn trim(value: &str) -> &str {
     let is_space = |byte: Option<&u8>| matches!(byte, Some(b' ' | b'\t' | b'\n' | b'\r'));
     let bytes = value.as_bytes();
     if !is_space(bytes.first()) && !is_space(bytes.last()) {
@@ -207,7 +86,7 @@ fn trim(value: &str) -> &str {
 }
 
 /// Parses the lexical space of XML Schema 1.1's `double` (Datatypes, section 3.3.5.2).
-fn parse_double(value: &str) -> Result<f64, Wrong> {
+pub(crate) fn parse_double(value: &str) -> Result<f64, Wrong> {
     match value {
         "INF" | "+INF" => return Ok(f64::INFINITY),
         "-INF" => return Ok(f64::NEG_INFINITY),
@@ -231,7 +110,7 @@ fn parse_double(value: &str) -> Result<f64, Wrong> {
 }
 
 /// Parses the lexical space of XML Schema's `integer` (Datatypes, section 3.4.13).
-fn parse_integer(value: &str) -> Result<i64, Wrong> {
+pub(crate) fn parse_integer(value: &str) -> Result<i64, Wrong> {
     let digits = value.strip_prefix(['+', '-']).unwrap_or(value);
     if digits.is_empty() || !digits.bytes().all(|byte| byte.is_ascii_digit()) {
         return Err(Wrong::Spelling);
