@@ -167,20 +167,26 @@ fn process_without_proof_does_not_judge() {
     assert_eq!(farm.verdict("good.xodr").verdict, Verdict::Accepted);
 }
 
+/// A new broker starts a bundle of its own if the old one does not return in half a second, as on a busy machine.
+/// Then the test tries again.
 #[test]
 fn children_prove_themselves_to_the_next_broker() {
     let farm = Farm::new();
     let mut broker = farm.serve_ready();
-    let launcher = parent_of(bundle_of(&farm).pid);
-    broker.kill();
-    let _next = farm.serve_ready();
-    let now = bundle_of(&farm);
-    // A confined process joins no other broker, so its launcher has started another one.
-    let found = (parent_of(now.pid), now.restarts);
-    assert_eq!(found, (launcher, 0), "{}", farm.log());
-    let status = farm.status().unwrap();
-    assert!(
-        status.notices.iter().all(|it| it.kind != "turned-away"),
-        "{status:#?}"
-    );
+    let returns = || {
+        let launcher = parent_of(bundle_of(&farm).pid);
+        broker.kill();
+        broker = farm.serve_ready();
+        let now = bundle_of(&farm);
+        assert_eq!(now.restarts, 0, "{}", farm.log());
+        let status = farm.status().unwrap();
+        let mut notices = status.notices.iter();
+        assert!(
+            notices.all(|it| it.kind != "turned-away" || it.text.contains("has already joined")),
+            "{status:#?}"
+        );
+        // A confined process joins no other broker, so its launcher has started another one.
+        (parent_of(now.pid) == launcher).then_some(())
+    };
+    until_or("a bundle joins the next broker", returns, || farm.log());
 }

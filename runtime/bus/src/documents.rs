@@ -26,7 +26,7 @@ pub enum LoanError {
     /// Shared memory lacks room. Writing anyway would kill the process, so no slot is lent.
     #[error(
         "not enough shared memory: {needed} bytes are needed, but not free in /dev/shm; it has {size} bytes, of \
-         which {reserve} are kept in reserve"
+         which {reserve} are kept in reserve; free some memory in it or make it larger"
     )]
     NoSpace {
         /// Requested bytes.

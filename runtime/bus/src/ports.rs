@@ -59,7 +59,7 @@ impl PortError {
         PortError {
             what: "joining".to_owned(),
             why: format!(
-                "not enough shared memory: {needed} bytes are needed, {free} are free in /dev/shm"
+                "not enough shared memory: {needed} bytes are needed, {free} are free in /dev/shm; make it larger"
             ),
         }
     }

@@ -405,7 +405,7 @@ pub struct ServeArgs {
     /// Check each file independently: a rejected map does not reject the scenarios that use it
     #[arg(long)]
     pub own_verdict: bool,
-    /// Treatment by the gate of a file that depends on files outside of DIR
+    /// How to publish accepted files that depend on files outside of DIR
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = OutsideArg::Name, hide_short_help = true)]
     pub gate_outside: OutsideArg,
     /// Run a reporter; may be given several times
@@ -414,9 +414,9 @@ pub struct ServeArgs {
     /// Scan at intervals instead of relying on file events (for network file systems)
     #[arg(long, value_name = "TIME", num_args = 0..=1, default_missing_value = "2s", value_parser = duration)]
     pub poll: Option<Duration>,
-    /// Time without changes after which a file that is written in place is checked, also after it
-    /// was closed. For uploads that close and reopen files (default: when it is closed, else after
-    /// 250ms)
+    /// Check a file only after TIME without changes, even if it was closed. For uploads that close
+    /// and reopen files (default: when it is closed; 250ms without close events; 1 minute if it
+    /// stays open)
     #[arg(long, value_name = "TIME", value_parser = rest)]
     pub settle: Option<Duration>,
     /// Retention time of the job history

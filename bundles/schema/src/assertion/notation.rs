@@ -161,6 +161,9 @@ mod tests {
             read,
             "{text}"
         );
+        let shown = read.xpath(&names);
+        let again = Assertion::from_xpath(&shown, &mut names).unwrap();
+        assert_eq!(again, read, "{shown}");
         text
     }
 
@@ -179,6 +182,18 @@ mod tests {
             "(= (count c/@id) (count-distinct c/@id))"
         );
         assert_eq!(through("exists(.//deep)"), ".//deep");
+        assert_eq!(
+            through("(@a or (if (@b) then @c else @d)) and not(@e)"),
+            "(and (or @a (if @b @c @d)) (not @e))"
+        );
+    }
+
+    #[test]
+    fn assertion_is_shown_as_xpath() {
+        let mut names = Names::default();
+        let xpath = "not(@a or @b) or (@a and count(b/@c) > 0)";
+        let read = Assertion::from_xpath(xpath, &mut names).unwrap();
+        assert_eq!(read.xpath(&names), xpath);
     }
 
     #[test]

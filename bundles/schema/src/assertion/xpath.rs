@@ -1,4 +1,6 @@
-//! Parser of XPath expressions.
+//! Parser and writer of XPath expressions.
+
+use std::fmt::{self, Write};
 
 use super::lexer::{Token, tokens};
 use super::{Assertion, Expr, MAX_DEPTH, Path, PathStep, Relation, XPathProblem};
@@ -23,6 +25,74 @@ impl Assertion {
             Some(token) => Err(problem(format!("unexpected {token:?}"))),
         }
     }
+}
+
+impl Assertion {
+    /// Writes the assertion as XPath, for people who know it from the schema.
+    pub(crate) fn xpath(&self, names: &Names) -> String {
+        let mut out = String::new();
+        // Writing to a String cannot fail.
+        let _ = write_xpath(&self.root, names, &mut out);
+        out
+    }
+}
+
+fn write_xpath(expr: &Expr, names: &Names, out: &mut String) -> fmt::Result {
+    match expr {
+        Expr::And(parts) => write_joined(" and ", parts, names, out),
+        Expr::Or(parts) => write_joined(" or ", parts, names, out),
+        Expr::Not(inner) => {
+            out.push_str("not(");
+            write_xpath(inner, names, out)?;
+            out.push(')');
+            Ok(())
+        }
+        Expr::If(parts) => {
+            let [test, yes, no] = &**parts;
+            out.push_str("if (");
+            write_xpath(test, names, out)?;
+            out.push_str(") then ");
+            write_operand(yes, names, out)?;
+            out.push_str(" else ");
+            write_operand(no, names, out)
+        }
+        Expr::Compare(relation, sides) => {
+            let sign = format!(" {} ", relation.symbol());
+            write_joined(&sign, &**sides, names, out)
+        }
+        Expr::Count(path) => write!(out, "count({})", path.notation(names)),
+        Expr::CountDistinct(path) => {
+            write!(out, "count(distinct-values({}))", path.notation(names))
+        }
+        Expr::Path(path) => out.write_str(&path.notation(names)),
+        Expr::Number(number) => write!(out, "{number}"),
+        Expr::Text(text) if text.contains('"') => write!(out, "'{text}'"),
+        Expr::Text(text) => write!(out, "\"{text}\""),
+        Expr::Bool(value) => write!(out, "{value}()"),
+    }
+}
+
+fn write_joined(word: &str, parts: &[Expr], names: &Names, out: &mut String) -> fmt::Result {
+    for (index, part) in parts.iter().enumerate() {
+        if index > 0 {
+            out.push_str(word);
+        }
+        write_operand(part, names, out)?;
+    }
+    Ok(())
+}
+
+/// Writes a part of a larger expression, in parentheses if it has parts of its own.
+fn write_operand(expr: &Expr, names: &Names, out: &mut String) -> fmt::Result {
+    let has_parts = matches!(expr, Expr::And(_) | Expr::Or(_) | Expr::If(_));
+    if has_parts {
+        out.push('(');
+    }
+    write_xpath(expr, names, out)?;
+    if has_parts {
+        out.push(')');
+    }
+    Ok(())
 }
 
 struct Parser<'t, 'n> {

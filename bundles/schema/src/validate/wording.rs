@@ -461,7 +461,7 @@ pub(super) fn no_type(
         .alternatives
         .iter()
         .filter_map(|one| one.test.as_ref());
-    let tests: Vec<String> = tests.map(|test| test.notation(&schema.names)).collect();
+    let tests: Vec<String> = tests.map(|test| test.xpath(&schema.names)).collect();
     let name = node.name();
     let text = if undecided && !tests.is_empty() {
         format!(
@@ -485,8 +485,9 @@ pub(super) fn condition_failed(node: Node<'_>, assertion: &Assertion, schema: &S
     let text = match defects::explanation(node, &condition) {
         Some(words) => format!("<{}> is invalid: {words}", node.name()),
         None => format!(
-            "<{}> breaks a condition of its type: {condition}",
-            node.name()
+            "<{}> breaks a condition of its type: {}",
+            node.name(),
+            assertion.xpath(&schema.names)
         ),
     };
     Wording::from(text).excused(known)

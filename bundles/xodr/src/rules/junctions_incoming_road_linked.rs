@@ -38,8 +38,8 @@ fn unlinked(map: &RoadMap<'_>, arm: RoadEnd, links: &[RoadContact<'_>], found: &
     };
     let junction = connecting.junction().unwrap_or_default();
     let text = format!(
-        "{says}, but the road is an incoming road of junction `{junction}`, whose road `{}` meets its {}; an \
-         incoming road must be linked to the junction, otherwise its continuations cannot be found",
+        "{says}, but its {1} meets road `{0}` of junction `{junction}`; link it to junction `{junction}`, \
+         otherwise its continuations cannot be found",
         connecting.id(),
         arm.end
     );

@@ -36,8 +36,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         for section in layer.sections(road) {
             if !section.lanes().any(is_there) {
                 let text = format!(
-                    "this lane section of road `{}` has no lane beside the center lane that is defined from the \
-                     start of the section and has width; without such a lane, it is not drivable",
+                    "this lane section of road `{}` needs a left or right lane with width from its start; without one, \
+                     it is not drivable",
                     road.id()
                 );
                 found

@@ -342,7 +342,7 @@ fn unasked(path: &Path, config: &Config, loaded: &Loaded) -> Vec<String> {
     let unasked = brought.filter(|(name, _)| !config.bundles.is_empty() && !named(name));
     let (shown, note) = (
         to_text(path),
-        "it judges nothing unless it is named by its short name",
+        "it judges nothing until `<CheckerBundle application=\"…\"/>` names it",
     );
     unasked
         .map(|(name, manifest)| format!("{manifest}: {shown} does not name `{name}`: {note}"))

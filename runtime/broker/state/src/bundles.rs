@@ -462,7 +462,7 @@ impl State {
         if given.any(|it| it.overtaken.is_some_and(|then| since(then) > deadline)) {
             let limit = deadline.as_secs_f64();
             return Some(format!(
-                "it forgot a job: it finished a later one {limit} s ago"
+                "it did not finish a job, but finished a later one more than {limit} s ago"
             ));
         }
         if still > deadline {

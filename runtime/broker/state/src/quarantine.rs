@@ -50,7 +50,8 @@ impl State {
                 && task.strikes >= STRIKES
             {
                 task.state = TaskState::Failed(format!(
-                    "{name} failed {STRIKES} times in a new process with only this file: {why}"
+                    "{name} failed {STRIKES} times in a new process with only this file: {why}; the file is checked again \
+                     when it, the bundle or the configuration changes"
                 ));
                 over.push(id);
             }

@@ -121,8 +121,8 @@ impl State {
         let pause = said.at.saturating_sub(self.now).as_secs_f64();
         let why = if changes >= self.settings.changes_forgiven {
             format!(
-                "its registration has changed {changes} times, and everything was judged again each time; it is \
-                 accepted again in {pause:.1} s"
+                "it changed its version or checkers {changes} times, and everything was judged again each time; the \
+                 next change is accepted in {pause:.1} s"
             )
         } else {
             format!(

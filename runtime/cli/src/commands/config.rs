@@ -56,7 +56,7 @@ fn tell(file: &Path, loaded: &Loaded) -> Exit {
         several => format!("{several} warnings"),
     };
     talk::fail(&format!(
-        "{shown}: not valid, {warnings}: the settings that they name do not take effect as written"
+        "{shown}: not valid, {warnings}: these settings do not work as written"
     ));
     Exit::Usage
 }

@@ -128,7 +128,7 @@ fn why_no_verdict(args: &WaitArgs) -> String {
         }
     }
     match args.file.exists() {
-        true => String::new(),
+        true => "; `qcbus status` shows the current work".to_owned(),
         false => ": the file does not exist".to_owned(),
     }
 }

@@ -218,7 +218,7 @@ impl Publications {
                     Some((_, other)) if *other != digest => {
                         let file = to_text(&file);
                         let why = format!(
-                            "it and the files that it depends on were accepted with different contents of {file}"
+                            "{file} changed between the verdicts of two files that belong together; they are judged again first"
                         );
                         let lasting = false;
                         return PublicationState::HeldBack { why, lasting };
