@@ -21,20 +21,20 @@ enum Fingerprint {
     Directory(u64),
 }
 
-/// Returns a time after all earlier changes of files and not after any future change.
+/// Returns a time that is not before any earlier change of a file and before every future change.
 ///
-/// File systems take their times from a clock with steps of some milliseconds. The result is the
-/// next step.
+/// Older kernels take the times of files from a coarse clock with steps of some milliseconds. Newer
+/// ones also take them from the fine clock, which is ahead of the coarse one.
 pub(super) fn now() -> (i64, i64) {
-    let coarse = || {
-        let now = clock_gettime(ClockId::RealtimeCoarse);
+    let read = |clock| {
+        let now = clock_gettime(clock);
         (now.tv_sec, now.tv_nsec)
     };
-    let begun = coarse();
-    while coarse() == begun {
+    let now = read(ClockId::Realtime);
+    while read(ClockId::RealtimeCoarse) <= now {
         std::thread::sleep(Duration::from_millis(1));
     }
-    coarse()
+    now
 }
 
 impl Stamps {
@@ -45,7 +45,7 @@ impl Stamps {
         for file in files {
             let stamp = look(&file);
             let meanwhile =
-                |it: &Fingerprint| matches!(it, Fingerprint::File(it) if it.changed >= begun);
+                |it: &Fingerprint| matches!(it, Fingerprint::File(it) if it.changed > begun);
             if stamp.as_ref().is_none_or(meanwhile) {
                 return Err(file);
             }
@@ -89,4 +89,25 @@ pub(super) fn is_importable(name: &std::ffi::OsStr, entry: &std::fs::DirEntry) -
     let name = name.as_bytes();
     let module = [&b".py"[..], b".pyc", b".so", b".pth"];
     module.iter().any(|end| name.ends_with(end)) || entry.file_type().is_ok_and(|it| !it.is_file())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_separates_earlier_from_later_changes() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("module.py");
+        for _ in 0..100 {
+            std::fs::write(&file, "1").unwrap();
+            // The kernel gives fine times only to files whose time was read.
+            let _ = look(&file);
+            std::fs::write(&file, "2").unwrap();
+            let begun = now();
+            assert!(Stamps::of(vec![file.clone()], begun).is_ok());
+            std::fs::write(&file, "3").unwrap();
+            assert!(Stamps::of(vec![file.clone()], begun).is_err());
+        }
+    }
 }
