@@ -1,6 +1,6 @@
 //! Damages files for tests in every way that authors and tools do. No damaged file may make a rule
 //! panic. `QCBUS_FUZZ_ROUNDS` sets the number of mutations of examples (1,000), `QCBUS_FUZZ_FILES`
-//! that of other files (200). `QCBUS_FUZZ_PLACES` sets at how many places those files are cut (2).
+//! that of other files (200). `QCBUS_FUZZ_PLACES` sets at how many places each file is cut (2).
 //! `QCBUS_FUZZ_SEED` sets another seed.
 //!
 //! A file that is cut is no longer well-formed XML, and few rules check it. So each file is cut a
@@ -45,14 +45,15 @@ impl Listener for Broken {
 }
 
 impl Robust {
-    /// Cuts every example of the pages at ten places.
+    /// Cuts every example of the pages at some places.
     ///
     /// # Panics
     /// If a checker does not complete. The message names the first such checker and the file.
     pub fn assert_truncated_examples(&self) {
         let plan = Plan::by_default(self.bundle);
+        let places = places();
         for shown in evidence::documents(self.bundle) {
-            self.assert_truncations(&plan, shown.text.as_bytes(), 10, shown.rule);
+            self.assert_truncations(&plan, shown.text.as_bytes(), places, shown.rule);
         }
     }
 
@@ -127,7 +128,7 @@ impl Robust {
         gather(directory, self.extension, &mut files);
         files.sort();
         let plan = Plan::by_default(self.bundle);
-        let places = setting("QCBUS_FUZZ_PLACES", 2);
+        let places = places();
         crate::note(&format!(
             "{} files, each cut at {places} places\n",
             files.len()
@@ -314,6 +315,11 @@ fn gather(directory: &Path, extension: &str, found: &mut Vec<PathBuf>) {
 
 fn dice() -> Random {
     Random(setting("QCBUS_FUZZ_SEED", 0x9E37_79B9) as u64)
+}
+
+/// Returns at how many places a file is cut.
+pub fn places() -> usize {
+    setting("QCBUS_FUZZ_PLACES", 2)
 }
 
 fn setting(name: &str, default: usize) -> usize {

@@ -11,7 +11,7 @@ use super::schedule::{Figures, Stage, Wrong, play};
 use super::threads::Crew;
 
 /// Number of schedules in a test run.
-const SCHEDULES: u64 = 500;
+const SCHEDULES: u64 = 150;
 
 fn number(name: &str) -> Option<u64> {
     let text = std::env::var(name).ok()?;
