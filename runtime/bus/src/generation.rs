@@ -336,7 +336,10 @@ mod tests {
     fn wait_until_stray(root: &Path) {
         let begin = std::time::Instant::now();
         while !is_stray(root) {
-            assert!(begin.elapsed() < Duration::from_secs(120), "the broker has died");
+            assert!(
+                begin.elapsed() < Duration::from_secs(120),
+                "the broker has died"
+            );
             std::thread::sleep(Duration::from_millis(1));
         }
     }

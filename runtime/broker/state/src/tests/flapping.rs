@@ -58,7 +58,11 @@ fn flapping_bundle_is_accepted_less_often_and_reported() {
     assert!(world.state.notices.iter().filter(flapping).count() >= 8);
     let status = world.state.status();
     let first = status.peers.iter().find(|it| it.name == "First").unwrap();
-    assert!(first.note.contains("next change is accepted in"), "{}", first.note);
+    assert!(
+        first.note.contains("next change is accepted in"),
+        "{}",
+        first.note
+    );
 }
 
 #[test]

@@ -103,7 +103,10 @@ fn forgotten_job_times_out_despite_later_jobs() {
         world.state.bundles.get_mut("First").unwrap().moved = world.now;
         alive(world);
     });
-    assert!(why.contains("did not finish a job, but finished a later one"), "{why}");
+    assert!(
+        why.contains("did not finish a job, but finished a later one"),
+        "{why}"
+    );
 }
 
 #[test]
