@@ -193,7 +193,7 @@ macro_rules! rules {
         &[$(&$crate::Rule {
             id: concat!("check_", stringify!($prefix), "_", stringify!($name)),
             $(uids: {
-                assert!($name::RULE.uids.is_empty(), "list a rule with the field `uids` without a UID");
+                assert!($name::RULE.uids.is_empty(), "the rule has the field `uids`; list it without a UID");
                 &[$uid]
             },)?
             page: include_str!(concat!(stringify!($name), ".md")),
