@@ -1,12 +1,9 @@
 //! The schema rule of a bundle: reports the violations that [`qcbus_schema`] finds in a document as
-//! issues. Bundles differ only in the rule's name and page:
+//! issues. Bundles differ only in the rule's name, precondition and page:
 //!
 //! ```text
-//! pub static RULE: Rule<Validated> = Rule {
-//!     id: "check_asam_xodr_xml_valid_schema",
-//!     uids: &["asam.net:xodr:1.0.0:xml.valid_schema"],
+//! pub const RULE: Rule<Validated> = Rule {
 //!     after: &["check_asam_xodr_xml_version_is_defined"],
-//!     page: include_str!("xml_valid_schema.md"),
 //!     ..qcbus_schema_rule::RULE
 //! };
 //! ```

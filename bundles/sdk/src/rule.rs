@@ -72,15 +72,14 @@ impl Model for Document<'static> {
 /// A rule: its name, the conditions under which it applies, and the check function.
 ///
 /// ```text
-/// pub static RULE: Rule<Document> = Rule {
-///     id: "check_asam_xodr_xml_fileheader_is_present",
-///     uids: &["asam.net:xodr:1.0.0:xml.fileheader_is_present"],
-///     after: &["check_asam_xodr_xml_root_tag_is_opendrive"],
-///     page: include_str!("xml_fileheader_is_present.md"),
+/// pub const RULE: Rule<Document> = Rule {
+///     level: Level::Warning,
 ///     run,
-///     ..Rule::DEFAULTS
+///     ..Rule::after(&["check_asam_xodr_xml_root_tag_is_opendrive"])
 /// };
 /// ```
+///
+/// [`rules!`](crate::rules) fills in `id`, `page` and a single UID.
 pub struct Rule<M: Model> {
     /// Identifier of the checker, unique in the bundle. It ends in the name of the rule's file.
     pub id: &'static str,
@@ -163,6 +162,43 @@ impl<M: Model> Rule<M> {
         page: "",
         each: None,
         run: finds_nothing::<M>,
+    };
+
+    /// Returns the default values of a rule with these preconditions, for its `..`.
+    pub const fn after(checkers: &'static [&'static str]) -> Rule<M> {
+        Rule {
+            after: checkers,
+            ..Rule::DEFAULTS
+        }
+    }
+}
+
+/// Lists the rules of a bundle. Each line has a prefix of the id, the name of a module with a
+/// `RULE`, and the UID. A rule with several UIDs has the field `uids` instead.
+///
+/// ```text
+/// mod xml_fileheader_is_present;
+///
+/// pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
+///     asam_xodr xml_fileheader_is_present "asam.net:xodr:1.0.0:xml.fileheader_is_present",
+/// };
+/// ```
+///
+/// The id of this rule is `check_asam_xodr_xml_fileheader_is_present`. Its page is the file
+/// `xml_fileheader_is_present.md` beside the list. The `mod` lines are outside of the macro, because
+/// `cargo fmt` does not look for files within macros.
+#[macro_export]
+macro_rules! rules {
+    ($($prefix:ident $name:ident $($uid:literal)?,)*) => {
+        &[$(&$crate::Rule {
+            id: concat!("check_", stringify!($prefix), "_", stringify!($name)),
+            $(uids: {
+                assert!($name::RULE.uids.is_empty(), "the rule has the field `uids`; list it without a UID");
+                &[$uid]
+            },)?
+            page: include_str!(concat!(stringify!($name), ".md")),
+            ..$name::RULE
+        }),*]
     };
 }
 

@@ -1,6 +1,7 @@
 //! Names that most rules use.
 
 pub(crate) use crate::model::{Part, Roads};
+pub(crate) use crate::rules::READABLE;
 pub(crate) use qcbus_document::{Document, Node};
 pub(crate) use qcbus_opendrive::geometry::{
     Cubic, ParamPoly3, ParamRange, Placed, Point, heading_difference,

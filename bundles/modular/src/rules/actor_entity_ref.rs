@@ -5,10 +5,7 @@ use crate::families::finds::Finds;
 use crate::prelude::*;
 use qcbus_sdk::modular::Problem;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_actor_entity_ref",
-    uids: &["qcbus.dev:mosc:1.0.0:actor.entity_ref"],
-    page: include_str!("actor_entity_ref.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

@@ -3,10 +3,7 @@ use crate::families::file_faults::{ARCHIVE, of_archives};
 use crate::prelude::*;
 use qcbus_messages::path_text::name_of;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_archive_main_present",
-    uids: &["qcbus.dev:mosc:1.0.0:archive.main_present"],
-    page: include_str!("archive_main_present.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

@@ -4,10 +4,7 @@ use crate::assembly::{Archive, Assembly, Member, Modular};
 use crate::prelude::*;
 use qcbus_messages::path_text::name_of;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_archive_member_collision",
-    uids: &["qcbus.dev:mosc:1.0.0:archive.member_collision"],
-    page: include_str!("archive_member_collision.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

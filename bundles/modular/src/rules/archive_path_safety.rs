@@ -5,10 +5,7 @@ use qcbus_messages::path_text::name_of;
 use qcbus_sdk::modular::has_only_backslashes;
 use qcbus_sdk::modular::stays_inside;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_archive_path_safety",
-    uids: &["qcbus.dev:mosc:1.0.0:archive.path_safety"],
-    page: include_str!("archive_path_safety.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

@@ -7,11 +7,8 @@ use qcbus_messages::Absence;
 use qcbus_messages::path_text::name_of;
 use qcbus_sdk::modular::stays_inside;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_archive_unused_member",
-    uids: &["qcbus.dev:mosc:1.0.0:archive.unused_member"],
+pub const RULE: Rule<Modular> = Rule {
     level: Level::Information,
-    page: include_str!("archive_unused_member.md"),
     run,
     ..Rule::DEFAULTS
 };

@@ -3,11 +3,8 @@ use std::collections::HashSet;
 use crate::assembly::{Assembly, Modular};
 use crate::prelude::*;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_group_content_dropped",
-    uids: &["qcbus.dev:mosc:1.0.0:group.content_dropped"],
+pub const RULE: Rule<Modular> = Rule {
     level: Level::Information,
-    page: include_str!("group_content_dropped.md"),
     run,
     ..Rule::DEFAULTS
 };

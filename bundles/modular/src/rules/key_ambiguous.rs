@@ -6,10 +6,7 @@ use crate::families::offers::{offered_in, path};
 use crate::prelude::*;
 use qcbus_sdk::modular::Key;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_key_ambiguous",
-    uids: &["qcbus.dev:mosc:1.0.0:key.ambiguous"],
-    page: include_str!("key_ambiguous.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

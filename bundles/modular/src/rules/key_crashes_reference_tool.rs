@@ -5,11 +5,8 @@ use crate::families::offers::{Offers, path};
 use crate::prelude::*;
 use qcbus_sdk::modular::Key;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_key_crashes_reference_tool",
-    uids: &["qcbus.dev:mosc:1.0.0:key.crashes_reference_tool"],
+pub const RULE: Rule<Modular> = Rule {
     level: Level::Warning,
-    page: include_str!("key_crashes_reference_tool.md"),
     run,
     ..Rule::DEFAULTS
 };

@@ -5,10 +5,7 @@ use crate::prelude::*;
 use qcbus_formats::distance::did_you_mean;
 use qcbus_sdk::modular::Problem;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_key_matches",
-    uids: &["qcbus.dev:mosc:1.0.0:key.matches"],
-    page: include_str!("key_matches.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

@@ -8,11 +8,8 @@ use crate::prelude::*;
 use qcbus_formats::distance::did_you_mean;
 use qcbus_sdk::modular::Key;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_key_path_exact",
-    uids: &["qcbus.dev:mosc:1.0.0:key.path_exact"],
+pub const RULE: Rule<Modular> = Rule {
     level: Level::Warning,
-    page: include_str!("key_path_exact.md"),
     run,
     ..Rule::DEFAULTS
 };

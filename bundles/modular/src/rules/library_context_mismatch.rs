@@ -6,11 +6,8 @@ use crate::families::finds::Finds;
 use crate::prelude::*;
 use qcbus_schema::Version;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_library_context_mismatch",
-    uids: &["qcbus.dev:mosc:1.0.0:library.context_mismatch"],
+pub const RULE: Rule<Modular> = Rule {
     level: Level::Warning,
-    page: include_str!("library_context_mismatch.md"),
     run,
     ..Rule::DEFAULTS
 };

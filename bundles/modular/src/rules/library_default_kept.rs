@@ -3,11 +3,8 @@ use crate::families::copies::{key_of, taken_at};
 use crate::prelude::*;
 use qcbus_sdk::modular::offered;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_library_default_kept",
-    uids: &["qcbus.dev:mosc:1.0.0:library.default_kept"],
+pub const RULE: Rule<Modular> = Rule {
     level: Level::Information,
-    page: include_str!("library_default_kept.md"),
     run,
     ..Rule::DEFAULTS
 };

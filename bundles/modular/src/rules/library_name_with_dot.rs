@@ -5,11 +5,8 @@ use crate::families::copies::taken_at;
 use crate::families::finds::Finds;
 use crate::prelude::*;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_library_name_with_dot",
-    uids: &["qcbus.dev:mosc:1.0.0:library.name_with_dot"],
+pub const RULE: Rule<Modular> = Rule {
     level: Level::Warning,
-    page: include_str!("library_name_with_dot.md"),
     run,
     ..Rule::DEFAULTS
 };

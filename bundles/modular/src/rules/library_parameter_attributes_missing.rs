@@ -4,11 +4,8 @@ use crate::families::finds::Finds;
 use crate::families::offers::{offers_any, unoffered};
 use crate::prelude::*;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_library_parameter_attributes_missing",
-    uids: &["qcbus.dev:mosc:1.0.0:library.parameter_attributes_missing"],
+pub const RULE: Rule<Modular> = Rule {
     level: Level::Warning,
-    page: include_str!("library_parameter_attributes_missing.md"),
     run,
     ..Rule::DEFAULTS
 };

@@ -1,10 +1,7 @@
 use crate::assembly::{Assembly, Modular};
 use crate::prelude::*;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_parameter_reference_attributes",
-    uids: &["qcbus.dev:mosc:1.0.0:parameter_reference.attributes"],
-    page: include_str!("parameter_reference_attributes.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

@@ -2,10 +2,7 @@ use crate::assembly::{Assembly, Modular, place};
 use crate::families::finds::Finds;
 use crate::prelude::*;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_reference_cycle",
-    uids: &["qcbus.dev:mosc:1.0.0:reference.cycle"],
-    page: include_str!("reference_cycle.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

@@ -3,10 +3,7 @@ use std::collections::BTreeMap;
 use crate::assembly::{Assembly, Modular, say};
 use crate::prelude::*;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_reference_depth",
-    uids: &["qcbus.dev:mosc:1.0.0:reference.depth"],
-    page: include_str!("reference_depth.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

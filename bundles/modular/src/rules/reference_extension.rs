@@ -1,10 +1,7 @@
 use crate::assembly::{Assembly, Modular, say_all};
 use crate::prelude::*;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_reference_extension",
-    uids: &["qcbus.dev:mosc:1.0.0:reference.extension"],
-    page: include_str!("reference_extension.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

@@ -4,10 +4,7 @@ use crate::families::finds::Finds;
 use crate::prelude::*;
 use qcbus_messages::{Absence, DocumentRole, MissingDocument};
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_reference_file_found",
-    uids: &["qcbus.dev:mosc:1.0.0:reference.file_found"],
-    page: include_str!("reference_file_found.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

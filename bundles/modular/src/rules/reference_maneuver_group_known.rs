@@ -6,10 +6,7 @@ use crate::families::finds::Finds;
 use crate::prelude::*;
 use qcbus_sdk::modular::Form;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_reference_maneuver_group_known",
-    uids: &["qcbus.dev:mosc:1.0.0:reference.maneuver_group_known"],
-    page: include_str!("reference_maneuver_group_known.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

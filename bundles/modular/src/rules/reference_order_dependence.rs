@@ -3,11 +3,8 @@ use std::collections::BTreeMap;
 use crate::assembly::{Assembly, Modular};
 use crate::prelude::*;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_reference_order_dependence",
-    uids: &["qcbus.dev:mosc:1.0.0:reference.order_dependence"],
+pub const RULE: Rule<Modular> = Rule {
     level: Level::Warning,
-    page: include_str!("reference_order_dependence.md"),
     run,
     ..Rule::DEFAULTS
 };

@@ -6,10 +6,7 @@ use crate::prelude::*;
 use qcbus_sdk::modular::Form;
 use qcbus_sdk::modular::is_archive;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_reference_unexpanded",
-    uids: &["qcbus.dev:mosc:1.0.0:reference.unexpanded"],
-    page: include_str!("reference_unexpanded.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

@@ -7,10 +7,7 @@ use crate::prelude::*;
 use qcbus_formats::distance::some_of;
 use qcbus_messages::DocumentRole;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_result_catalogs_resolve",
-    uids: &["qcbus.dev:mosc:1.0.0:result.catalogs_resolve"],
-    page: include_str!("result_catalogs_resolve.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

@@ -8,10 +8,7 @@ use qcbus_formats::distance::some_of;
 use qcbus_openscenario::Declared;
 use qcbus_openscenario::Scenario;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_result_entities_declared",
-    uids: &["qcbus.dev:mosc:1.0.0:result.entities_declared"],
-    page: include_str!("result_entities_declared.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

@@ -4,10 +4,7 @@ use crate::assembly::{Assembly, Modular, place};
 use crate::families::copies::Taken;
 use crate::prelude::*;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_result_names_unique",
-    uids: &["qcbus.dev:mosc:1.0.0:result.names_unique"],
-    page: include_str!("result_names_unique.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

@@ -7,10 +7,7 @@ use crate::prelude::*;
 use qcbus_openscenario::expr;
 use qcbus_openscenario::{Scenario, bare};
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_result_parameters_resolved",
-    uids: &["qcbus.dev:mosc:1.0.0:result.parameters_resolved"],
-    page: include_str!("result_parameters_resolved.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

@@ -7,10 +7,7 @@ use crate::prelude::*;
 use qcbus_messages::DocumentRole;
 use qcbus_schema::{Checked, Code, Options, Outcome, Severity, Version, Violation};
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_result_valid_schema",
-    uids: &["qcbus.dev:mosc:1.0.0:result.valid_schema"],
-    page: include_str!("result_valid_schema.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

@@ -1,10 +1,7 @@
 use crate::assembly::{Assembly, Modular, say_all};
 use crate::prelude::*;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_scenario_reference_single",
-    uids: &["qcbus.dev:mosc:1.0.0:scenario_reference.single"],
-    page: include_str!("scenario_reference_single.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

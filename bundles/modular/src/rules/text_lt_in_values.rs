@@ -5,11 +5,8 @@ use crate::families::copies::taken_at;
 use crate::families::finds::Finds;
 use crate::prelude::*;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_text_lt_in_values",
-    uids: &["qcbus.dev:mosc:1.0.0:text.lt_in_values"],
+pub const RULE: Rule<Modular> = Rule {
     level: Level::Warning,
-    page: include_str!("text_lt_in_values.md"),
     run,
     ..Rule::DEFAULTS
 };

@@ -7,11 +7,8 @@ use crate::families::typings::Typings;
 use crate::prelude::*;
 use qcbus_openscenario::parse_double;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_value_range",
-    uids: &["qcbus.dev:mosc:1.0.0:value.range"],
+pub const RULE: Rule<Modular> = Rule {
     level: Level::Warning,
-    page: include_str!("value_range.md"),
     run,
     ..Rule::DEFAULTS
 };

@@ -6,10 +6,7 @@ use crate::prelude::*;
 use qcbus_openscenario::DataType;
 use qcbus_schema::ValueType;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_value_type",
-    uids: &["qcbus.dev:mosc:1.0.0:value.type"],
-    page: include_str!("value_type.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

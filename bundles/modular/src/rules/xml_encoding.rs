@@ -3,11 +3,8 @@ use crate::families::file_faults::of;
 use crate::prelude::*;
 use qcbus_messages::path_text::name_of;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_xml_encoding",
-    uids: &["qcbus.dev:mosc:1.0.0:xml.encoding"],
+pub const RULE: Rule<Modular> = Rule {
     level: Level::Warning,
-    page: include_str!("xml_encoding.md"),
     run,
     ..Rule::DEFAULTS
 };

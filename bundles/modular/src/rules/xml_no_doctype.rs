@@ -3,10 +3,7 @@ use crate::families::file_faults::{DOCTYPES, of};
 use crate::prelude::*;
 use qcbus_messages::path_text::name_of;
 
-pub static RULE: Rule<Modular> = Rule {
-    id: "check_qcbus_mosc_xml_no_doctype",
-    uids: &["qcbus.dev:mosc:1.0.0:xml.no_doctype"],
-    page: include_str!("xml_no_doctype.md"),
+pub const RULE: Rule<Modular> = Rule {
     run,
     ..Rule::DEFAULTS
 };

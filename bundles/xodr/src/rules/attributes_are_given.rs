@@ -3,13 +3,9 @@ use crate::families::object_parts::{listed, named};
 use crate::families::own_schema::OwnSchema;
 use crate::prelude::*;
 
-pub static RULE: Rule<Document> = Rule {
-    id: "check_qcbus_xodr_attributes_are_given",
-    uids: &["qcbus.dev:xodr:1.0.0:attributes.are_given"],
-    after: super::READABLE,
-    page: include_str!("attributes_are_given.md"),
+pub const RULE: Rule<Document> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Elements with the attributes that they need to be meaningful.

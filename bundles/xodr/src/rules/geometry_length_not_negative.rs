@@ -1,15 +1,11 @@
 use crate::families::shown::number;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_geometry_length_not_negative",
-    uids: &["qcbus.dev:xodr:1.0.0:geometry.length_not_negative"],
+pub const RULE: Rule<Roads> = Rule {
     // From 1.5 on the schema reports this.
     versions: "..1.5.0",
-    after: super::READABLE,
-    page: include_str!("geometry_length_not_negative.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

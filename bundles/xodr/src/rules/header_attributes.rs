@@ -2,11 +2,8 @@ use crate::families::shown::{beside, number};
 use crate::prelude::*;
 use qcbus_document::ValueError;
 
-pub static RULE: Rule<Document> = Rule {
-    id: "check_qcbus_xodr_header_attributes",
-    uids: &["qcbus.dev:xodr:1.0.0:header.attributes"],
+pub const RULE: Rule<Document> = Rule {
     after: &["check_asam_xodr_xml_fileheader_is_present"],
-    page: include_str!("header_attributes.md"),
     run,
     ..Rule::DEFAULTS
 };

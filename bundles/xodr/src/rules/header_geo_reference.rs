@@ -1,14 +1,10 @@
 use crate::families::georeference::flaws;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_header_geo_reference",
-    uids: &["qcbus.dev:xodr:1.4.0:header.geo_reference"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("header_geo_reference.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

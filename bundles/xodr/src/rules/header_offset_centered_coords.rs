@@ -1,16 +1,12 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_header_offset_centered_coords",
-    uids: &["asam.net:xodr:1.7.0:header.offset.centered_coords"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.7.0..",
     backport: Backport::Lower { since: "1.6.0" },
-    after: super::READABLE,
     params: &[LIMIT],
-    page: include_str!("header_offset_centered_coords.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const LIMIT: Param = Param::number("limit", 1e5, "m", "maximum accepted coordinate");

@@ -2,15 +2,11 @@ use std::f64::consts::TAU;
 
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_header_offset_plausible",
-    uids: &["qcbus.dev:xodr:1.4.0:header.offset_plausible"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[DISTANCE, HEIGHT],
-    page: include_str!("header_offset_plausible.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Maximum x and y. Gauss and Krüger zones may precede the easting: 60 500 000 is the middle of the

@@ -1,12 +1,8 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Document> = Rule {
-    id: "check_qcbus_xodr_header_version_published",
-    uids: &["qcbus.dev:xodr:1.4.0:header.version_published"],
-    after: super::READABLE,
-    page: include_str!("header_version_published.md"),
+pub const RULE: Rule<Document> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(document: &Document<'_>, found: &mut Sink<'_>) {

@@ -2,14 +2,10 @@ use crate::families::ids::{KINDS, Kind, Scope};
 use crate::prelude::*;
 use foldhash::HashMap;
 
-pub static RULE: Rule<Document> = Rule {
-    id: "check_asam_xodr_ids_id_unique_in_class",
-    uids: &["asam.net:xodr:1.4.0:ids.id_unique_in_class"],
+pub const RULE: Rule<Document> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("ids_id_unique_in_class.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(document: &Document<'_>, found: &mut Sink<'_>) {

@@ -2,17 +2,14 @@ use std::collections::HashMap;
 
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_ids_id_unique_in_lane_section",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         "asam.net:xodr:1.4.0:ids.id_unique_in_lane_section",
         "asam.net:xodr:1.9.0:road.lane.lane_id_unique",
     ],
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("ids_id_unique_in_lane_section.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// First version in which another UID states the same requirement.

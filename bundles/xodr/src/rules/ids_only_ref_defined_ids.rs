@@ -4,15 +4,11 @@ use crate::families::object_parts::outlines;
 use crate::prelude::*;
 use foldhash::{HashMap, HashSet};
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_ids_only_ref_defined_ids",
-    uids: &["asam.net:xodr:1.4.0:ids.only_ref_defined_ids"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("ids_only_ref_defined_ids.md"),
     each: Some(each),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// An attribute that refers to another element.

@@ -3,15 +3,11 @@ use std::collections::BTreeSet;
 use crate::families::on_road::OnRoad;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_boundary_close_gap_with_new_roads",
-    uids: &["asam.net:xodr:1.8.0:junctions.boundary.close_gap_with_new_roads"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.8.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_boundary_close_gap_with_new_roads.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

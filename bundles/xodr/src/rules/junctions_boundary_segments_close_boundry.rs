@@ -8,15 +8,11 @@ const GAP: Param = Param::number(
     "maximum distance between the end of a segment and the start of the next one",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_boundary_segments_close_boundry",
-    uids: &["asam.net:xodr:1.8.0:junctions.boundary.segments_close_boundry"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
     params: &[GAP],
-    page: include_str!("junctions_boundary_segments_close_boundry.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::families::junction_area::{Stretch, boundary, doubled_area, ring};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_boundary_segments_counter_clockwise_order",
-    uids: &["asam.net:xodr:1.8.0:junctions.boundary.segments_counter_clockwise_order"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_boundary_segments_counter_clockwise_order.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

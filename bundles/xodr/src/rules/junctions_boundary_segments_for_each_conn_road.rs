@@ -2,14 +2,10 @@ use std::collections::{HashMap, HashSet};
 
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_boundary_segments_for_each_conn_road",
-    uids: &["asam.net:xodr:1.8.0:junctions.boundary.segments_for_each_conn_road"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_boundary_segments_for_each_conn_road.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

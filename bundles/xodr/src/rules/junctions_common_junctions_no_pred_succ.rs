@@ -1,13 +1,9 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_common_junctions_no_pred_succ",
-    uids: &["asam.net:xodr:1.4.0:junctions.common.junctions_no_pred_succ"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_common_junctions_no_pred_succ.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

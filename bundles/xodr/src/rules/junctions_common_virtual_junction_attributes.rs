@@ -1,13 +1,9 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_common_virtual_junction_attributes",
-    uids: &["asam.net:xodr:1.5.0:junctions.common.virtual_junction_attributes"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.5.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_common_virtual_junction_attributes.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,18 +1,15 @@
 use crate::families::junction_ends::{Meeting, name};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_common_when_to_use",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         "asam.net:xodr:1.4.0:junctions.common.when_to_use",
         "asam.net:xodr:1.9.0:junctions.common.not_only_two",
     ],
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_common_when_to_use.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// First version with a rule about junctions of two roads.

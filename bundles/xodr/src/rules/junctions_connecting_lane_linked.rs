@@ -12,15 +12,11 @@ const NEAR: Param = Param::number(
     "maximum distance between the edges of two lanes for one to continue as the other",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_junctions_connecting_lane_linked",
-    uids: &["qcbus.dev:xodr:1.4.0:junctions.connecting_lane_linked"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[NARROW, NEAR],
-    page: include_str!("junctions_connecting_lane_linked.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

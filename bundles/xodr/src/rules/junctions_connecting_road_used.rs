@@ -3,15 +3,11 @@ use crate::families::routes::is_route;
 use crate::prelude::*;
 use foldhash::HashSet;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_junctions_connecting_road_used",
-    uids: &["qcbus.dev:xodr:1.4.0:junctions.connecting_road_used"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_connecting_road_used.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

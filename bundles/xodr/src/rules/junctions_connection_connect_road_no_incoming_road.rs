@@ -3,15 +3,11 @@ use std::collections::BTreeSet;
 use crate::families::on_road::OnRoad;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_connection_connect_road_no_incoming_road",
-    uids: &["asam.net:xodr:1.4.0:junctions.connection.connect_road_no_incoming_road"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     backport: Backport::Alike { since: "1.1.0" },
-    after: super::READABLE,
-    page: include_str!("junctions_connection_connect_road_no_incoming_road.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

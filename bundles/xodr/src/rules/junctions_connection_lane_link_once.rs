@@ -1,15 +1,11 @@
 use crate::prelude::*;
 use foldhash::HashMap;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_junctions_connection_lane_link_once",
-    uids: &["qcbus.dev:xodr:1.4.0:junctions.connection.lane_link_once"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_connection_lane_link_once.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

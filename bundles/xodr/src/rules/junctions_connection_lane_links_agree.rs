@@ -3,15 +3,11 @@ use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::routes::{NARROW, is_route, is_wide, lanes_at, routes_at};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_junctions_connection_lane_links_agree",
-    uids: &["qcbus.dev:xodr:1.4.0:junctions.connection.lane_links_agree"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[NARROW],
-    page: include_str!("junctions_connection_lane_links_agree.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

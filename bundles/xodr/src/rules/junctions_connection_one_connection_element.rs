@@ -1,14 +1,10 @@
 use crate::families::connections::{repeated, report_repeated};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_connection_one_connection_element",
-    uids: &["asam.net:xodr:1.7.0:junctions.connection.one_connection_element"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..1.8.0",
-    after: super::READABLE,
-    page: include_str!("junctions_connection_one_connection_element.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -2,15 +2,11 @@ use crate::families::connections::{repeated, report_repeated};
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_connection_one_link_to_incoming",
-    uids: &["asam.net:xodr:1.8.0:junctions.connection.one_link_to_incoming"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
     backport: Backport::Separate { since: "" },
-    after: super::READABLE,
-    page: include_str!("junctions_connection_one_link_to_incoming.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::families::object_parts::listed;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_junctions_connection_required_attributes",
-    uids: &["qcbus.dev:xodr:1.4.0:junctions.connection.required_attributes"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_connection_required_attributes.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -2,13 +2,10 @@ use crate::families::gap_levels::{KINK_ERROR_FROM, STEP_BROKEN_FROM, STEP_ERROR_
 use crate::families::touching::{GAP, KINK, STEP, Where, report_misfits};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_connection_smooth_fit",
-    uids: &["asam.net:xodr:1.9.0:junctions.connection.smooth_fit"],
+pub const RULE: Rule<Roads> = Rule {
     // The text about connecting roads contains this requirement since 1.6. Its UID is from 1.9.
     versions: "1.6.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
     params: &[
         GAP,
         KINK,
@@ -17,9 +14,8 @@ pub static RULE: Rule<Roads> = Rule {
         STEP_ERROR_FROM,
         STEP_BROKEN_FROM,
     ],
-    page: include_str!("junctions_connection_smooth_fit.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -2,15 +2,11 @@ use std::collections::HashSet;
 
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_cross_path_correct_junction_id",
-    uids: &["asam.net:xodr:1.8.0:junctions.cross_path.correct_junction_id"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
     backport: Backport::Lower { since: "1.1.0" },
-    after: super::READABLE,
-    page: include_str!("junctions_cross_path_correct_junction_id.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -9,15 +9,11 @@ const TOLERANCE: Param = Param::number(
     "maximum distance of an end of a crossing road beside the linked lane",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_cross_path_lane_linkage",
-    uids: &["asam.net:xodr:1.8.0:junctions.cross_path.lane_linkage"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("junctions_cross_path_lane_linkage.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::prelude::*;
 use qcbus_opendrive::CrossPath;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_cross_path_only_connect_correct_type",
-    uids: &["asam.net:xodr:1.8.0:junctions.cross_path.only_connect_correct_type"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_cross_path_only_connect_correct_type.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -8,15 +8,11 @@ const TOLERANCE: Param = Param::number(
     "maximum distance of a corner of the crossing road outside the linked lane",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_cross_path_start_end_contained",
-    uids: &["asam.net:xodr:1.8.0:junctions.cross_path.start_end_contained"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("junctions_cross_path_start_end_contained.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -10,16 +10,12 @@ const TOLERANCE: Param = Param::number(
     "maximum distance by which a cross path may extend out of its junction",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_cross_path_within_junction_area",
-    uids: &["asam.net:xodr:1.8.0:junctions.cross_path.within_junction_area"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.8.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("junctions_cross_path_within_junction_area.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

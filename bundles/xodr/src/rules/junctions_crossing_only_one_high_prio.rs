@@ -2,14 +2,10 @@ use std::collections::HashSet;
 
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_crossing_only_one_high_prio",
-    uids: &["asam.net:xodr:1.8.0:junctions.crossing.only_one_high_prio"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_crossing_only_one_high_prio.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

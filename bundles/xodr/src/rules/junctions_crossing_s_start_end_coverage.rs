@@ -28,15 +28,11 @@ const SHRINK: f64 = 0.02;
 const MOST: usize = 16;
 const BUDGET: usize = 20_000_000;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_crossing_s_start_end_coverage",
-    uids: &["asam.net:xodr:1.8.0:junctions.crossing.s_start_end_coverage"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
     params: &[TOLERANCE, CLEARANCE],
-    page: include_str!("junctions_crossing_s_start_end_coverage.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// A road section with its road and its range.

@@ -4,15 +4,11 @@ use crate::prelude::*;
 
 const STEP: Param = Param::number("step", 0.05, "m", "maximum accepted difference in height");
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_direct_flat_exits_entries",
-    uids: &["asam.net:xodr:1.8.0:junctions.direct.flat_exits_entries"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
     params: &[STEP],
-    page: include_str!("junctions_direct_flat_exits_entries.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -2,11 +2,8 @@ use crate::families::gap_levels::{KINK_ERROR_FROM, STEP_BROKEN_FROM, STEP_ERROR_
 use crate::families::touching::{GAP, KINK, STEP, Where, report_misfits};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_direct_linked_lane_smoothness",
-    uids: &["asam.net:xodr:1.7.0:junctions.direct.linked_lane_smoothness"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
-    after: super::READABLE,
     params: &[
         GAP,
         KINK,
@@ -15,9 +12,8 @@ pub static RULE: Rule<Roads> = Rule {
         STEP_ERROR_FROM,
         STEP_BROKEN_FROM,
     ],
-    page: include_str!("junctions_direct_linked_lane_smoothness.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

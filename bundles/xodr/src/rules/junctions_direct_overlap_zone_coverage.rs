@@ -9,15 +9,11 @@ const TOLERANCE: Param = Param::number(
     "maximum length by which an overlap may exceed its zone",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_direct_overlap_zone_coverage",
-    uids: &["asam.net:xodr:1.8.0:junctions.direct.overlap_zone_coverage"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("junctions_direct_overlap_zone_coverage.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,13 +1,9 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_direct_overlap_zone_exclusivity",
-    uids: &["asam.net:xodr:1.8.0:junctions.direct.overlap_zone_exclusivity"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_direct_overlap_zone_exclusivity.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// A lane link with an overlap zone and the lanes that it links.

@@ -1,14 +1,10 @@
 use crate::families::junction_ends::{Meeting, name};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_direct_road_connectivity",
-    uids: &["asam.net:xodr:1.8.0:junctions.direct.road_connectivity"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_direct_road_connectivity.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

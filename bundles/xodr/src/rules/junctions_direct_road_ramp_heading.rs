@@ -4,15 +4,11 @@ use crate::families::on_road::OnRoad;
 use crate::families::touching::KINK;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_direct_road_ramp_heading",
-    uids: &["asam.net:xodr:1.7.0:junctions.direct.road_ramp_heading"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
-    after: super::READABLE,
     params: &[KINK],
-    page: include_str!("junctions_direct_road_ramp_heading.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -6,14 +6,10 @@ use crate::prelude::*;
 /// Minimum distance of the middles of two lanes that count as side by side, in metres.
 const MARGIN: f64 = 0.1;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_direct_split_or_merge",
-    uids: &["asam.net:xodr:1.8.0:junctions.direct.split_or_merge"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_direct_split_or_merge.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -13,16 +13,12 @@ const STEP: Param = Param::number(
 /// Number of places across the mouth of a road at which heights are compared.
 const SAMPLES: usize = 5;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_elevation_grid_entry_exit_smoothness",
-    uids: &["asam.net:xodr:1.8.0:junctions.elevation_grid.entry_exit_smoothness"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.8.0..",
-    after: super::READABLE,
     params: &[STEP],
-    page: include_str!("junctions_elevation_grid_entry_exit_smoothness.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

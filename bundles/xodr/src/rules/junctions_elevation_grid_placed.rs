@@ -1,14 +1,10 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_junctions_elevation_grid_placed",
-    uids: &["qcbus.dev:xodr:1.4.0:junctions.elevation_grid_placed"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.8.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_elevation_grid_placed.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -9,15 +9,11 @@ const TOLERANCE: Param = Param::number(
     "maximum distance by which the junction may extend beyond the grid",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_elevation_grid_valid_for_entire_boundry",
-    uids: &["asam.net:xodr:1.8.0:junctions.elevation_grid.valid_for_entire_boundry"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("junctions_elevation_grid_valid_for_entire_boundry.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -9,15 +9,11 @@ const GAP: Param = Param::number(
     "maximum distance between the line and the boundary at which they touch",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_geometry_correct_junction_boundry",
-    uids: &["asam.net:xodr:1.8.0:junctions.geometry.correct_junction_boundry"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
     params: &[GAP],
-    page: include_str!("junctions_geometry_correct_junction_boundry.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -8,15 +8,11 @@ const TOLERANCE: Param = Param::number(
     "maximum distance by which the junction may extend beyond the ends of the line",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_geometry_ref_line_definition",
-    uids: &["asam.net:xodr:1.8.0:junctions.geometry.ref_line_definition"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("junctions_geometry_ref_line_definition.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

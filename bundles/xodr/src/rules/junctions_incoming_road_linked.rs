@@ -3,14 +3,10 @@ use crate::families::unlinked_arms::UnlinkedArms;
 use crate::prelude::*;
 use foldhash::HashSet;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_junctions_incoming_road_linked",
-    uids: &["qcbus.dev:xodr:1.4.0:junctions.incoming_road_linked"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_incoming_road_linked.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

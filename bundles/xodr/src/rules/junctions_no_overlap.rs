@@ -36,15 +36,11 @@ const SAME: f64 = 1e-6;
 const BUDGET: usize = 10_000_000;
 const MOST_POINTS: f64 = 64.0;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_no_overlap",
-    uids: &["asam.net:xodr:1.4.0:junctions.no_overlap"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[AREA, DEPTH, CLEARANCE],
-    page: include_str!("junctions_no_overlap.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Ground that a junction covers: its boundary, or one of its roads.

@@ -4,16 +4,12 @@ use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::routes::{NARROW, routes_at};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_junctions_outgoing_lane_reached",
-    uids: &["qcbus.dev:xodr:1.4.0:junctions.outgoing_lane_reached"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[NARROW],
-    page: include_str!("junctions_outgoing_lane_reached.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

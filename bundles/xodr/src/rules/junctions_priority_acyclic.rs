@@ -2,15 +2,11 @@ use crate::prelude::*;
 use foldhash::HashMap;
 use qcbus_opendrive::Priority;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_junctions_priority_acyclic",
-    uids: &["qcbus.dev:xodr:1.4.0:junctions.priority.acyclic"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_priority_acyclic.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

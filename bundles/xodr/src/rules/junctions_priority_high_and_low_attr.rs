@@ -1,14 +1,10 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_priority_high_and_low_attr",
-    uids: &["asam.net:xodr:1.8.0:junctions.priority.high_and_low_attr"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
     backport: Backport::Lower { since: "1.1.0" },
-    after: super::READABLE,
-    page: include_str!("junctions_priority_high_and_low_attr.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

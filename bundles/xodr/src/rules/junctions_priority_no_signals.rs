@@ -1,15 +1,11 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_priority_no_signals",
-    uids: &["asam.net:xodr:1.7.0:junctions.priority.no_signals"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("junctions_priority_no_signals.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,16 +1,13 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_type_default_no_linked_road",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         "asam.net:xodr:1.7.0:junctions.type_default_no_linked_road",
         "asam.net:xodr:1.7.0:junctions.direct.correct_type_linked_road_usage",
     ],
     versions: "1.7.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_type_default_no_linked_road.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const ONLY_DIRECT: &str = "asam.net:xodr:1.7.0:junctions.direct.correct_type_linked_road_usage";

@@ -1,17 +1,14 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_type_direct_no_conn_road",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         "asam.net:xodr:1.7.0:junctions.type_direct_no_conn_road",
         "asam.net:xodr:1.7.0:junctions.direct.connecting_road_attribute_usage",
         "asam.net:xodr:1.9.0:junctions.connection.no_connecting_road_direct",
     ],
     versions: "1.7.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_type_direct_no_conn_road.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

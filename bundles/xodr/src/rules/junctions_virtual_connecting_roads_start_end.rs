@@ -15,16 +15,12 @@ const GAP: Param = Param::number(
     "maximum distance between the actual end of the road and that position, along the main road",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_virtual_connecting_roads_start_end",
-    uids: &["asam.net:xodr:1.9.0:junctions.virtual.connecting_roads_start_end"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Lower { since: "1.6.0" },
-    after: super::READABLE,
     params: &[TOLERANCE, GAP],
-    page: include_str!("junctions_virtual_connecting_roads_start_end.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_virtual_connections_only_virtual_junctions",
-    uids: &["asam.net:xodr:1.9.0:junctions.virtual.connections.only_virtual_junctions"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Lower { since: "1.5.0" },
-    after: super::READABLE,
-    page: include_str!("junctions_virtual_connections_only_virtual_junctions.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -9,15 +9,11 @@ const TOLERANCE: Param = Param::number(
     "largest distance by which the crossing road may extend beyond the other road",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_virtual_cross_path_cross_road_check_s_t",
-    uids: &["asam.net:xodr:1.8.0:junctions.virtual.crossPath.cross_road_check_s_t"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("junctions_virtual_cross_path_cross_road_check_s_t.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -5,16 +5,12 @@ use crate::families::touching::KINK;
 use crate::families::virtual_junctions::all_branches;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_virtual_heading_equal_mainroad",
-    uids: &["asam.net:xodr:1.9.0:junctions.virtual.heading_equal_mainroad"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Lower { since: "1.6.0" },
-    after: super::READABLE,
     params: &[KINK],
-    page: include_str!("junctions_virtual_heading_equal_mainroad.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

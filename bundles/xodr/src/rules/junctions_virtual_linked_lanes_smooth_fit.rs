@@ -11,12 +11,9 @@ use crate::prelude::*;
 use qcbus_opendrive::BorderPoint;
 use qcbus_opendrive::LaneLink;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_virtual_linked_lanes_smooth_fit",
-    uids: &["asam.net:xodr:1.9.0:junctions.virtual.linked_lanes_smooth_fit"],
+pub const RULE: Rule<Roads> = Rule {
     // The text about virtual junctions contains this requirement since 1.6. Its UID is from 1.9.
     versions: "1.6.0..",
-    after: super::READABLE,
     params: &[
         GAP,
         KINK,
@@ -27,9 +24,8 @@ pub static RULE: Rule<Roads> = Rule {
         STEP_ERROR_FROM,
         STEP_BROKEN_FROM,
     ],
-    page: include_str!("junctions_virtual_linked_lanes_smooth_fit.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,13 +1,9 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_virtual_main_road_only",
-    uids: &["asam.net:xodr:1.9.0:junctions.virtual.main_road_only"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
-    after: super::READABLE,
-    page: include_str!("junctions_virtual_main_road_only.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,15 +1,11 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_junctions_virtual_only_one_start_end",
-    uids: &["asam.net:xodr:1.9.0:junctions.virtual.only_one_start_end"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Lower { since: "1.5.0" },
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("junctions_virtual_only_one_start_end.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TOLERANCE: Param = Param::number(

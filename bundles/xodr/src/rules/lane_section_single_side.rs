@@ -1,14 +1,10 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_lane_section_single_side",
-    uids: &["qcbus.dev:xodr:1.4.0:lane_section.single_side"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("lane_section_single_side.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -24,12 +24,9 @@ const LANE_ERROR_FROM: Param = Param::number(
      applies",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_lane_smoothness_contact_point_no_horizontal_gaps",
-    uids: &["asam.net:xodr:1.7.0:lane_smoothness.contact_point_no_horizontal_gaps"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Separate { since: "" },
-    after: super::READABLE,
     params: &[
         GAP,
         ZERO_WIDTH,
@@ -37,10 +34,9 @@ pub static RULE: Rule<Roads> = Rule {
         GAP_ERROR_FROM,
         GAP_BROKEN_FROM,
     ],
-    page: include_str!("lane_smoothness_contact_point_no_horizontal_gaps.md"),
     each: Some(each),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// First version in which this rule covers reference lines.

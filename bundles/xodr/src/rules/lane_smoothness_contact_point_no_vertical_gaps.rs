@@ -12,12 +12,9 @@ const ROLL: Param = Param::number(
 /// Minimum width for comparing crossfalls, in metres. Rounded heights tilt narrower lanes.
 const TOO_NARROW: f64 = 2.0;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_lane_smoothness_contact_point_no_vertical_gaps",
-    uids: &["qcbus.dev:xodr:1.8.0:lane_smoothness.contact_point_no_vertical_gaps"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
     params: &[
         STEP,
         ROLL,
@@ -25,9 +22,8 @@ pub static RULE: Rule<Roads> = Rule {
         STEP_BROKEN_FROM,
         KINK_ERROR_FROM,
     ],
-    page: include_str!("lane_smoothness_contact_point_no_vertical_gaps.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -10,17 +10,13 @@ const PITCH: Param = Param::number(
     "largest difference between two slopes (height over distance) that is accepted",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_lane_smoothness_contact_point_no_vertical_kinks",
-    uids: &["qcbus.dev:xodr:1.8.0:lane_smoothness.contact_point_no_vertical_kinks"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.8.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
     params: &[PITCH, GAP, STEP],
-    page: include_str!("lane_smoothness_contact_point_no_vertical_kinks.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

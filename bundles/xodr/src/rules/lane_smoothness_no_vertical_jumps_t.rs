@@ -9,17 +9,13 @@ const STEP: Param = Param::number(
     "largest step between neighbouring lanes that is accepted",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_lane_smoothness_no_vertical_jumps_t",
-    uids: &["qcbus.dev:xodr:1.8.0:lane_smoothness.no_vertical_jumps_t"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.8.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
     params: &[STEP],
-    page: include_str!("lane_smoothness_no_vertical_jumps_t.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -15,16 +15,12 @@ const GAP: Param = Param::number(
     "largest step of a lane's edge within its lane section that is accepted",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_lane_smoothness_profile_no_horizontal_gaps",
-    uids: &["qcbus.dev:xodr:1.4.0:lane_smoothness.profile_no_horizontal_gaps"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[GAP, GAP_BROKEN_FROM],
-    page: include_str!("lane_smoothness_profile_no_horizontal_gaps.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

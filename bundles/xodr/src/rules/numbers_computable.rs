@@ -22,14 +22,10 @@ const COEFFICIENT: Param = Param::number(
     "largest coefficient of first or higher degree that can be used in computations",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_numbers_computable",
-    uids: &["qcbus.dev:xodr:1.4.0:numbers.computable"],
-    after: super::READABLE,
+pub const RULE: Rule<Roads> = Rule {
     params: &[MOST, EARTH, COEFFICIENT],
-    page: include_str!("numbers_computable.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

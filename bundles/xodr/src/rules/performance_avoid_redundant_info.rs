@@ -22,8 +22,7 @@ const GAP: Param = Param::number(
     "largest distance at which two lines count as one",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_performance_avoid_redundant_info",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         // ASAM's checker prints this UID. Annex F contains the rule since 1.8.1.
         "asam.net:xodr:1.7.0:performance.avoid_redundant_info",
@@ -32,11 +31,9 @@ pub static RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.7.0..",
     backport: Backport::Separate { since: "" },
-    after: super::READABLE,
     params: &[TOLERANCE, TURN, GAP],
-    page: include_str!("performance_avoid_redundant_info.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

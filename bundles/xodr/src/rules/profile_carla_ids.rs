@@ -1,15 +1,11 @@
 use crate::families::simulators::further;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_profile_carla_ids",
-    uids: &["qcbus.dev:xodr:1.4.0:profile.carla_ids"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Information,
-    after: super::READABLE,
     default_on: false,
-    page: include_str!("profile_carla_ids.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

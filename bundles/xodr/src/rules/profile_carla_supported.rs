@@ -1,15 +1,11 @@
 use crate::families::simulators::{self, Gap, lane_border};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_profile_carla_supported",
-    uids: &["qcbus.dev:xodr:1.4.0:profile.carla_supported"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Information,
-    after: super::READABLE,
     default_on: false,
-    page: include_str!("profile_carla_supported.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const GAPS: &[Gap] = &[

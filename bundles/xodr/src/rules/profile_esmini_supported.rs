@@ -1,15 +1,11 @@
 use crate::families::simulators::{self, Gap, any, lane_border};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_profile_esmini_supported",
-    uids: &["qcbus.dev:xodr:1.4.0:profile.esmini_supported"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Information,
-    after: super::READABLE,
     default_on: false,
-    page: include_str!("profile_esmini_supported.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Elements that determine the position of roads and lanes, and so the paths of vehicles.

@@ -1,15 +1,11 @@
 use crate::families::shown::number;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_profiles_begin_with_road",
-    uids: &["qcbus.dev:xodr:1.0.0:profiles.begin_with_road"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("profiles_begin_with_road.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TOLERANCE: Param = Param::number(

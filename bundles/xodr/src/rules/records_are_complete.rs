@@ -1,15 +1,11 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_records_are_complete",
-    uids: &["qcbus.dev:xodr:1.0.0:records.are_complete"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     // From 1.5 on the schema requires these attributes.
     versions: "..1.5.0",
-    after: super::READABLE,
-    page: include_str!("records_are_complete.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const CUBIC: [&str; 5] = ["s", "a", "b", "c", "d"];

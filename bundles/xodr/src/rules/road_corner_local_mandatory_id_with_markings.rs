@@ -1,15 +1,11 @@
 use crate::families::corner_ids;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_corner_local_mandatory_id_with_markings",
-    uids: &["asam.net:xodr:1.9.0:road.corner_local.mandatory_id_with_markings"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_corner_local_mandatory_id_with_markings.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,8 +1,7 @@
 use crate::families::object_parts::{CORNERS, Stands, listed, objects, outlines};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_corner_road_corner_road_local_exclusivity",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         "asam.net:xodr:1.9.0:road.corner_road.corner_road_local_exclusivity",
         // Annex F prints this UID with the version 1.x.0, which no reader of results accepts.
@@ -10,10 +9,8 @@ pub static RULE: Rule<Roads> = Rule {
     ],
     versions: "1.9.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_corner_road_corner_road_local_exclusivity.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

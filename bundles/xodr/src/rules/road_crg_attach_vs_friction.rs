@@ -1,14 +1,10 @@
 use crate::families::crg::{purpose, records};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_crg_attach_vs_friction",
-    uids: &["asam.net:xodr:1.7.0:road.crg.attach_vs_friction"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
-    after: super::READABLE,
-    page: include_str!("road_crg_attach_vs_friction.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,13 +1,9 @@
 use crate::families::object_parts::{below, is_by_schema};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_crg_file_named",
-    uids: &["qcbus.dev:xodr:1.1.0:road.crg.file_named"],
-    after: super::READABLE,
-    page: include_str!("road_crg_file_named.md"),
+pub const RULE: Rule<Roads> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::families::crg::{self, purpose, records};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_crg_friction_no_z_offset_scale",
-    uids: &["asam.net:xodr:1.7.0:road.crg.friction_no_z_offset_scale"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
-    after: super::READABLE,
-    page: include_str!("road_crg_friction_no_z_offset_scale.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

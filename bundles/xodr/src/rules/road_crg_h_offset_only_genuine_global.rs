@@ -1,15 +1,11 @@
 use crate::families::crg::{self, records};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_crg_h_offset_only_genuine_global",
-    uids: &["asam.net:xodr:1.9.0:road.crg.h_offset_only_genuine_global"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_crg_h_offset_only_genuine_global.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -2,14 +2,10 @@ use std::collections::HashMap;
 
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_crg_junction",
-    uids: &["asam.net:xodr:1.7.0:road.crg.junction"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
-    after: super::READABLE,
-    page: include_str!("road_crg_junction.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

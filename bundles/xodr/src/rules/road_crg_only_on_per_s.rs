@@ -4,17 +4,13 @@ use crate::families::crg::{parent, purpose, records};
 use crate::families::object_parts::{named, number};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_crg_only_on_per_s",
-    uids: &["asam.net:xodr:1.7.0:road.crg.only_on_per_s"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_crg_only_on_per_s.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TOLERANCE: Param = Param::number(

@@ -1,14 +1,11 @@
 use crate::families::crg::{self, records};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_crg_s_t_offset_no_global",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[ALONG, ACROSS],
     versions: "1.7.0..",
-    after: super::READABLE,
-    page: include_str!("road_crg_s_t_offset_no_global.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const ALONG: &str = "asam.net:xodr:1.7.0:road.crg.s_t_offset_no_global";

@@ -3,14 +3,10 @@ use std::collections::HashMap;
 use crate::prelude::*;
 use qcbus_opendrive::Strip;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_cross_section_surface_use_strip",
-    uids: &["asam.net:xodr:1.8.0:road.cross_section_surface.use_strip"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
-    page: include_str!("road_cross_section_surface_use_strip.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -1,15 +1,11 @@
 use crate::prelude::*;
 use qcbus_opendrive::Strip;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_cross_section_surface_use_width",
-    uids: &["asam.net:xodr:1.8.0:road.cross_section_surface.use_width"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_cross_section_surface_use_width.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TOLERANCE: Param = Param::number(

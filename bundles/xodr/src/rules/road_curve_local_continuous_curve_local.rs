@@ -11,15 +11,11 @@ const GAP: Param = Param::number(
     "largest distance between the end of a curve and the start of the next one",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_curve_local_continuous_curve_local",
-    uids: &["asam.net:xodr:1.9.0:road.curve_local.continuous_curve_local"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
-    after: super::READABLE,
     params: &[GAP],
-    page: include_str!("road_curve_local_continuous_curve_local.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -2,16 +2,12 @@ use crate::families::on_road::OnRoad;
 use crate::families::outline_curves::{LENGTH_TOLERANCE, for_each_poly};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_curve_local_length_match",
-    uids: &["asam.net:xodr:1.9.0:road.curve_local.length_match"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.9.0..",
-    after: super::READABLE,
     params: &[LENGTH_TOLERANCE],
-    page: include_str!("road_curve_local_length_match.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,15 +1,11 @@
 use crate::families::outline_curves::{LENGTH_TOLERANCE, range_fits};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_curve_local_parampoly3_arclength_range",
-    uids: &["asam.net:xodr:1.9.0:road.curve_local.paramPoly3.arcLength_range"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
-    after: super::READABLE,
     params: &[LENGTH_TOLERANCE],
-    page: include_str!("road_curve_local_parampoly3_arclength_range.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

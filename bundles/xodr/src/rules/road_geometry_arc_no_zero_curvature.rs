@@ -1,16 +1,12 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_geometry_arc_no_zero_curvature",
-    uids: &["asam.net:xodr:1.9.0:road.geometry.arc.no_zero_curvature"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.9.0..",
     backport: Backport::Lower { since: "1.1.0" },
-    after: super::READABLE,
     params: &[LEAST],
-    page: include_str!("road_geometry_arc_no_zero_curvature.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const LEAST: Param = Param::number(

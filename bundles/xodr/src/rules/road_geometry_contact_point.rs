@@ -13,12 +13,9 @@ const GAP: Param = Param::number(
     "largest distance that is accepted, in the plan view and in height",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_geometry_contact_point",
-    uids: &["asam.net:xodr:1.7.0:road.geometry.contact_point"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Separate { since: "" },
-    after: super::READABLE,
     params: &[
         GAP,
         GAP_ERROR_FROM,
@@ -26,9 +23,8 @@ pub static RULE: Rule<Roads> = Rule {
         STEP_ERROR_FROM,
         STEP_BROKEN_FROM,
     ],
-    page: include_str!("road_geometry_contact_point.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

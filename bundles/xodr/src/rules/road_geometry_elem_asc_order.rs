@@ -9,16 +9,12 @@ const TOLERANCE: Param = Param::number(
     "values of s that differ by less than this count as equal",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_geometry_elem_asc_order",
-    uids: &["asam.net:xodr:1.4.0:road.geometry.elem_asc_order"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     backport: Backport::Alike { since: "1.1.0" },
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_geometry_elem_asc_order.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -16,15 +16,11 @@ const FAR: f64 = 1.0;
 /// directions that continue, in radians.
 const NEAR: f64 = 0.01;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_geometry_hdg_in_radians",
-    uids: &["qcbus.dev:xodr:1.4.0:road.geometry.hdg_in_radians"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[TURNS],
-    page: include_str!("road_geometry_hdg_in_radians.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

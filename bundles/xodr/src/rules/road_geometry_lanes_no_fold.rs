@@ -23,15 +23,11 @@ const WIDE: f64 = 60.0;
 /// Number of places on a curve at which its edges are checked.
 const PLACES: u32 = 8;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_geometry_lanes_no_fold",
-    uids: &["qcbus.dev:xodr:1.4.0:road.geometry.lanes_no_fold"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[BACKWARDS, RADIUS],
-    page: include_str!("road_geometry_lanes_no_fold.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

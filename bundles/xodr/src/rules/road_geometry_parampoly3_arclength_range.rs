@@ -1,8 +1,7 @@
 use crate::families::curve_length::{self, LENGTH_TOLERANCE};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_geometry_parampoly3_arclength_range",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         // ASAM's checker and annex F use different spellings.
         "asam.net:xodr:1.7.0:road.geometry.parampoly3.arclength_range",
@@ -10,11 +9,9 @@ pub static RULE: Rule<Roads> = Rule {
     ],
     versions: "1.7.0..",
     backport: Backport::Separate { since: "" },
-    after: super::READABLE,
     params: &[LENGTH_TOLERANCE],
-    page: include_str!("road_geometry_parampoly3_arclength_range.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -14,16 +14,12 @@ const HARMFUL: Param = Param::number(
     "shift or rotation above which the finding is an error",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_geometry_parampoly3_valid_parameters",
-    uids: &["asam.net:xodr:1.7.0:road.geometry.paramPoly3.valid_parameters"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Separate { since: "" },
-    after: super::READABLE,
     params: &[TOLERANCE, HARMFUL],
-    page: include_str!("road_geometry_parampoly3_valid_parameters.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

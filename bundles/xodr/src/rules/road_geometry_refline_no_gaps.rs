@@ -9,18 +9,14 @@ const GAP: Param = Param::number(
     "largest distance between two geometries that is accepted",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_geometry_refline_no_gaps",
-    uids: &["asam.net:xodr:1.4.0:road.geometry.refline_no_gaps"],
+pub const RULE: Rule<Roads> = Rule {
     // From 1.7 on `lane_smoothness.contact_point_no_horizontal_gaps` requires it as well. Other
     // tools also use its checker.
     versions: "1.4.0..1.7.0",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
     params: &[GAP, GAP_ERROR_FROM, GAP_BROKEN_FROM],
-    page: include_str!("road_geometry_refline_no_gaps.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

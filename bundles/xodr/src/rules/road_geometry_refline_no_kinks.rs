@@ -10,19 +10,16 @@ const KINK: Param = Param::number(
     "largest difference between two headings that is accepted",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_geometry_refline_no_kinks",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         "asam.net:xodr:1.4.0:road.geometry.refline_no_kinks",
         "qcbus.dev:xodr:1.8.0:lane_smoothness.refline_no_horizontal_kinks",
     ],
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[KINK, KINK_ERROR_FROM],
-    page: include_str!("road_geometry_refline_no_kinks.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// First version with rules about smooth lanes.

@@ -1,16 +1,12 @@
 use crate::families::shown::number;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_geometry_s_value_sum",
-    uids: &["asam.net:xodr:1.9.0:road.geometry.s-value_sum"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Alike { since: "1.1.0" },
-    after: super::READABLE,
     params: &[TOLERANCE, GRAVE],
-    page: include_str!("road_geometry_s_value_sum.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TOLERANCE: Param = Param::number(

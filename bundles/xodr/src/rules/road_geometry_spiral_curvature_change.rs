@@ -1,17 +1,13 @@
 use crate::families::shown;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_geometry_spiral_curvature_change",
-    uids: &["asam.net:xodr:1.9.0:road.geometry.spiral.curvature_change"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.9.0..",
     backport: Backport::Lower { since: "1.1.0" },
-    after: super::READABLE,
     params: &[LEAST],
-    page: include_str!("road_geometry_spiral_curvature_change.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const LEAST: Param = Param::number(

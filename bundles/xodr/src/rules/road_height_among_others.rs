@@ -11,15 +11,11 @@ const APART: Param = Param::number(
 /// Minimum ratio of the two groups. Only a small group is odd; of two halves it is unclear which.
 const FEW: usize = 10;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_height_among_others",
-    uids: &["qcbus.dev:xodr:1.4.0:road.height_among_others"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[APART],
-    page: include_str!("road_height_among_others.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// A road with the heights of its ends, the lower one first.

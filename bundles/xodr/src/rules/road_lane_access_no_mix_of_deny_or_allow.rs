@@ -12,16 +12,12 @@ const SAME_PLACE: Param = Param::number(
 /// Maximum number of previous records for comparisons. It limits the work on hostile files.
 const LOOK_BACK: usize = 64;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_access_no_mix_of_deny_or_allow",
-    uids: &["asam.net:xodr:1.7.0:road.lane.access.no_mix_of_deny_or_allow"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Separate { since: "" },
-    after: super::READABLE,
     params: &[SAME_PLACE],
-    page: include_str!("road_lane_access_no_mix_of_deny_or_allow.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

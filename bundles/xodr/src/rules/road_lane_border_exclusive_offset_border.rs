@@ -1,17 +1,14 @@
 use crate::prelude::*;
 use qcbus_opendrive::Record;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_border_exclusive_offset_border",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         "asam.net:xodr:1.4.0:road.lane.border.exclusive_offset_border",
         "asam.net:xodr:1.4.0:road.lanes.lane_offset.no_offset_if_border_defined",
     ],
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("road_lane_border_exclusive_offset_border.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

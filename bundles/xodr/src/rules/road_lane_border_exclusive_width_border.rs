@@ -1,17 +1,14 @@
 use crate::families::lane_numbers::word;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_border_exclusive_width_border",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         "asam.net:xodr:1.4.0:road.lane.border.exclusive_width_border",
         "asam.net:xodr:1.9.0:road.lane.width.no_width_with_border",
     ],
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("road_lane_border_exclusive_width_border.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

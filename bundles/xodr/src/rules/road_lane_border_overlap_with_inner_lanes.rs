@@ -9,16 +9,12 @@ const TOLERANCE: Param = Param::number(
     "largest distance by which a border may lie inside an inner one",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_border_overlap_with_inner_lanes",
-    uids: &["asam.net:xodr:1.4.0:road.lane.border.overlap_with_inner_lanes"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     backport: Backport::Alike { since: "1.1.0" },
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_lane_border_overlap_with_inner_lanes.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -1,7 +1,6 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_center_elem_definition",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         "asam.net:xodr:1.4.0:road.lane.center_elem_definition",
         "asam.net:xodr:1.9.0:road.lane.center_lane",
@@ -9,10 +8,8 @@ pub static RULE: Rule<Roads> = Rule {
         "asam.net:xodr:1.9.0:road.lane.layer.center_lane_permanent",
     ],
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("road_lane_center_elem_definition.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// First version with separate rules for center lanes.

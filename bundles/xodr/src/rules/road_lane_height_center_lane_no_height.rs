@@ -1,14 +1,10 @@
 use crate::families::center_lane;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_height_center_lane_no_height",
-    uids: &["asam.net:xodr:1.4.0:road.lane.height.center_lane_no_height"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("road_lane_height_center_lane_no_height.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_lane_listing",
-    uids: &["asam.net:xodr:1.4.0:road.lane.lane_listing"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("road_lane_lane_listing.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

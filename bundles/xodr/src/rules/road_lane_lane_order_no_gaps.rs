@@ -1,14 +1,10 @@
 use crate::families::lane_numbers::{number, outward};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_lane_order_no_gaps",
-    uids: &["asam.net:xodr:1.4.0:road.lane.lane_order_no_gaps"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("road_lane_lane_order_no_gaps.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

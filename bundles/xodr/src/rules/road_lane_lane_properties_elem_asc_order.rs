@@ -1,8 +1,7 @@
 use crate::families::ascending;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_lane_properties_elem_asc_order",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         "asam.net:xodr:1.4.0:road.lane.lane_properties.elem_asc_order",
         "asam.net:xodr:1.4.0:road.lane.width.elem_asc_order",
@@ -10,11 +9,9 @@ pub static RULE: Rule<Roads> = Rule {
         "asam.net:xodr:1.4.0:road.lane.height.elem_asc_order",
     ],
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[ascending::TOLERANCE],
-    page: include_str!("road_lane_lane_properties_elem_asc_order.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -2,15 +2,11 @@ use crate::families::on_road::OnRoad;
 use crate::families::routes::DIRECTED;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_lane_reverse_left_right",
-    uids: &["asam.net:xodr:1.4.0:road.lane.lane_reverse_left_right"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("road_lane_lane_reverse_left_right.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -1,16 +1,13 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_lane_sect_min_amount",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         "asam.net:xodr:1.4.0:road.lane.lane_sect_min_amount",
         "asam.net:xodr:1.4.0:road.lane_section.lane_sect_req",
     ],
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("road_lane_lane_sect_min_amount.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const PER_ROAD: &str = "asam.net:xodr:1.4.0:road.lane_section.lane_sect_req";

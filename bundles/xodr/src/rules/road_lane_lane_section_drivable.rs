@@ -4,16 +4,12 @@ use crate::families::on_road::OnRoad;
 use crate::families::zero_stretches::zero_stretches;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_lane_section_drivable",
-    uids: &["asam.net:xodr:1.9.0:road.lane.lane_section_drivable"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.9.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_lane_lane_section_drivable.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -9,15 +9,11 @@ const TOLERANCE: Param = Param::number(
     "largest distance by which the border of a lane may lie on the other side of the center lane",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_lanes_numbered_correctly",
-    uids: &["asam.net:xodr:1.4.0:road.lane.lanes_numbered_correctly"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_lane_lanes_numbered_correctly.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

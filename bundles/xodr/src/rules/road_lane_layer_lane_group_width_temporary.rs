@@ -9,15 +9,11 @@ const TOLERANCE: Param = Param::number(
     "largest distance by which temporary lanes may extend beyond permanent ones",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_layer_lane_group_width_temporary",
-    uids: &["asam.net:xodr:1.9.0:road.lane.layer.lane_group_width_temporary"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_lane_layer_lane_group_width_temporary.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

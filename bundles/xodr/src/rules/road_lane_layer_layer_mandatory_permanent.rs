@@ -1,14 +1,10 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_layer_layer_mandatory_permanent",
-    uids: &["asam.net:xodr:1.9.0:road.lane.layer.layer_mandatory_permanent"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_lane_layer_layer_mandatory_permanent.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TOLERANCE: Param = Param::number("tolerance", 1e-6, "m", "largest gap that is accepted");

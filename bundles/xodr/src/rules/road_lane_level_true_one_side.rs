@@ -1,15 +1,11 @@
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_level_true_one_side",
-    uids: &["asam.net:xodr:1.7.0:road.lane.level_true_one_side"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Separate { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_lane_level_true_one_side.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -1,15 +1,11 @@
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_lane_link_center_lane",
-    uids: &["qcbus.dev:xodr:1.4.0:road.lane.link.center_lane"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("road_lane_link_center_lane.md"),
     each: Some(each),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

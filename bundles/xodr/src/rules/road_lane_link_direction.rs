@@ -10,15 +10,11 @@ const FAR: Param = Param::number(
     "a linked lane that lies farther away than this is a wrong link, regardless of its direction",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_lane_link_direction",
-    uids: &["qcbus.dev:xodr:1.4.0:road.lane.link.direction"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[FAR],
-    page: include_str!("road_lane_link_direction.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -16,8 +16,7 @@ const ANNEX_F: &str = "asam.net:xodr:1.4.0:road.lane.link.lanes_across_laneSecti
 /// Minimum width of lanes that count as continuing, in metres.
 const NARROW: f64 = 0.1;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_link_lanes_across_lane_sections",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         // ASAM's checker prints this UID.
         "asam.net:xodr:1.4.0:road.lane.link.lanes_across_lane_sections",
@@ -25,11 +24,9 @@ pub static RULE: Rule<Roads> = Rule {
     ],
     versions: "1.4.0..",
     backport: Backport::Alike { since: "1.1.0" },
-    after: super::READABLE,
     params: &[OVERLAP],
-    page: include_str!("road_lane_link_lanes_across_lane_sections.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -14,16 +14,12 @@ const NEAR: Param = Param::number(
 /// Minimum width of lanes that count as continuing, in metres.
 const NARROW: f64 = 0.1;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_lane_link_lanes_across_roads",
-    uids: &["qcbus.dev:xodr:1.4.0:road.lane.link.lanes_across_roads"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[NEAR],
-    page: include_str!("road_lane_link_lanes_across_roads.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -2,14 +2,10 @@ use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::zero_stretches::NO_WIDTH;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_link_multiple_connections",
-    uids: &["asam.net:xodr:1.4.0:road.lane.link.multiple_connections"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("road_lane_link_multiple_connections.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -2,16 +2,12 @@ use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::zero_width::{ZERO_WIDTH, is_zero_at, opens};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_link_new_lane_appear",
-    uids: &["asam.net:xodr:1.4.0:road.lane.link.new_lane_appear"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     backport: Backport::Alike { since: "1.1.0" },
-    after: super::READABLE,
     params: &[ZERO_WIDTH],
-    page: include_str!("road_lane_link_new_lane_appear.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

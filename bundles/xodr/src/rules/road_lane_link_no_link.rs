@@ -1,14 +1,10 @@
 use crate::prelude::*;
 use qcbus_opendrive::LaneLayer;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_link_no_link",
-    uids: &["asam.net:xodr:1.4.0:road.lane.link.no_link"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("road_lane_link_no_link.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

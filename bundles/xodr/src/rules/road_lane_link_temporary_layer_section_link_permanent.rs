@@ -3,14 +3,10 @@ use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::zero_stretches::NO_WIDTH;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_link_temporary_layer_section_link_permanent",
-    uids: &["asam.net:xodr:1.9.0:road.lane.link.temporary_layer_section_link_permanent"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
-    after: super::READABLE,
-    page: include_str!("road_lane_link_temporary_layer_section_link_permanent.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

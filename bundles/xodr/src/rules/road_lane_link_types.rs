@@ -3,16 +3,12 @@ use crate::families::routes::{NARROW, is_route};
 use crate::prelude::*;
 use foldhash::HashSet;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_lane_link_types",
-    uids: &["qcbus.dev:xodr:1.4.0:road.lane.link.types"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[NARROW],
-    page: include_str!("road_lane_link_types.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Types of lanes on which no vehicle drives, independent of the lanes before and after them.

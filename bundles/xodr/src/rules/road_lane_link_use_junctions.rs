@@ -3,14 +3,10 @@ use std::collections::BTreeMap;
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_link_use_junctions",
-    uids: &["asam.net:xodr:1.4.0:road.lane.link.use_junctions"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("road_lane_link_use_junctions.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,16 +1,12 @@
 use crate::families::zero_width::{self, ZERO_WIDTH};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_link_zero_width_at_end",
-    uids: &["asam.net:xodr:1.7.0:road.lane.link.zero_width_at_end"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Separate { since: "" },
-    after: super::READABLE,
     params: &[ZERO_WIDTH],
-    page: include_str!("road_lane_link_zero_width_at_end.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -27,15 +27,11 @@ const ABSURD: f64 = 1e9;
 /// Number of pieces of a stretch for measuring its steep part.
 const PIECES: u32 = 64;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_lane_offset_plausible",
-    uids: &["qcbus.dev:xodr:1.4.0:road.lane.offset_plausible"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[MOST, SLOPE, LENGTH],
-    page: include_str!("road_lane_offset_plausible.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

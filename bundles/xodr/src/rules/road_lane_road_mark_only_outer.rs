@@ -2,16 +2,12 @@ use crate::families::on_road::{OnRoad, lane_name};
 use crate::prelude::*;
 use qcbus_opendrive::LaneRecord;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_road_mark_only_outer",
-    uids: &["asam.net:xodr:1.9.0:road.lane.road_mark.only_outer"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Information,
     versions: "1.9.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_lane_road_mark_only_outer.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

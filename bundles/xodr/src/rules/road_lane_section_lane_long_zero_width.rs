@@ -11,17 +11,13 @@ const LENGTH: Param = Param::number(
     "longest distance over which a lane without width is accepted",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_section_lane_long_zero_width",
-    uids: &["asam.net:xodr:1.9.0:road.lane_section.lane_long_zero_width"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.9.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
     params: &[LENGTH],
-    page: include_str!("road_lane_section_lane_long_zero_width.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -2,15 +2,11 @@ use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::zero_stretches::zero_stretches;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_section_lanesec_usage_lane_num",
-    uids: &["asam.net:xodr:1.4.0:road.lane_section.lanesec_usage_lane_num"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Information,
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("road_lane_section_lanesec_usage_lane_num.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_section_new_lanesec_link_temp_to_perm",
-    uids: &["asam.net:xodr:1.9.0:road.lane_section.new_lanesec_link_temp_to_perm"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_lane_section_new_lanesec_link_temp_to_perm.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TOLERANCE: Param = Param::number(

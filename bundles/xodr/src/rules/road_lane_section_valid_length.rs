@@ -1,15 +1,11 @@
 use crate::families::shown::number;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_section_valid_length",
-    uids: &["asam.net:xodr:1.4.0:road.lane_section.valid_length"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[LEAST, SHORT],
-    page: include_str!("road_lane_section_valid_length.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const LEAST: Param = Param::number("least", 0.0, "m", "a length up to this counts as zero");

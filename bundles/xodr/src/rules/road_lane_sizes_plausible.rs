@@ -16,15 +16,11 @@ const LANE_HEIGHT: Param = Param::number(
     "largest plausible height of a lane above or below the road",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_lane_sizes_plausible",
-    uids: &["qcbus.dev:xodr:1.4.0:road.lane.sizes_plausible"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[MARK_WIDTH, MARK_HEIGHT, LANE_HEIGHT],
-    page: include_str!("road_lane_sizes_plausible.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

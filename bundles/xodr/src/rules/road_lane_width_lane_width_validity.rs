@@ -24,15 +24,11 @@ const NOTHING: Param = Param::number(
      digits",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_width_lane_width_validity",
-    uids: &["asam.net:xodr:1.4.0:road.lane.width.lane_width_validity"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[NOTHING, TOLERANCE, SMALL],
-    page: include_str!("road_lane_width_lane_width_validity.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -36,15 +36,11 @@ const NOTHING: f64 = 0.05;
 /// Start value of a record in metres above which another rule reports the number as invalid.
 const ABSURD: f64 = 1e9;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_lane_width_plausible",
-    uids: &["qcbus.dev:xodr:1.4.0:road.lane.width_plausible"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[LEAST, MOST, ANY, LENGTH],
-    page: include_str!("road_lane_width_plausible.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

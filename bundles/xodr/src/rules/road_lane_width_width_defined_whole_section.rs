@@ -1,16 +1,12 @@
 use crate::families::shown::number;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_lane_width_width_defined_whole_section",
-    uids: &["asam.net:xodr:1.7.0:road.lane.width.width_defined_whole_section"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Alike { since: "1.1.0" },
-    after: super::READABLE,
     params: &[TOLERANCE, GRAVE],
-    page: include_str!("road_lane_width_width_defined_whole_section.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TOLERANCE: Param = Param::number(

@@ -1,17 +1,13 @@
 use crate::families::shown::number;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_length_sum_geometries",
-    uids: &["asam.net:xodr:1.9.0:road.length_sum_geometries"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.9.0..",
     backport: Backport::Lower { since: "1.1.0" },
-    after: super::READABLE,
     params: &[TOLERANCE, BROKEN_FROM],
-    page: include_str!("road_length_sum_geometries.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TOLERANCE: Param = Param::number(

@@ -4,15 +4,11 @@ use crate::families::link_sides::{Known, agrees, in_virtual_junction};
 use crate::families::unlinked_arms::UnlinkedArms;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_linkage_both_sides_consistency",
-    uids: &["asam.net:xodr:1.9.0:road.linkage.both_sides_consistency"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Lower { since: "1.1.0" },
-    after: super::READABLE,
-    page: include_str!("road_linkage_both_sides_consistency.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

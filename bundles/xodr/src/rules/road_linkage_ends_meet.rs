@@ -26,14 +26,10 @@ const MOST_ARMS: usize = 64;
 /// Maximum number of road ends. Larger junctions get no findings about unconnected roads.
 const MOST_ENDS: usize = 256;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_linkage_ends_meet",
-    uids: &["qcbus.dev:xodr:1.4.0:road.linkage.ends_meet"],
-    after: super::READABLE,
+pub const RULE: Rule<Roads> = Rule {
     params: &[GAP_BROKEN_FROM, FAR],
-    page: include_str!("road_linkage_ends_meet.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

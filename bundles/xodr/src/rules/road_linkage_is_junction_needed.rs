@@ -4,15 +4,11 @@ use crate::families::on_road::{MAX_PLACES, OnRoad};
 use crate::prelude::*;
 use foldhash::HashSet;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_linkage_is_junction_needed",
-    uids: &["asam.net:xodr:1.4.0:road.linkage.is_junction_needed"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.4.0..",
     backport: Backport::Alike { since: "1.1.0" },
-    after: super::READABLE,
-    page: include_str!("road_linkage_is_junction_needed.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

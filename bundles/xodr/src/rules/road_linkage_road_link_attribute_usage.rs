@@ -3,14 +3,10 @@ use std::cell::OnceCell;
 use crate::families::virtual_links;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_linkage_road_link_attribute_usage",
-    uids: &["asam.net:xodr:1.4.0:road.linkage.road_link_attribute_usage"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("road_linkage_road_link_attribute_usage.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -17,16 +17,12 @@ const TURN: Param = Param::number(
     "largest difference between the directions of two road ends that touch",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_linkage_touching_ends",
-    uids: &["qcbus.dev:xodr:1.4.0:road.linkage.touching_ends"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[NEAR, TURN, NARROW],
-    page: include_str!("road_linkage_touching_ends.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Maximum number of compared open ends per cell. More ends mean that roads are stacked.

@@ -1,16 +1,12 @@
 use crate::families::virtual_links;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_linkage_virtjunc_link_attribute_usage",
-    uids: &["asam.net:xodr:1.7.0:road.linkage.virtjunc_link_attribute_usage"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Lower { since: "1.5.0" },
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_linkage_virtjunc_link_attribute_usage.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TOLERANCE: Param = Param::number(

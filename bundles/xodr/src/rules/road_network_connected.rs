@@ -9,16 +9,12 @@ const SHARE: Param = Param::number(
     "a part of the network with at most this fraction of the length of the largest part is an island",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_network_connected",
-    uids: &["qcbus.dev:xodr:1.4.0:road.network.connected"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[SHARE],
-    page: include_str!("road_network_connected.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

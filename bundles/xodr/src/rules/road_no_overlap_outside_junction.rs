@@ -33,19 +33,16 @@ const NEAR_CONTACT: f64 = 10.0;
 /// Maximum number of roads that share one place in a real map.
 const MOST: usize = 64;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_no_overlap_outside_junction",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         "asam.net:xodr:1.4.0:road.no_overlap_outside_junction",
         "asam.net:xodr:1.4.0:road.overlap_inside_junction",
         "asam.net:xodr:1.4.0:road.no_overlap_self",
     ],
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[AREA, SHRINK, CLEARANCE],
-    page: include_str!("road_no_overlap_outside_junction.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

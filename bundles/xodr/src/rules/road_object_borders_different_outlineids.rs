@@ -3,15 +3,11 @@ use std::collections::HashMap;
 use crate::families::object_parts::{Stands, below, owner};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_borders_different_outlineids",
-    uids: &["asam.net:xodr:1.9.0:road.object.borders.different_outlineids"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_object_borders_different_outlineids.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,15 +1,12 @@
 use crate::families::object_parts::{Stands, below, owner};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_borders_use_complete_outline_true",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[COMPLETE, PARTIAL],
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_object_borders_use_complete_outline_true.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const COMPLETE: &str = "asam.net:xodr:1.7.0:road.object.borders.useCompleteOutline_true";

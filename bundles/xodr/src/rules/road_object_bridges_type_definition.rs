@@ -1,14 +1,10 @@
 use crate::families::object_parts::check_types;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_bridges_type_definition",
-    uids: &["asam.net:xodr:1.7.0:road.object.bridges.type_definition"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
-    after: super::READABLE,
-    page: include_str!("road_object_bridges_type_definition.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// The types in the standard.

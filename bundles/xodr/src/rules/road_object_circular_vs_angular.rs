@@ -1,15 +1,11 @@
 use crate::families::object_parts::{self, Stands, listed, named, number, objects};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_circular_vs_angular",
-    uids: &["asam.net:xodr:1.7.0:road.object.circular_vs_angular"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Alike { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_object_circular_vs_angular.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -3,15 +3,11 @@ use crate::families::on_road::OnRoad;
 use crate::families::roadside::{beside, edges_at};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_object_crosswalk_crosses_lanes",
-    uids: &["qcbus.dev:xodr:1.4.0:road.object.crosswalk_crosses_lanes"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[AWAY],
-    page: include_str!("road_object_crosswalk_crosses_lanes.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const AWAY: Param = Param::number(

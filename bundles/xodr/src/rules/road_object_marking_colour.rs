@@ -2,14 +2,11 @@ use crate::families::corner_references::markings;
 use crate::families::object_parts::{Stands, is_blank};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_marking_colour",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[MARKING, IN_OUTLINE],
     versions: "1.7.0..",
-    after: super::READABLE,
-    page: include_str!("road_object_marking_colour.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const MARKING: &str = "asam.net:xodr:1.7.0:road.object.marking.colour";

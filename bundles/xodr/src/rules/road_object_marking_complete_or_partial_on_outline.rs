@@ -2,14 +2,10 @@ use crate::families::corner_references::markings;
 use crate::families::object_parts::{Stands, corners, named, outlines};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_marking_complete_or_partial_on_outline",
-    uids: &["asam.net:xodr:1.9.0:road.object.marking.complete_or_partial_on_outline"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
-    after: super::READABLE,
-    page: include_str!("road_object_marking_complete_or_partial_on_outline.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::families::object_parts::{Stands, named, objects, outlines};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_marking_markings_with_outline",
-    uids: &["asam.net:xodr:1.9.0:road.object.marking.markings_with_outline"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
-    after: super::READABLE,
-    page: include_str!("road_object_marking_markings_with_outline.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

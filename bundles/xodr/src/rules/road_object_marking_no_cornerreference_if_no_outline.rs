@@ -1,15 +1,11 @@
 use crate::families::object_parts::{Stands, has_outline, named, objects};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_marking_no_cornerreference_if_no_outline",
-    uids: &["asam.net:xodr:1.7.0:road.object.marking.no_cornerreference_if_no_outline"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_object_marking_no_cornerreference_if_no_outline.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -2,15 +2,11 @@ use crate::families::corner_references::markings;
 use crate::families::object_parts::{Stands, has_outline, is_blank, named};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_marking_no_outline_side_attr",
-    uids: &["asam.net:xodr:1.7.0:road.object.marking.no_outline_side_attr"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_object_marking_no_outline_side_attr.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -2,15 +2,11 @@ use crate::families::corner_references::{Path, markings};
 use crate::families::object_parts::Stands;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_object_marking_enclosed_outline_marking",
-    uids: &["asam.net:xodr:1.9.0:road.object.object_marking.enclosed_outline_marking"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.9.0..",
-    after: super::READABLE,
-    page: include_str!("road_object_object_marking_enclosed_outline_marking.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

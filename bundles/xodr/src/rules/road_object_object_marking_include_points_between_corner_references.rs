@@ -2,17 +2,11 @@ use crate::families::corner_references::markings;
 use crate::families::object_parts::Stands;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_object_marking_include_points_between_corner_references",
-    uids: &[
-        "asam.net:xodr:1.9.0:road.object.object_marking.include_points_between_cornerReferences",
-    ],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Information,
     versions: "1.9.0..",
-    after: super::READABLE,
-    page: include_str!("road_object_object_marking_include_points_between_corner_references.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -2,15 +2,11 @@ use crate::families::corner_references::{Path, markings};
 use crate::families::object_parts::Stands;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_object_marking_keep_id_ordered",
-    uids: &["asam.net:xodr:1.9.0:road.object.object_marking.keep_id_ordered"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_object_object_marking_keep_id_ordered.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

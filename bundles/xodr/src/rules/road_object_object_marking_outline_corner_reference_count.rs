@@ -2,15 +2,12 @@ use crate::families::corner_references::{Marking, markings};
 use crate::families::object_parts::{Stands, has_outline, is_blank, named};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_object_marking_outline_corner_reference_count",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[IN_OUTLINE, IN_OBJECT],
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_object_object_marking_outline_corner_reference_count.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const IN_OUTLINE: &str =

@@ -1,15 +1,11 @@
 use crate::families::object_parts::{Stands, is_blank, named, objects};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_orientation",
-    uids: &["asam.net:xodr:1.7.0:road.object.orientation"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.7.0..",
-    after: super::READABLE,
-    page: include_str!("road_object_orientation.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,15 +1,11 @@
 use crate::families::object_parts::{Stands, below, owner};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_outline_exactly_one_outer",
-    uids: &["asam.net:xodr:1.9.0:road.object.outline.exactly_one_outer"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_object_outline_exactly_one_outer.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

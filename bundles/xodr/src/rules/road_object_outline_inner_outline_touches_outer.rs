@@ -17,16 +17,12 @@ const SAME: f64 = 0.001;
 /// Maximum number of comparisons for one object. Only hostile files need more.
 const MOST: usize = 5_000_000;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_outline_inner_outline_touches_outer",
-    uids: &["asam.net:xodr:1.9.0:road.object.outline.inner_outline_touches_outer"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Lower { since: "1.5.0" },
-    after: super::READABLE,
     params: &[TOUCH],
-    page: include_str!("road_object_outline_inner_outline_touches_outer.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

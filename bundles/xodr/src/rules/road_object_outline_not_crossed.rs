@@ -3,14 +3,10 @@ use crate::families::on_road::OnRoad;
 use crate::prelude::*;
 use qcbus_opendrive::Corner;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_object_outline_not_crossed",
-    uids: &["qcbus.dev:xodr:1.4.0:road.object.outline.not_crossed"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("road_object_outline_not_crossed.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Maximum number of checked corners, because each side is compared with all others.

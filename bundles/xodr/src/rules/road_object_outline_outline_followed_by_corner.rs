@@ -1,15 +1,12 @@
 use crate::families::object_parts::{CORNERS, Stands, is_before, objects, outlines};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_outline_outline_followed_by_corner",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[OUTLINE, LOCAL, ROAD, CURVE],
     versions: "1.7.0..",
     backport: Backport::Alike { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_object_outline_outline_followed_by_corner.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const OUTLINE: &str = "asam.net:xodr:1.9.0:road.object.outline.outline_followed_by_corner";

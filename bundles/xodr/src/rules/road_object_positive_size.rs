@@ -3,13 +3,9 @@ use crate::families::object_parts::{
 };
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_object_positive_size",
-    uids: &["qcbus.dev:xodr:1.0.0:road.object.positive_size"],
-    after: super::READABLE,
-    page: include_str!("road_object_positive_size.md"),
+pub const RULE: Rule<Roads> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Sizes, each with the flag whether the schema of 1.7 and 1.8 forbids negative values.

@@ -1,15 +1,11 @@
 use crate::families::object_parts::{Stands, listed, named, objects, outlines};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_repeating_attributes_with_outline_skeleton",
-    uids: &["asam.net:xodr:1.9.0:road.object.repeating.attributes_with_outline_skeleton"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_object_repeating_attributes_with_outline_skeleton.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const SIZES: [&str; 6] = [

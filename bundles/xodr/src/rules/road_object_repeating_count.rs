@@ -2,15 +2,11 @@ use crate::families::object_parts::named;
 use crate::families::on_road::OnRoad;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_object_repeating_count",
-    uids: &["qcbus.dev:xodr:1.4.0:road.object.repeating.count"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[MOST],
-    page: include_str!("road_object_repeating_count.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const MOST: Param = Param::number(

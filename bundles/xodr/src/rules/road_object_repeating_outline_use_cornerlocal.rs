@@ -1,15 +1,11 @@
 use crate::families::object_parts::{Stands, named, objects, outlines};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_repeating_outline_use_cornerlocal",
-    uids: &["asam.net:xodr:1.9.0:road.object.repeating.outline_use_cornerlocal"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_object_repeating_outline_use_cornerlocal.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

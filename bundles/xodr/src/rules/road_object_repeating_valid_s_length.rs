@@ -2,16 +2,13 @@ use crate::families::object_parts::{is_before, is_by_schema, number, objects};
 use crate::families::shown;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_repeating_valid_s_length",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[VALID, LATERAL],
     versions: "1.9.0..",
     backport: Backport::Alike { since: "" },
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_object_repeating_valid_s_length.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const VALID: &str = "asam.net:xodr:1.9.0:road.object.repeating.valid_s_length";

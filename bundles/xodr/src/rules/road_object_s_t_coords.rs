@@ -1,16 +1,12 @@
 use crate::families::object_parts::{listed, named, number, objects};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_s_t_coords",
-    uids: &["asam.net:xodr:1.7.0:road.object.s_t_coords"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_object_s_t_coords.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TOLERANCE: Param = Param::number(

@@ -21,15 +21,11 @@ const SIGNAL: Param = Param::number(
     "largest plausible width and height of a signal",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_object_sizes_plausible",
-    uids: &["qcbus.dev:xodr:1.1.0:road.object.sizes_plausible"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[SLENDER, LARGE, SIGNAL],
-    page: include_str!("road_object_sizes_plausible.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Types of objects that are slender in every relevant direction.

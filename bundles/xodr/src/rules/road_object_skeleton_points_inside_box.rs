@@ -1,15 +1,11 @@
 use crate::families::object_frame::{TOLERANCE, report_outside};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_skeleton_points_inside_box",
-    uids: &["asam.net:xodr:1.8.0:road.object.skeleton.points_inside_box"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_object_skeleton_points_inside_box.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

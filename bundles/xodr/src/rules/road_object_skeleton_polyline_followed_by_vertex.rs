@@ -2,14 +2,11 @@ use crate::families::object_parts::{Stands, owner, polylines};
 use crate::families::vertices::Vertices;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_skeleton_polyline_followed_by_vertex",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[POLYLINE, ROAD, LOCAL],
     versions: "1.8.0..",
-    after: super::READABLE,
-    page: include_str!("road_object_skeleton_polyline_followed_by_vertex.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const POLYLINE: &str = "asam.net:xodr:1.8.0:road.object.skeleton.polyline_followed_by_vertex";

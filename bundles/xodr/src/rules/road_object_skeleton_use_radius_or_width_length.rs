@@ -2,14 +2,11 @@ use crate::families::object_parts::{Stands, owner, polylines};
 use crate::families::vertices::Vertices;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_skeleton_use_radius_or_width_length",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[ONE_WAY, ROAD, LOCAL],
     versions: "1.8.0..",
-    after: super::READABLE,
-    page: include_str!("road_object_skeleton_use_radius_or_width_length.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const ONE_WAY: &str = "asam.net:xodr:1.8.0:road.object.skeleton.use_radius_or_width_length";

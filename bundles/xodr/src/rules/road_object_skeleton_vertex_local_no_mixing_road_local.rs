@@ -2,14 +2,11 @@ use crate::families::object_parts::{Stands, owner, polylines};
 use crate::families::vertices::Vertices;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_skeleton_vertex_local_no_mixing_road_local",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[SINCE_NINE, IN_EIGHT],
     versions: "1.8.0..",
-    after: super::READABLE,
-    page: include_str!("road_object_skeleton_vertex_local_no_mixing_road_local.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const SINCE_NINE: &str =

@@ -1,16 +1,12 @@
 use crate::families::on_road::OnRoad;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_surface_avoid_skewed_crg_surfacees",
-    uids: &["asam.net:xodr:1.9.0:road.object.surface.avoid_skewed_crg_surfacees"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.9.0..",
     backport: Backport::Lower { since: "1.7.0" },
-    after: super::READABLE,
-    page: include_str!("road_object_surface_avoid_skewed_crg_surfacees.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

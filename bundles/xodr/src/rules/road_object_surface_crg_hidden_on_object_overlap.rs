@@ -2,14 +2,10 @@ use crate::families::on_road::OnRoad;
 use crate::prelude::*;
 use qcbus_opendrive::Crg;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_surface_crg_hidden_on_object_overlap",
-    uids: &["asam.net:xodr:1.7.0:road.object.surface.crg_hidden_on_object_overlap"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
-    after: super::READABLE,
-    page: include_str!("road_object_surface_crg_hidden_on_object_overlap.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -16,15 +16,11 @@ const TOLERANCE: Param = Param::number(
 /// Maximum number of compared pairs of boxes.
 const BUDGET: usize = 5_000_000;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_surface_no_bounding_box_overlap",
-    uids: &["asam.net:xodr:1.7.0:road.object.surface.no_bounding_box_overlap"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_object_surface_no_bounding_box_overlap.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

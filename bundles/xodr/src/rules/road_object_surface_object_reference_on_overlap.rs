@@ -26,15 +26,11 @@ const SHRINK: f64 = 0.02;
 const MOST_PIECES: usize = 500_000;
 const BUDGET: usize = 20_000_000;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_surface_object_reference_on_overlap",
-    uids: &["asam.net:xodr:1.7.0:road.object.surface.object_reference_on_overlap"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
-    after: super::READABLE,
     params: &[AREA, CLEARANCE],
-    page: include_str!("road_object_surface_object_reference_on_overlap.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::families::object_parts::{Stands, has_outline, named, number, objects};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_surface_only_for_angular_boxes",
-    uids: &["asam.net:xodr:1.7.0:road.object.surface.only_for_angular_boxes"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
-    after: super::READABLE,
-    page: include_str!("road_object_surface_only_for_angular_boxes.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

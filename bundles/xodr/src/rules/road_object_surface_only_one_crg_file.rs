@@ -1,14 +1,10 @@
 use crate::families::object_parts::{Stands, named, objects};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_surface_only_one_crg_file",
-    uids: &["asam.net:xodr:1.7.0:road.object.surface.only_one_crg_file"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
-    after: super::READABLE,
-    page: include_str!("road_object_surface_only_one_crg_file.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::families::object_parts::{Stands, named, number, objects};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_surface_repeat_discretely_not_continously",
-    uids: &["asam.net:xodr:1.7.0:road.object.surface.repeat_discretely_not_continously"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
-    after: super::READABLE,
-    page: include_str!("road_object_surface_repeat_discretely_not_continously.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Distance in metres up to which a value counts as zero.

@@ -1,15 +1,11 @@
 use crate::families::object_parts::{Stands, is_blank, named, objects};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_type_attr",
-    uids: &["asam.net:xodr:1.7.0:road.object.type_attr"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.7.0..",
-    after: super::READABLE,
-    page: include_str!("road_object_type_attr.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Deprecated types, with the first version of the deprecation and the replacement.

@@ -1,15 +1,12 @@
 use crate::families::lane_ranges;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_object_validty_check_parent_orientation",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[RIGHT, LEFT, REFERENCE],
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_object_validty_check_parent_orientation.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const RIGHT: &str = "asam.net:xodr:1.7.0:road.object.validty.right_hand_traffic_lane_ids";

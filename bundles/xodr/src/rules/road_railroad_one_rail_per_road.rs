@@ -1,14 +1,10 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_railroad_one_rail_per_road",
-    uids: &["asam.net:xodr:1.7.0:road.railroad.one_rail_per_road"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_railroad_one_rail_per_road.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -1,18 +1,15 @@
 use crate::families::object_parts::named;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_railroad_platforms_min_segments",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         "asam.net:xodr:1.7.0:road.railroad.platforms.min_segments",
         "asam.net:xodr:1.7.0:road.railroad.segment.segments_per_platform_min_amount",
     ],
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_railroad_platforms_min_segments.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

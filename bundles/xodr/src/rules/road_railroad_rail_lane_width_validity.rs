@@ -5,17 +5,13 @@ use crate::prelude::*;
 const TRAM: Param = Param::number("tram", 2.2, "m", "smallest width of a lane for trams");
 const RAIL: Param = Param::number("rail", 2.6, "m", "smallest width of a lane for trains");
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_railroad_rail_lane_width_validity",
-    uids: &["asam.net:xodr:1.7.0:road.railroad.rail_lane_width_validity"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
     params: &[TRAM, RAIL],
-    page: include_str!("road_railroad_rail_lane_width_validity.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

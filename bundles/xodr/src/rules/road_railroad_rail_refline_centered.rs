@@ -10,16 +10,12 @@ const TOLERANCE: Param = Param::number(
     "largest distance between the middle of the lane and the reference line that is accepted",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_railroad_rail_refline_centered",
-    uids: &["asam.net:xodr:1.7.0:road.railroad.rail_refline_centered"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_railroad_rail_refline_centered.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

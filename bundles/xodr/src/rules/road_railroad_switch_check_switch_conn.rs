@@ -5,15 +5,12 @@ use crate::families::switches::by_id;
 use crate::prelude::*;
 use qcbus_opendrive::Switch;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_railroad_switch_check_switch_conn",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[CONNECTION, PARENT],
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_railroad_switch_check_switch_conn.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const CONNECTION: &str = "asam.net:xodr:1.7.0:road.railroad.switch.check_switch_conn";

@@ -3,15 +3,11 @@ use crate::families::switches::by_id;
 use crate::prelude::*;
 use qcbus_opendrive::Switch;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_railroad_switch_single_switch_no_partner",
-    uids: &["asam.net:xodr:1.7.0:road.railroad.switch.single_switch_no_partner"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_railroad_switch_single_switch_no_partner.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::families::object_parts::{below, number};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_ranges_not_reversed",
-    uids: &["qcbus.dev:xodr:1.1.0:road.ranges_not_reversed"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("road_ranges_not_reversed.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Elements with `sStart` and `sEnd` on one road, with their parents and their names in texts.

@@ -3,15 +3,11 @@ use crate::families::object_parts::{is_by_schema, named, number};
 use crate::families::shown;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_records_within_extent",
-    uids: &["qcbus.dev:xodr:1.0.0:road.records_within_extent"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[TOLERANCE, ROADSIDE, CLEAR],
-    page: include_str!("road_records_within_extent.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TOLERANCE: Param = Param::number(

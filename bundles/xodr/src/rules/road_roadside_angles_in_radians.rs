@@ -5,15 +5,11 @@ use crate::families::on_road::OnRoad;
 use crate::families::roadside::{place, things};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_roadside_angles_in_radians",
-    uids: &["qcbus.dev:xodr:1.0.0:road.roadside.angles_in_radians"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[LARGE],
-    page: include_str!("road_roadside_angles_in_radians.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const LARGE: Param = Param::number(

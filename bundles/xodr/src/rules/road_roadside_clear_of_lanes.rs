@@ -4,15 +4,11 @@ use crate::families::roadside::{Row, Spot, lane_at, lanes_at, place, stands_itse
 use crate::families::routes::DIRECTED;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_roadside_clear_of_lanes",
-    uids: &["qcbus.dev:xodr:1.0.0:road.roadside.clear_of_lanes"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[DEPTH, CLEARANCE],
-    page: include_str!("road_roadside_clear_of_lanes.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const DEPTH: Param = Param::number(

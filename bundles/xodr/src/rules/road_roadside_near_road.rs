@@ -3,15 +3,11 @@ use crate::families::on_road::OnRoad;
 use crate::families::roadside::{NearRoads, Row, beside, place, stands_itself, things};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_roadside_near_road",
-    uids: &["qcbus.dev:xodr:1.0.0:road.roadside.near_road"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[FAR_SIGNAL, FAR_OBJECT, HIGH, HIGH_SIGNAL, DEEP, DEEP_SIGNAL],
-    page: include_str!("road_roadside_near_road.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const FAR_SIGNAL: Param = Param::number(

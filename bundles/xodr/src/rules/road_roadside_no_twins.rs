@@ -4,15 +4,11 @@ use crate::families::roadside::{place, things};
 use crate::prelude::*;
 use foldhash::HashMap;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_roadside_no_twins",
-    uids: &["qcbus.dev:xodr:1.0.0:road.roadside.no_twins"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[NEAR],
-    page: include_str!("road_roadside_no_twins.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const NEAR: Param = Param::number(

@@ -2,15 +2,11 @@ use crate::families::ascending::TOLERANCE;
 use crate::families::shown::number;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_shape_elem_asc_order",
-    uids: &["asam.net:xodr:1.4.0:road.shape.elem_asc_order"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_shape_elem_asc_order.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -8,15 +8,11 @@ const STEP: Param = Param::number(
     "largest plausible step across a road, such as that of a high kerb",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_shape_no_step",
-    uids: &["qcbus.dev:xodr:1.4.0:road.shape.no_step"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[STEP],
-    page: include_str!("road_shape_no_step.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

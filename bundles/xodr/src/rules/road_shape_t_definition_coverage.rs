@@ -13,18 +13,15 @@ const TOLERANCE: Param = Param::number(
 
 const STARTS_RIGHT: &str = "asam.net:xodr:1.9.0:road.use_cases.shape_elements_start_right";
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_shape_t_definition_coverage",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[
         "asam.net:xodr:1.4.0:road.shape.t_definition_coverage",
         "asam.net:xodr:1.9.0:road.use_cases.shape_elements_start_right",
     ],
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_shape_t_definition_coverage.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

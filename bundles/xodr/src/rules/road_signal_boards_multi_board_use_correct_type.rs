@@ -2,14 +2,10 @@ use crate::families::boards::carriers;
 use crate::families::object_parts::{Stands, named};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_signal_boards_multi_board_use_correct_type",
-    uids: &["asam.net:xodr:1.8.0:road.signal.boards.multi_board_use_correct_type"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
-    after: super::READABLE,
-    page: include_str!("road_signal_boards_multi_board_use_correct_type.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -2,14 +2,11 @@ use crate::families::boards::{Carrier, carriers};
 use crate::families::object_parts::{Stands, named};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_signal_boards_static_board_use_correct_type",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[STATIC, STATIC_DYNAMIC, VARIABLE],
     versions: "1.8.0..",
-    after: super::READABLE,
-    page: include_str!("road_signal_boards_static_board_use_correct_type.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const STATIC: &str = "asam.net:xodr:1.8.0:road.signal.boards.static_board_use_correct_type";

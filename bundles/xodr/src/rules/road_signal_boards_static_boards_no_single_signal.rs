@@ -2,15 +2,11 @@ use crate::families::boards::carriers;
 use crate::families::object_parts::Stands;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_signal_boards_static_boards_no_single_signal",
-    uids: &["asam.net:xodr:1.9.0:road.signal.boards.static_boards_no_single_signal"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Lower { since: "1.8.0" },
-    after: super::READABLE,
-    page: include_str!("road_signal_boards_static_boards_no_single_signal.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -3,14 +3,10 @@ use crate::prelude::*;
 use foldhash::{HashMap, HashSet};
 use qcbus_opendrive::SignalKey;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_signal_controller_dynamic_only",
-    uids: &["qcbus.dev:xodr:1.1.0:road.signal.controller.dynamic_only"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Information,
-    after: super::READABLE,
-    page: include_str!("road_signal_controller_dynamic_only.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -2,14 +2,10 @@ use crate::families::object_parts::named;
 use crate::prelude::*;
 use foldhash::HashSet;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_signal_controller_in_junction",
-    uids: &["qcbus.dev:xodr:1.1.0:road.signal.controller.in_junction"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Information,
-    after: super::READABLE,
-    page: include_str!("road_signal_controller_in_junction.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -5,15 +5,11 @@ use qcbus_opendrive::Control;
 use qcbus_opendrive::Controller;
 use qcbus_opendrive::Signal;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_signal_controller_one_per_light",
-    uids: &["qcbus.dev:xodr:1.1.0:road.signal.controller.one_per_light"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[SHARE],
-    page: include_str!("road_signal_controller_one_per_light.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const SHARE: Param = Param::number(

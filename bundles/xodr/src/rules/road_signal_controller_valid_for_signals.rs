@@ -5,15 +5,11 @@ use crate::families::object_parts::named;
 use crate::prelude::*;
 use qcbus_opendrive::Control;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_signal_controller_valid_for_signals",
-    uids: &["asam.net:xodr:1.7.0:road.signal.controller.valid_for_signals"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_signal_controller_valid_for_signals.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,15 +1,11 @@
 use crate::families::gantries::gantry_of;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_signal_gantry_all_variable_boards_same_gantry",
-    uids: &["asam.net:xodr:1.9.0:road.signal.gantry.all_variable_boards_same_gantry"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
     backport: Backport::Lower { since: "1.8.0" },
-    after: super::READABLE,
-    page: include_str!("road_signal_gantry_all_variable_boards_same_gantry.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -4,16 +4,12 @@ use crate::families::gantries::gantry_of;
 use crate::families::on_road::OnRoad;
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_signal_gantry_vmsgroup_at_least_one_reference",
-    uids: &["asam.net:xodr:1.9.0:road.signal.gantry.vmsgroup_at_least_one_reference"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.9.0..",
     backport: Backport::Lower { since: "1.8.0" },
-    after: super::READABLE,
-    page: include_str!("road_signal_gantry_vmsgroup_at_least_one_reference.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::families::object_parts::{Stands, below, named};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_signal_no_self_reference",
-    uids: &["qcbus.dev:xodr:1.2.0:road.signal.no_self_reference"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("road_signal_no_self_reference.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

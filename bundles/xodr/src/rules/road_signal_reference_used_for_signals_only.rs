@@ -4,15 +4,11 @@ use crate::families::ids::{Class, Kind};
 use crate::families::object_parts::{Stands, below};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_signal_reference_used_for_signals_only",
-    uids: &["asam.net:xodr:1.7.0:road.signal.reference.used_for_signals_only"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_signal_reference_used_for_signals_only.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Classes that may be confused with signals. An id of these may also be the id of a signal.

@@ -1,15 +1,11 @@
 use crate::families::object_parts::{Stands, below, is_blank, listed, named, owner};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_signal_signal_type",
-    uids: &["asam.net:xodr:1.7.0:road.signal.signal_type"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("road_signal_signal_type.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {

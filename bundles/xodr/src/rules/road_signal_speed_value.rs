@@ -4,15 +4,12 @@ use crate::families::object_parts::{
 use crate::prelude::*;
 use foldhash::HashSet;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_signal_speed_value",
+pub const RULE: Rule<Roads> = Rule {
     uids: &[SPEED, UNIT],
     level: Level::Warning,
-    after: super::READABLE,
     params: &[HIGHEST],
-    page: include_str!("road_signal_speed_value.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const SPEED: &str = "qcbus.dev:xodr:1.2.0:road.signal.speed_value";

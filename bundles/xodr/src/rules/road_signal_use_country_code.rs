@@ -1,16 +1,12 @@
 use crate::families::object_parts::{Stands, below, is_blank, named, owner};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_signal_use_country_code",
-    uids: &["asam.net:xodr:1.7.0:road.signal.use_country_code"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     versions: "1.7.0..",
-    after: super::READABLE,
-    page: include_str!("road_signal_use_country_code.md"),
     each: Some(each),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -28,15 +28,11 @@ const LENGTH: Param = Param::number(
     "smallest length over which a steep road is reported",
 );
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_slope_plausible",
-    uids: &["qcbus.dev:xodr:1.4.0:road.slope_plausible"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[SLOPE, BANKING, OVERTURNED, CROSSFALL, LENGTH],
-    page: include_str!("road_slope_plausible.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

@@ -18,15 +18,11 @@ const RURAL: Param = Param::number(
 );
 const MOST: Param = Param::number("most", 90.0, "m/s", "highest plausible limit anywhere");
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_speed_plausible",
-    uids: &["qcbus.dev:xodr:1.4.0:road.speed_plausible"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[SLOW, TOWN, RURAL, MOST],
-    page: include_str!("road_speed_plausible.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

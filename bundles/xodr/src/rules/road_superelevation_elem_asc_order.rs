@@ -1,15 +1,11 @@
 use crate::families::ascending::{TOLERANCE, VOID, along_road, children};
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_superelevation_elem_asc_order",
-    uids: &["asam.net:xodr:1.4.0:road.superelevation.elem_asc_order"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("road_superelevation_elem_asc_order.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

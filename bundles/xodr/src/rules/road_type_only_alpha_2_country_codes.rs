@@ -1,14 +1,10 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_asam_xodr_road_type_only_alpha_2_country_codes",
-    uids: &["asam.net:xodr:1.7.0:road.type.only_alpha_2_country_codes"],
+pub const RULE: Rule<Roads> = Rule {
     versions: "1.7.0..",
     backport: Backport::Lower { since: "1.1.0" },
-    after: super::READABLE,
-    page: include_str!("road_type_only_alpha_2_country_codes.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// ALPHA-3 codes of countries that are frequent in maps, and the names that older versions allow,

@@ -3,14 +3,10 @@ use crate::families::on_road::OnRoad;
 use crate::prelude::*;
 use qcbus_opendrive::Validity;
 
-pub static RULE: Rule<Roads> = Rule {
-    id: "check_qcbus_xodr_road_validity_lanes_exist",
-    uids: &["qcbus.dev:xodr:1.4.0:road.validity_lanes_exist"],
+pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("road_validity_lanes_exist.md"),
     each: Some(each),
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {

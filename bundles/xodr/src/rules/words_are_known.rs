@@ -3,14 +3,10 @@ use crate::families::own_schema::OwnSchema;
 use crate::families::vocabularies::{VOCABULARIES, Vocabulary};
 use crate::prelude::*;
 
-pub static RULE: Rule<Document> = Rule {
-    id: "check_qcbus_xodr_words_are_known",
-    uids: &["qcbus.dev:xodr:1.0.0:words.are_known"],
+pub const RULE: Rule<Document> = Rule {
     versions: "..1.7.0",
-    after: super::READABLE,
-    page: include_str!("words_are_known.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(document: &Document<'_>, found: &mut Sink<'_>) {

@@ -1,10 +1,7 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Document> = Rule {
-    id: "check_asam_xodr_xml_root_tag_is_opendrive",
-    uids: &["asam.net:xodr:1.0.0:xml.root_tag_is_opendrive"],
+pub const RULE: Rule<Document> = Rule {
     after: &["check_asam_xodr_xml_valid_xml_document"],
-    page: include_str!("xml_root_tag_is_opendrive.md"),
     run,
     ..Rule::DEFAULTS
 };

@@ -1,9 +1,6 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Document> = Rule {
-    id: "check_asam_xodr_xml_valid_xml_document",
-    uids: &["asam.net:xodr:1.0.0:xml.valid_xml_document"],
-    page: include_str!("xml_valid_xml_document.md"),
+pub const RULE: Rule<Document> = Rule {
     run,
     ..Rule::DEFAULTS
 };

@@ -1,10 +1,7 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Document> = Rule {
-    id: "check_asam_xodr_xml_version_is_defined",
-    uids: &["asam.net:xodr:1.0.0:xml.version_is_defined"],
+pub const RULE: Rule<Document> = Rule {
     after: &["check_asam_xodr_xml_fileheader_is_present"],
-    page: include_str!("xml_version_is_defined.md"),
     run,
     ..Rule::DEFAULTS
 };

@@ -2,15 +2,11 @@ use crate::families::references::quoted;
 use crate::prelude::*;
 use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_action_add_delete_order",
-    uids: &["qcbus.dev:xosc:1.0.0:action.add_delete_order"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("action_add_delete_order.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,13 +2,10 @@ use crate::families::ranges;
 use crate::families::ranges::tables::OVERRIDES;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_action_controller_override_range",
+pub const RULE: Rule<Scene> = Rule {
     uids: &UIDS,
-    after: super::READABLE,
-    page: include_str!("action_controller_override_range.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const OWN: [&str; 1] = ["qcbus.dev:xosc:1.0.0:action.controller_override_range"];

@@ -1,15 +1,11 @@
 use crate::prelude::*;
 use foldhash::{HashMap, HashMapExt as _};
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_action_custom_command_portable",
-    uids: &["qcbus.dev:xosc:1.0.0:action.custom_command_portable"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("action_custom_command_portable.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

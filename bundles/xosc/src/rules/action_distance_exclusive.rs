@@ -1,13 +1,9 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_action_distance_exclusive",
-    uids: &["qcbus.dev:xosc:1.0.0:action.distance_exclusive"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("action_distance_exclusive.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

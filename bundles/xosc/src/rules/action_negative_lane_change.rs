@@ -1,16 +1,12 @@
 use crate::families::actions::{short, stated};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_action_negative_lane_change",
-    uids: &["qcbus.dev:xosc:1.0.0:action.negative_lane_change"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     params: &[MOST],
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("action_negative_lane_change.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const MOST: Param = Param::number("most", 5.0, "m", "largest lane offset that is accepted");

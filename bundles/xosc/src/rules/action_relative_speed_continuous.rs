@@ -1,16 +1,12 @@
 use crate::families::actions::stated;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_action_relative_speed_continuous",
-    uids: &["qcbus.dev:xosc:1.0.0:action.relative_speed_continuous"],
+pub const RULE: Rule<Scene> = Rule {
     // Some simulators drop one of the two and continue.
     level: Level::Warning,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("action_relative_speed_continuous.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

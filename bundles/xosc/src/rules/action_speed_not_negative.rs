@@ -1,15 +1,11 @@
 use crate::families::actions::stated;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_action_speed_not_negative",
-    uids: &["qcbus.dev:xosc:1.0.0:action.speed_not_negative"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("action_speed_not_negative.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

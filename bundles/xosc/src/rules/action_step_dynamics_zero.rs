@@ -1,15 +1,11 @@
 use crate::families::actions::{TRANSITIONS, stated};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_action_step_dynamics_zero",
-    uids: &["qcbus.dev:xosc:1.0.0:action.step_dynamics_zero"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("action_step_dynamics_zero.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

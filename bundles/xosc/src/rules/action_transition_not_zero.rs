@@ -1,15 +1,11 @@
 use crate::families::actions::{TRANSITIONS, stated};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_action_transition_not_zero",
-    uids: &["qcbus.dev:xosc:1.0.0:action.transition_not_zero"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("action_transition_not_zero.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,14 +2,10 @@ use crate::families::catalogs::{self, Once};
 use crate::prelude::*;
 use foldhash::HashMap;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_catalogs_duplicate_across_files",
-    uids: &["qcbus.dev:xosc:1.0.0:catalogs.duplicate_across_files"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("catalogs_duplicate_across_files.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Catalog, kind and name of an entry.

@@ -3,13 +3,9 @@ use crate::prelude::*;
 use foldhash::{HashMap, HashSet};
 use qcbus_schema_rule::{Breach, Weight, breaches};
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_catalogs_entry_schema",
-    uids: &["qcbus.dev:xosc:1.0.0:catalogs.entry_schema"],
-    after: super::READABLE,
-    page: include_str!("catalogs_entry_schema.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

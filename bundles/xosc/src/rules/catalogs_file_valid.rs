@@ -1,14 +1,10 @@
 use crate::prelude::*;
 use qcbus_messages::DocumentRole;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_catalogs_file_valid",
-    uids: &["qcbus.dev:xosc:1.0.0:catalogs.file_valid"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("catalogs_file_valid.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(_: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,13 +1,9 @@
 use crate::families::catalogs;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_catalogs_kind_mismatch",
-    uids: &["qcbus.dev:xosc:1.0.0:catalogs.kind_mismatch"],
-    after: super::READABLE,
-    page: include_str!("catalogs_kind_mismatch.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

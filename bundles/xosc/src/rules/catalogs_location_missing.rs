@@ -1,13 +1,9 @@
 use crate::families::catalogs::{self, Once};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_catalogs_location_missing",
-    uids: &["qcbus.dev:xosc:1.0.0:catalogs.location_missing"],
-    after: super::READABLE,
-    page: include_str!("catalogs_location_missing.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

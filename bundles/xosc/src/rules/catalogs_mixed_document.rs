@@ -1,12 +1,8 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_catalogs_mixed_document",
-    uids: &["qcbus.dev:xosc:1.0.0:catalogs.mixed_document"],
-    after: super::READABLE,
-    page: include_str!("catalogs_mixed_document.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Elements that determine the form of a document.

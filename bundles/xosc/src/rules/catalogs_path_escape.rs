@@ -2,14 +2,10 @@ use crate::families::catalogs;
 use crate::families::references::quoted;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_catalogs_path_escape",
-    uids: &["qcbus.dev:xosc:1.0.0:catalogs.path_escape"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("catalogs_path_escape.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::families::catalogs;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_catalogs_unused_location",
-    uids: &["qcbus.dev:xosc:1.0.0:catalogs.unused_location"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
-    after: super::READABLE,
-    page: include_str!("catalogs_unused_location.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

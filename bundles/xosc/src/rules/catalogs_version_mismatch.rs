@@ -1,14 +1,10 @@
 use crate::families::catalogs::{self, Once};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_catalogs_version_mismatch",
-    uids: &["qcbus.dev:xosc:1.0.0:catalogs.version_mismatch"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
-    after: super::READABLE,
-    page: include_str!("catalogs_version_mismatch.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

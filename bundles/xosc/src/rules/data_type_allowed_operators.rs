@@ -1,8 +1,7 @@
 use crate::families::values;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_data_type_allowed_operators",
+pub const RULE: Rule<Scene> = Rule {
     uids: &[
         "asam.net:xosc:1.2.0:data_type.allowed_operators",
         "asam.net:xosc:1.1.0:expressions.allowed_operators",
@@ -10,10 +9,8 @@ pub static RULE: Rule<Scene> = Rule {
     ],
     versions: "1.2.0..",
     backport: Backport::Alike { since: "1.1.0" },
-    after: super::READABLE,
-    page: include_str!("data_type_allowed_operators.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,13 +2,10 @@ use crate::families::ranges;
 use crate::families::ranges::tables::CONDITION_DELAY;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_data_type_condition_delay_not_negative",
+pub const RULE: Rule<Scene> = Rule {
     uids: &UIDS,
-    after: super::READABLE,
-    page: include_str!("data_type_condition_delay_not_negative.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const OWN: [&str; 1] = ["asam.net:xosc:1.0.0:data_type.condition_delay_not_negative"];

@@ -2,15 +2,12 @@ use crate::families::ranges;
 use crate::families::ranges::tables::DISTANCES;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_data_type_distances_are_not_negative",
+pub const RULE: Rule<Scene> = Rule {
     uids: &UIDS,
     versions: "1.1.0..",
     backport: Backport::Alike { since: "" },
-    after: super::READABLE,
-    page: include_str!("data_type_distances_are_not_negative.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const OWN: [&str; 1] = ["asam.net:xosc:1.1.0:data_type.distances_are_not_negative"];

@@ -2,15 +2,12 @@ use crate::families::ranges;
 use crate::families::ranges::tables::TRANSITIONS;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_data_type_non_negative_transition_time_in_light_state_action",
+pub const RULE: Rule<Scene> = Rule {
     uids: &UIDS,
     // Lights exist since this version, so older files have none.
     versions: "1.2.0..",
-    after: super::READABLE,
-    page: include_str!("data_type_non_negative_transition_time_in_light_state_action.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const OWN: [&str; 1] =

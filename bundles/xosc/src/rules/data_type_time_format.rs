@@ -1,13 +1,9 @@
 use crate::families::values;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_data_type_time_format",
-    uids: &["asam.net:xosc:1.0.0:data_type.time_format"],
-    after: super::READABLE,
-    page: include_str!("data_type_time_format.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

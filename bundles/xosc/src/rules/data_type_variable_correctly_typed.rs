@@ -2,14 +2,10 @@ use crate::families::declared;
 use crate::families::values;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_data_type_variable_correctly_typed",
-    uids: &["asam.net:xosc:1.2.0:data_type.variable_correctly_typed"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.2.0..",
-    after: super::READABLE,
-    page: include_str!("data_type_variable_correctly_typed.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

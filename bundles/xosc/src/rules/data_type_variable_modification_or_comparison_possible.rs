@@ -2,14 +2,10 @@ use crate::families::constraints;
 use crate::families::declared;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_data_type_variable_modification_or_comparison_possible",
-    uids: &["asam.net:xosc:1.2.0:data_type.variable_modification_or_comparison_possible"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.2.0..",
-    after: super::READABLE,
-    page: include_str!("data_type_variable_modification_or_comparison_possible.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

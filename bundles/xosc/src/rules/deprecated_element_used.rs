@@ -1,15 +1,11 @@
 use crate::families::deprecation;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_deprecated_element_used",
-    uids: &["qcbus.dev:xosc:1.0.0:deprecated.element_used"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.1.0..2.0.0",
-    after: super::READABLE,
-    page: include_str!("deprecated_element_used.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

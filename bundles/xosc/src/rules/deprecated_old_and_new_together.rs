@@ -1,13 +1,9 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_deprecated_old_and_new_together",
-    uids: &["qcbus.dev:xosc:1.0.0:deprecated.old_and_new_together"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.1..",
-    after: super::READABLE,
-    page: include_str!("deprecated_old_and_new_together.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Element, its type, the deprecated attribute and its replacements. The function converts the old

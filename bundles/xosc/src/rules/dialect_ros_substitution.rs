@@ -2,15 +2,11 @@ use crate::families::values;
 use crate::prelude::*;
 use qcbus_openscenario::Dialect;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_dialect_ros_substitution",
-    uids: &["qcbus.dev:xosc:1.0.0:dialect.ros_substitution"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[ALLOWED],
-    page: include_str!("dialect_ros_substitution.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const ALLOWED: Param = Param::flag(

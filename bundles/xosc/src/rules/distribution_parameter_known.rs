@@ -2,14 +2,10 @@ use crate::families::distributions::{self, SOURCES};
 use crate::families::references::hint;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_distribution_parameter_known",
-    uids: &["qcbus.dev:xosc:1.0.0:distribution.parameter_known"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("distribution_parameter_known.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,15 +2,11 @@ use crate::families::distributions;
 use crate::families::references::quoted;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_distribution_range_valid",
-    uids: &["qcbus.dev:xosc:1.0.0:distribution.range_valid"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
     params: &[MOST],
-    page: include_str!("distribution_range_valid.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const MOST: Param = Param::number(

@@ -2,14 +2,10 @@ use crate::families::catalogs;
 use crate::prelude::*;
 use qcbus_messages::DocumentRole;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_distribution_scenario_file",
-    uids: &["qcbus.dev:xosc:1.0.0:distribution.scenario_file"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("distribution_scenario_file.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

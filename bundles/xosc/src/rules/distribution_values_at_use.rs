@@ -5,14 +5,10 @@ use crate::prelude::*;
 use foldhash::{HashMap, HashSet};
 use qcbus_openscenario::Inputs;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_distribution_values_at_use",
-    uids: &["qcbus.dev:xosc:1.0.0:distribution.values_at_use"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("distribution_values_at_use.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Maximum number of elements that are read again in total. Large scenarios are checked with fewer

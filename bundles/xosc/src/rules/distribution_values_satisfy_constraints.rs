@@ -2,14 +2,10 @@ use crate::families::distributions::{self, SOURCES};
 use crate::families::{allowed_values, references::quoted};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_distribution_values_satisfy_constraints",
-    uids: &["qcbus.dev:xosc:1.0.0:distribution.values_satisfy_constraints"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("distribution_values_satisfy_constraints.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

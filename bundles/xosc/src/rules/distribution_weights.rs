@@ -1,14 +1,10 @@
 use crate::families::references::quoted;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_distribution_weights",
-    uids: &["qcbus.dev:xosc:1.0.0:distribution.weights"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("distribution_weights.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Attributes of the shape of a distribution: element, attribute, allowed values in words, and

@@ -1,14 +1,10 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_entities_axle_geometry",
-    uids: &["qcbus.dev:xosc:1.0.0:entities.axle_geometry"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[WHEELBASE, WHEEL],
-    page: include_str!("entities_axle_geometry.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const WHEELBASE: Param = Param::number(

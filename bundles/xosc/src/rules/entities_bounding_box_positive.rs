@@ -1,14 +1,10 @@
 use crate::families::catalogs;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_entities_bounding_box_positive",
-    uids: &["qcbus.dev:xosc:1.0.0:entities.bounding_box_positive"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("entities_bounding_box_positive.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,15 +1,11 @@
 use crate::families::actions::stated;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_entities_dimensions_plausible",
-    uids: &["qcbus.dev:xosc:1.0.0:entities.dimensions_plausible"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[LENGTH, ACROSS],
-    page: include_str!("entities_dimensions_plausible.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const LENGTH: Param = Param::number(

@@ -3,14 +3,10 @@ use std::cell::LazyCell;
 use crate::families::{placement, references};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_entities_not_positioned",
-    uids: &["qcbus.dev:xosc:1.0.0:entities.not_positioned"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("entities_not_positioned.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,15 +1,11 @@
 use crate::families::spawn;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_entities_overlapping_spawn",
-    uids: &["qcbus.dev:xosc:1.0.0:entities.overlapping_spawn"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[TOLERANCE],
-    page: include_str!("entities_overlapping_spawn.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TOLERANCE: Param = Param::number(

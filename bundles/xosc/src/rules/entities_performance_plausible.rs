@@ -1,14 +1,10 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_entities_performance_plausible",
-    uids: &["qcbus.dev:xosc:1.0.0:entities.performance_plausible"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
-    after: super::READABLE,
     params: &[SPEED, ACCELERATION],
-    page: include_str!("entities_performance_plausible.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const SPEED: Param = Param::number(

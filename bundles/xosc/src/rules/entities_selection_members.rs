@@ -2,13 +2,9 @@ use crate::prelude::*;
 use foldhash::HashSet;
 use qcbus_openscenario::Selection;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_entities_selection_members",
-    uids: &["qcbus.dev:xosc:1.0.0:entities.selection_members"],
-    after: super::READABLE,
-    page: include_str!("entities_selection_members.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::families::references::{SINGLE_ENTITY, quoted};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_entities_selection_not_allowed",
-    uids: &["qcbus.dev:xosc:1.0.0:entities.selection_not_allowed"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("entities_selection_not_allowed.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Elements in which an `EntityRef` refers to one entity.

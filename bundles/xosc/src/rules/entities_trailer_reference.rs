@@ -2,14 +2,10 @@ use crate::families::references::quoted;
 use crate::prelude::*;
 use foldhash::{HashMap, HashSet};
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_entities_trailer_reference",
-    uids: &["qcbus.dev:xosc:1.0.0:entities.trailer_reference"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.3.0..",
-    after: super::READABLE,
-    page: include_str!("entities_trailer_reference.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

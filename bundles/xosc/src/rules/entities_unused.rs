@@ -5,14 +5,10 @@ use crate::families::references;
 use crate::prelude::*;
 use foldhash::HashSet;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_entities_unused",
-    uids: &["qcbus.dev:xosc:1.0.0:entities.unused"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
-    after: super::READABLE,
-    page: include_str!("entities_unused.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

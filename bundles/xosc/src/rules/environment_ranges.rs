@@ -2,13 +2,10 @@ use crate::families::ranges;
 use crate::families::ranges::tables::ENVIRONMENT;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_environment_ranges",
+pub const RULE: Rule<Scene> = Rule {
     uids: &UIDS,
-    after: super::READABLE,
-    page: include_str!("environment_ranges.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const OWN: [&str; 1] = ["qcbus.dev:xosc:1.0.0:environment.ranges"];

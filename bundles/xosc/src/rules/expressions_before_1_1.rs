@@ -1,14 +1,10 @@
 use crate::families::values;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_expressions_before_1_1",
-    uids: &["qcbus.dev:xosc:1.0.0:expressions.before_1_1"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.0.0..1.1.0",
-    after: super::READABLE,
-    page: include_str!("expressions_before_1_1.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::families::values;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_expressions_evaluation_of_expressions_possible",
-    uids: &["asam.net:xosc:1.1.0:expressions.evaluation_of_expressions_possible"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("expressions_evaluation_of_expressions_possible.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

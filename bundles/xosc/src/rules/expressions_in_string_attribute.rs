@@ -2,15 +2,11 @@ use crate::families::values;
 use crate::prelude::*;
 use qcbus_openscenario::expr;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_expressions_in_string_attribute",
-    uids: &["qcbus.dev:xosc:1.0.0:expressions.in_string_attribute"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("expressions_in_string_attribute.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,15 +1,11 @@
 use crate::families::values;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_expressions_precision_loss",
-    uids: &["qcbus.dev:xosc:1.0.0:expressions.precision_loss"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("expressions_precision_loss.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_expressions_suspicious_units",
-    uids: &["qcbus.dev:xosc:1.0.0:expressions.suspicious_units"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
-    after: super::READABLE,
     params: &[FASTEST],
-    page: include_str!("expressions_suspicious_units.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Elements whose `value` is a speed in m/s.

@@ -1,16 +1,12 @@
 use crate::families::values;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_expressions_unused_constant",
-    uids: &["qcbus.dev:xosc:1.0.0:expressions.unused_constant"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.1.0..",
-    after: super::READABLE,
     default_on: false,
-    page: include_str!("expressions_unused_constant.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

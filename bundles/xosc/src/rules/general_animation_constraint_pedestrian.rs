@@ -1,14 +1,10 @@
 use crate::families::actions::acting;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_general_animation_constraint_pedestrian",
-    uids: &["asam.net:xosc:1.2.0:general.animation_constraint_pedestrian"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.2.0..",
-    after: super::READABLE,
-    page: include_str!("general_animation_constraint_pedestrian.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -3,18 +3,15 @@ use crate::families::references::quoted;
 use crate::prelude::*;
 use foldhash::HashMap;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_general_references_to_scenario_object",
+pub const RULE: Rule<Scene> = Rule {
     uids: &[
         "asam.net:xosc:1.1.0:general.references_to_scenario_object",
         "asam.net:xosc:1.2.0:reference_control.references_to_scenario_object",
     ],
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("general_references_to_scenario_object.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Actions of vehicles and pedestrians, by the standard's table of entity type constraints.

@@ -1,15 +1,11 @@
 use crate::prelude::*;
 use qcbus_openscenario::DateTime;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_header_date_plausible",
-    uids: &["qcbus.dev:xosc:1.0.0:header.date_plausible"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
-    after: super::READABLE,
     params: &[EARLIEST],
-    page: include_str!("header_date_plausible.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const EARLIEST: Param = Param::number(

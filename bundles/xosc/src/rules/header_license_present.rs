@@ -1,15 +1,11 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_header_license_present",
-    uids: &["qcbus.dev:xosc:1.0.0:header.license_present"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.1..",
-    after: super::READABLE,
     default_on: false,
-    page: include_str!("header_license_present.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,13 +1,9 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_header_metadata_filled",
-    uids: &["qcbus.dev:xosc:1.0.0:header.metadata_filled"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
-    after: super::READABLE,
-    page: include_str!("header_metadata_filled.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,13 +1,9 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Document> = Rule {
-    id: "check_qcbus_xosc_header_unsupported_version",
-    uids: &["qcbus.dev:xosc:1.0.0:header.unsupported_version"],
+pub const RULE: Rule<Document> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("header_unsupported_version.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(document: &Document<'_>, found: &mut Sink<'_>) {

@@ -1,15 +1,11 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_minsubset_not_more_than_one_story_allowed",
-    uids: &["asam.net:xosc:1.3.0:minsubset.not_more_than_one_story_allowed"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.3.0..",
-    after: super::READABLE,
     default_on: false,
-    page: include_str!("minsubset_not_more_than_one_story_allowed.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,16 +1,12 @@
 use crate::families::minsubset;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_minsubset_stop_triggers_not_allowed_except_in_storyboard",
-    uids: &["asam.net:xosc:1.3.0:minsubset.stop_triggers_not_allowed_except_in_storyboard"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.3.0..",
-    after: super::READABLE,
     default_on: false,
-    page: include_str!("minsubset_stop_triggers_not_allowed_except_in_storyboard.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,16 +1,12 @@
 use crate::families::minsubset;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_minsubset_variables_not_allowed",
-    uids: &["asam.net:xosc:1.3.0:minsubset.variables_not_allowed"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.3.0..",
-    after: super::READABLE,
     default_on: false,
-    page: include_str!("minsubset_variables_not_allowed.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,13 +2,9 @@ use crate::prelude::*;
 use qcbus_document::FileKind;
 use qcbus_messages::DocumentRole;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_modular_not_plain_scenario",
-    uids: &["qcbus.dev:xosc:1.0.0:modular.not_plain_scenario"],
-    after: super::READABLE,
-    page: include_str!("modular_not_plain_scenario.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

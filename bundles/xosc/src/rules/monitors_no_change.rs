@@ -2,15 +2,11 @@ use crate::families::declared;
 use crate::prelude::*;
 use foldhash::{HashSet, HashSetExt as _};
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_monitors_no_change",
-    uids: &["qcbus.dev:xosc:1.0.0:monitors.no_change"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.3.0..",
-    after: super::READABLE,
-    page: include_str!("monitors_no_change.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

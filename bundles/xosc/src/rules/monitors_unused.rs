@@ -1,15 +1,11 @@
 use crate::families::declared;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_monitors_unused",
-    uids: &["qcbus.dev:xosc:1.0.0:monitors.unused"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.3.0..",
-    after: super::READABLE,
-    page: include_str!("monitors_unused.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

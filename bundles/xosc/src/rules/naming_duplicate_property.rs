@@ -1,14 +1,10 @@
 use crate::prelude::*;
 use foldhash::HashMap;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_naming_duplicate_property",
-    uids: &["qcbus.dev:xosc:1.0.0:naming.duplicate_property"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("naming_duplicate_property.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

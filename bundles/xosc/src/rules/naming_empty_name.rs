@@ -3,13 +3,9 @@ use crate::families::references::quoted;
 use crate::prelude::*;
 use qcbus_openscenario::StoryKind;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_naming_empty_name",
-    uids: &["qcbus.dev:xosc:1.0.0:naming.empty_name"],
-    after: super::READABLE,
-    page: include_str!("naming_empty_name.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,13 +2,9 @@ use crate::families::references::quoted;
 use crate::prelude::*;
 use foldhash::HashMap;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_naming_entity_selection_clash",
-    uids: &["qcbus.dev:xosc:1.0.0:naming.entity_selection_clash"],
-    after: super::READABLE,
-    page: include_str!("naming_entity_selection_clash.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

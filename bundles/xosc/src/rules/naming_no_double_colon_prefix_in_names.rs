@@ -2,13 +2,9 @@ use crate::families::names;
 use crate::families::references::quoted;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_naming_no_double_colon_prefix_in_names",
-    uids: &["asam.net:xosc:1.0.0:naming.no_double_colon_prefix_in_names"],
-    after: super::READABLE,
-    page: include_str!("naming_no_double_colon_prefix_in_names.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::families::names;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_naming_non_ascii_or_control",
-    uids: &["qcbus.dev:xosc:1.0.0:naming.non_ascii_or_control"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("naming_non_ascii_or_control.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

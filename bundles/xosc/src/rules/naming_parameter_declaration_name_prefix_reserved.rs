@@ -1,13 +1,9 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_naming_parameter_declaration_name_prefix_reserved",
-    uids: &["asam.net:xosc:1.0.0:naming.parameter_declaration_name_prefix_reserved"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("naming_parameter_declaration_name_prefix_reserved.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,15 +1,11 @@
 use crate::prelude::*;
 use qcbus_openscenario::is_identifier;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_naming_parameter_declaration_parameter_name",
-    uids: &["asam.net:xosc:1.1.0:naming.parameter_declaration_parameter_name"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.1.0..",
     backport: Backport::Lower { since: "" },
-    after: super::READABLE,
-    page: include_str!("naming_parameter_declaration_parameter_name.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,17 +1,14 @@
 use crate::families::names;
 use crate::prelude::*;
 
-pub static RULE: Rule<Document> = Rule {
-    id: "check_asam_xosc_naming_unique_element_names_on_same_level",
+pub const RULE: Rule<Document> = Rule {
     uids: &[
         "asam.net:xosc:1.0.0:naming.unique_element_names_on_same_level",
         "qcbus.dev:xosc:1.0.0:parameters.duplicate_declaration",
     ],
     versions: "1.0.0..1.2.0",
-    after: super::READABLE,
-    page: include_str!("naming_unique_element_names_on_same_level.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(document: &Document<'_>, found: &mut Sink<'_>) {

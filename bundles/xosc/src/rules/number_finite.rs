@@ -1,13 +1,9 @@
 use crate::families::{self, finite::Numbers};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_number_finite",
-    uids: &["qcbus.dev:xosc:1.0.0:number.finite"],
-    after: super::READABLE,
-    page: include_str!("number_finite.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Numbers that are not part of a position and have no range of their own.

@@ -1,13 +1,9 @@
 use crate::prelude::*;
 use foldhash::{HashMap, HashSet};
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_parameters_assignment_duplicate",
-    uids: &["qcbus.dev:xosc:1.0.0:parameters.assignment_duplicate"],
-    after: super::READABLE,
-    page: include_str!("parameters_assignment_duplicate.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Holders of assignments, the assigning elements, and the attribute that names the parameter.

@@ -1,13 +1,9 @@
 use crate::families::{allowed_values, catalogs};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_parameters_assignment_type",
-    uids: &["qcbus.dev:xosc:1.0.0:parameters.assignment_type"],
-    after: super::READABLE,
-    page: include_str!("parameters_assignment_type.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,13 +2,9 @@ use crate::families::catalogs;
 use crate::families::references::hint;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_parameters_assignment_unknown",
-    uids: &["qcbus.dev:xosc:1.0.0:parameters.assignment_unknown"],
-    after: super::READABLE,
-    page: include_str!("parameters_assignment_unknown.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

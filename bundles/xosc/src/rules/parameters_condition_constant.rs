@@ -3,15 +3,11 @@ use crate::families::declared;
 use crate::families::values;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_parameters_condition_constant",
-    uids: &["qcbus.dev:xosc:1.0.0:parameters.condition_constant"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.2.0..",
-    after: super::READABLE,
-    page: include_str!("parameters_condition_constant.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,13 +2,9 @@ use crate::families::declared;
 use crate::families::references;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_parameters_condition_reference",
-    uids: &["qcbus.dev:xosc:1.0.0:parameters.condition_reference"],
-    after: super::READABLE,
-    page: include_str!("parameters_condition_reference.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,15 +2,11 @@ use crate::families::constraints;
 use crate::families::declared;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_parameters_constraint_contradiction",
-    uids: &["qcbus.dev:xosc:1.0.0:parameters.constraint_contradiction"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("parameters_constraint_contradiction.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

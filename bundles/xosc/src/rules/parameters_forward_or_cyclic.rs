@@ -1,13 +1,9 @@
 use crate::families::values;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_parameters_forward_or_cyclic",
-    uids: &["qcbus.dev:xosc:1.0.0:parameters.forward_or_cyclic"],
-    after: super::READABLE,
-    page: include_str!("parameters_forward_or_cyclic.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

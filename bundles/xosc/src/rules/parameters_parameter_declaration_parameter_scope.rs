@@ -1,15 +1,11 @@
 use crate::families::values;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_parameters_parameter_declaration_parameter_scope",
-    uids: &["asam.net:xosc:1.1.0:parameters.parameter_declaration_parameter_scope"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.1.0..",
     backport: Backport::Alike { since: "" },
-    after: super::READABLE,
-    page: include_str!("parameters_parameter_declaration_parameter_scope.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

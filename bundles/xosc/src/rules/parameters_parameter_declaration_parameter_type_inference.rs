@@ -3,13 +3,9 @@ use crate::families::values;
 use crate::prelude::*;
 use qcbus_openscenario::ValueFault;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_parameters_parameter_declaration_parameter_type_inference",
-    uids: &["asam.net:xosc:1.0.0:parameters.parameter_declaration_parameter_type_inference"],
-    after: super::READABLE,
-    page: include_str!("parameters_parameter_declaration_parameter_type_inference.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

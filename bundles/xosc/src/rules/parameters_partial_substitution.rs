@@ -1,15 +1,11 @@
 use crate::families::values;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_parameters_partial_substitution",
-    uids: &["qcbus.dev:xosc:1.0.0:parameters.partial_substitution"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[ALLOWED],
-    page: include_str!("parameters_partial_substitution.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const ALLOWED: Param = Param::flag(

@@ -1,14 +1,10 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_parameters_shadowing",
-    uids: &["qcbus.dev:xosc:1.0.0:parameters.shadowing"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("parameters_shadowing.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_parameters_type_literal_version",
-    uids: &["qcbus.dev:xosc:1.0.0:parameters.type_literal_version"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.2.0..",
-    after: super::READABLE,
-    page: include_str!("parameters_type_literal_version.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

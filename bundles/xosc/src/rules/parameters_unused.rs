@@ -3,14 +3,10 @@ use crate::prelude::*;
 use foldhash::{HashSet, HashSetExt as _};
 use qcbus_openscenario::identifier;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_parameters_unused",
-    uids: &["qcbus.dev:xosc:1.0.0:parameters.unused"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
-    after: super::READABLE,
-    page: include_str!("parameters_unused.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Elements that refer to a parameter by its name.

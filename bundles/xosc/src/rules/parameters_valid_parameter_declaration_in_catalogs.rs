@@ -3,15 +3,11 @@ use crate::prelude::*;
 use foldhash::{HashMap, HashMapExt as _, HashSet};
 use qcbus_openscenario::identifier;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_parameters_valid_parameter_declaration_in_catalogs",
-    uids: &["asam.net:xosc:1.2.0:parameters.valid_parameter_declaration_in_catalogs"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.2.0..",
     backport: Backport::Alike { since: "" },
-    after: super::READABLE,
-    page: include_str!("parameters_valid_parameter_declaration_in_catalogs.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

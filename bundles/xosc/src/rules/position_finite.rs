@@ -1,13 +1,9 @@
 use crate::families::{self, finite::Numbers};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_position_finite",
-    uids: &["qcbus.dev:xosc:1.0.0:position.finite"],
-    after: super::READABLE,
-    page: include_str!("position_finite.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Elements of positions, with their numeric attributes.

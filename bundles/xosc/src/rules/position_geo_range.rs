@@ -2,14 +2,11 @@ use crate::families::ranges;
 use crate::families::ranges::tables::GEO;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_position_geo_range",
+pub const RULE: Rule<Scene> = Rule {
     uids: &UIDS,
     versions: "1.1..",
-    after: super::READABLE,
-    page: include_str!("position_geo_range.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const OWN: [&str; 1] = ["qcbus.dev:xosc:1.0.0:position.geo_range"];

@@ -2,15 +2,11 @@ use crate::families::positions::shown;
 use crate::prelude::*;
 use foldhash::{HashSet, HashSetExt as _};
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_position_orientation_range",
-    uids: &["qcbus.dev:xosc:1.0.0:position.orientation_range"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[TURNS],
-    page: include_str!("position_orientation_range.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TURNS: Param = Param::number(

@@ -8,14 +8,10 @@ use crate::families::routes::waypoints;
 use crate::prelude::*;
 use qcbus_opendrive::TrafficRule;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_position_route_reference",
-    uids: &["qcbus.dev:xosc:1.0.0:position.route_reference"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("position_route_reference.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -6,18 +6,15 @@ use crate::prelude::*;
 use foldhash::HashSet;
 use qcbus_opendrive::LaneRef;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_positioning_road_lane_offset_in_bounds",
+pub const RULE: Rule<Scene> = Rule {
     uids: &[
         "asam.net:xosc:1.0.0:positioning.road_lane_offset_in_bounds",
         "qcbus.dev:xosc:1.0.0:range.laneposition_s",
         "qcbus.dev:xosc:1.0.0:range.roadposition_s",
     ],
-    after: super::READABLE,
     params: &[SLACK],
-    page: include_str!("positioning_road_lane_offset_in_bounds.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const SLACK: Param = Param::number(

@@ -2,15 +2,12 @@ use crate::families::ranges;
 use crate::families::ranges::tables::PHASES;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_positive_duration_in_phase",
+pub const RULE: Rule<Scene> = Rule {
     uids: &UIDS,
     versions: "1.2.0..",
     backport: Backport::Alike { since: "" },
-    after: super::READABLE,
-    page: include_str!("positive_duration_in_phase.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const OWN: [&str; 2] = [

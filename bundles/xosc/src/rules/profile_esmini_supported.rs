@@ -2,15 +2,11 @@ use crate::families::profiles::Fate::{Ignores, Stops};
 use crate::families::profiles::{self, Gap, gap};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_profile_esmini_supported",
-    uids: &["qcbus.dev:xosc:1.0.0:profile.esmini_supported"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
-    after: super::READABLE,
     default_on: false,
-    page: include_str!("profile_esmini_supported.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const GAPS: &[Gap] = &[

@@ -2,13 +2,10 @@ use crate::families::ranges::tables::APPEARANCE;
 use crate::families::ranges::{self, RESOLVED};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_range_appearance",
+pub const RULE: Rule<Scene> = Rule {
     uids: &UIDS,
-    after: super::READABLE,
-    page: include_str!("range_appearance.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const UIDS: [&str; 1 + APPEARANCE.len()] = ranges::uids(&[RESOLVED], APPEARANCE);

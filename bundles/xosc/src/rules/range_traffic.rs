@@ -2,13 +2,10 @@ use crate::families::ranges::tables::TRAFFIC;
 use crate::families::ranges::{self, RESOLVED};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_range_traffic",
+pub const RULE: Rule<Scene> = Rule {
     uids: &UIDS,
-    after: super::READABLE,
-    page: include_str!("range_traffic.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const UIDS: [&str; 1 + TRAFFIC.len()] = ranges::uids(&[RESOLVED], TRAFFIC);

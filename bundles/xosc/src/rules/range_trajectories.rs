@@ -2,13 +2,10 @@ use crate::families::ranges::tables::TRAJECTORIES;
 use crate::families::ranges::{self, RESOLVED};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_range_trajectories",
+pub const RULE: Rule<Scene> = Rule {
     uids: &UIDS,
-    after: super::READABLE,
-    page: include_str!("range_trajectories.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const UIDS: [&str; 1 + TRAJECTORIES.len()] = ranges::uids(&[RESOLVED], TRAJECTORIES);

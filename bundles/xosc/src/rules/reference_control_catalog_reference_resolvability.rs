@@ -2,14 +2,10 @@ use crate::families::catalogs::{self, Fault, Once};
 use crate::families::references::{hint_or_all, quoted};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_reference_control_catalog_reference_resolvability",
-    uids: &["asam.net:xosc:1.0.0:reference_control.catalog_reference_resolvability"],
+pub const RULE: Rule<Scene> = Rule {
     backport: Backport::None,
-    after: super::READABLE,
-    page: include_str!("reference_control_catalog_reference_resolvability.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,13 +1,9 @@
 use crate::families::catalogs::{self, Fault};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_reference_control_catalogs_referenced_by_directory",
-    uids: &["asam.net:xosc:1.0.0:reference_control.catalogs_referenced_by_directory"],
-    after: super::READABLE,
-    page: include_str!("reference_control_catalogs_referenced_by_directory.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

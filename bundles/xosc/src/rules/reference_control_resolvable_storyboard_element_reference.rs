@@ -4,8 +4,7 @@ use foldhash::{HashMap, HashMapExt as _};
 use qcbus_openscenario::StoryElement;
 use qcbus_openscenario::StoryKind;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_reference_control_resolvable_storyboard_element_reference",
+pub const RULE: Rule<Scene> = Rule {
     uids: &[
         "asam.net:xosc:1.2.0:reference_control.resolvable_storyboard_element_reference",
         "asam.net:xosc:1.0.0:reference_control.resolvable_storyboard_element_ref",
@@ -13,10 +12,8 @@ pub static RULE: Rule<Scene> = Rule {
     ],
     versions: "1.2.0..",
     backport: Backport::Alike { since: "" },
-    after: super::READABLE,
-    page: include_str!("reference_control_resolvable_storyboard_element_reference.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,19 +1,11 @@
 use crate::families::signals::Controllers;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_reference_control_resolvable_traffic_signal_controller_by_traffic_signal_controller_ref",
-    uids: &[
-        "asam.net:xosc:1.2.0:reference_control.resolvable_traffic_signal_controller_by_traffic_signal_controller_ref",
-    ],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.2.0..",
     backport: Backport::Alike { since: "" },
-    after: super::READABLE,
-    page: include_str!(
-        "reference_control_resolvable_traffic_signal_controller_by_traffic_signal_controller_ref.md"
-    ),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

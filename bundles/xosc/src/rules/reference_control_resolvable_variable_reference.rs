@@ -1,14 +1,10 @@
 use crate::families::declared;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_reference_control_resolvable_variable_reference",
-    uids: &["asam.net:xosc:1.2.0:reference_control.resolvable_variable_reference"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.2.0..",
-    after: super::READABLE,
-    page: include_str!("reference_control_resolvable_variable_reference.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -10,13 +10,9 @@ use foldhash::HashSet;
 use qcbus_opendrive::SectionRef;
 use qcbus_openscenario::RoadNetwork;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_reference_control_road_lane_exists",
-    uids: &["asam.net:xosc:1.0.0:reference_control.road_lane_exists"],
-    after: super::READABLE,
-    page: include_str!("reference_control_road_lane_exists.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Maximum number of roads in a message.

@@ -1,14 +1,10 @@
 use crate::families::references::quoted;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_reference_control_road_network_availability",
-    uids: &["asam.net:xosc:1.0.0:reference_control.road_network_availability"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("reference_control_road_network_availability.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

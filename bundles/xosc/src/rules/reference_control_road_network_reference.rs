@@ -1,14 +1,10 @@
 use crate::families::road_network::{ON_ROADS, ON_SIGNALS, used};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_reference_control_road_network_reference",
-    uids: &["asam.net:xosc:1.0.0:reference_control.road_network_reference"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("reference_control_road_network_reference.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

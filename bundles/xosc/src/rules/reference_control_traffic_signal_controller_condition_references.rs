@@ -1,13 +1,9 @@
 use crate::families::signals;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_reference_control_traffic_signal_controller_condition_references",
-    uids: &["asam.net:xosc:1.0.0:reference_control.traffic_signal_controller_condition_references"],
-    after: super::READABLE,
-    page: include_str!("reference_control_traffic_signal_controller_condition_references.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,8 +1,7 @@
 use crate::families::names;
 use crate::prelude::*;
 
-pub static RULE: Rule<Document> = Rule {
-    id: "check_asam_xosc_reference_control_unique_element_names_on_same_level",
+pub const RULE: Rule<Document> = Rule {
     uids: &[
         "asam.net:xosc:1.2.0:reference_control.unique_element_names_on_same_level",
         "asam.net:xosc:1.0.0:naming.unique_element_names_on_same_level",
@@ -11,10 +10,8 @@ pub static RULE: Rule<Document> = Rule {
         "qcbus.dev:xosc:1.0.0:monitors.duplicate",
     ],
     versions: "1.2.0..",
-    after: super::READABLE,
-    page: include_str!("reference_control_unique_element_names_on_same_level.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(document: &Document<'_>, found: &mut Sink<'_>) {

@@ -1,15 +1,11 @@
 use crate::families::triggers::called;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_reference_control_valid_actor_reference_in_private_actions",
-    uids: &["asam.net:xosc:1.2.0:reference_control.valid_actor_reference_in_private_actions"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.2.0..",
     backport: Backport::Alike { since: "" },
-    after: super::READABLE,
-    page: include_str!("reference_control_valid_actor_reference_in_private_actions.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

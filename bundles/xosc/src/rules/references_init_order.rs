@@ -2,14 +2,10 @@ use crate::families::placement::{self, Start};
 use crate::prelude::*;
 use foldhash::{HashMap, HashSet};
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_references_init_order",
-    uids: &["qcbus.dev:xosc:1.0.0:references.init_order"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
-    after: super::READABLE,
-    page: include_str!("references_init_order.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

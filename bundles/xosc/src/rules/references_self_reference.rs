@@ -3,14 +3,10 @@ use crate::families::placement;
 use crate::families::references::quoted;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_references_self_reference",
-    uids: &["qcbus.dev:xosc:1.0.0:references.self_reference"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("references_self_reference.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Actions that need an entity other than their actor. A lane or a single change of speed relative

@@ -2,14 +2,10 @@ use crate::families::references;
 use crate::prelude::*;
 use foldhash::HashSet;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_references_traffic_name",
-    uids: &["qcbus.dev:xosc:1.0.0:references.traffic_name"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("references_traffic_name.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

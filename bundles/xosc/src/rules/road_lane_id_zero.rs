@@ -2,14 +2,10 @@ use crate::families::positions::lane_id;
 use crate::families::references::quoted;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_road_lane_id_zero",
-    uids: &["qcbus.dev:xosc:1.0.0:road.lane_id_zero"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("road_lane_id_zero.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -4,14 +4,10 @@ use crate::prelude::*;
 use foldhash::HashSet;
 use qcbus_opendrive::LaneRef;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_road_lane_type_drivable",
-    uids: &["qcbus.dev:xosc:1.0.0:road.lane_type_drivable"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("road_lane_type_drivable.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Lane types on which no motor vehicle drives or stands.

@@ -4,15 +4,11 @@ use crate::prelude::*;
 use qcbus_openscenario::RoadNetwork;
 use qcbus_openscenario::RoadsNearby;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_road_world_position_on_road",
-    uids: &["qcbus.dev:xosc:1.0.0:road.world_position_on_road"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
-    after: super::READABLE,
     params: &[DISTANCE],
-    page: include_str!("road_world_position_on_road.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const DISTANCE: Param = Param::number(

@@ -1,13 +1,9 @@
 use crate::prelude::*;
 use qcbus_messages::DocumentRole;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_road_xodr_parses",
-    uids: &["qcbus.dev:xosc:1.0.0:road.xodr_parses"],
-    after: super::READABLE,
-    page: include_str!("road_xodr_parses.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

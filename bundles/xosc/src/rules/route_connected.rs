@@ -3,14 +3,10 @@ use crate::families::routes::{is_for_vehicles, routes, stop, waypoints};
 use crate::prelude::*;
 use qcbus_openscenario::Way;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_route_connected",
-    uids: &["qcbus.dev:xosc:1.0.0:route.connected"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("route_connected.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Maximum number of road stretches that are visited for all routes of a scenario.

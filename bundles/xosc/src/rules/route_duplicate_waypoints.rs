@@ -2,14 +2,10 @@ use crate::families::positions::Spot;
 use crate::families::routes::{routes, waypoints};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_route_duplicate_waypoints",
-    uids: &["qcbus.dev:xosc:1.0.0:route.duplicate_waypoints"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("route_duplicate_waypoints.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,13 +2,9 @@ use crate::families::routes::{routes, waypoints};
 use crate::prelude::*;
 use qcbus_openscenario::Version;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_route_min_waypoints",
-    uids: &["qcbus.dev:xosc:1.0.0:route.min_waypoints"],
-    after: super::READABLE,
-    page: include_str!("route_min_waypoints.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Last version with a schema that counts waypoints.

@@ -2,14 +2,10 @@ use crate::families::positions::listed;
 use crate::families::routes::{is_for_vehicles, routes, waypoints};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_routing_ambiguous_route_waypoints",
-    uids: &["asam.net:xosc:1.0.0:routing.ambiguous_route_waypoints"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("routing_ambiguous_route_waypoints.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

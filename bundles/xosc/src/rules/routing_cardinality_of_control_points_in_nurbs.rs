@@ -1,12 +1,8 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_routing_cardinality_of_control_points_in_nurbs",
-    uids: &["asam.net:xosc:1.0.0:routing.cardinality_of_control_points_in_nurbs"],
-    after: super::READABLE,
-    page: include_str!("routing_cardinality_of_control_points_in_nurbs.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,15 +2,11 @@ use crate::families::positions::{metres, shown};
 use crate::families::trajectories::{followed, longest, named};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_routing_offset_should_be_less_than_trajectory_length",
-    uids: &["asam.net:xosc:1.1.0:routing.offset_should_be_less_than_trajectory_length"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.1.0..",
-    after: super::READABLE,
-    page: include_str!("routing_offset_should_be_less_than_trajectory_length.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

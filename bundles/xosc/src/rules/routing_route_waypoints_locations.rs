@@ -2,14 +2,10 @@ use crate::families::positions::road_of;
 use crate::families::routes::{routes, waypoints};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_routing_route_waypoints_locations",
-    uids: &["asam.net:xosc:1.0.0:routing.route_waypoints_locations"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("routing_route_waypoints_locations.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

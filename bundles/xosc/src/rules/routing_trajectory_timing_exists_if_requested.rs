@@ -1,13 +1,9 @@
 use crate::families::trajectories::{Timing, followed, named, shape, timed_points, timing_of};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_routing_trajectory_timing_exists_if_requested",
-    uids: &["asam.net:xosc:1.0.0:routing.trajectory_timing_exists_if_requested"],
-    after: super::READABLE,
-    page: include_str!("routing_trajectory_timing_exists_if_requested.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

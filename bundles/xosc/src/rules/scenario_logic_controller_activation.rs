@@ -2,14 +2,10 @@ use crate::families::references::{hint, quoted};
 use crate::prelude::*;
 use foldhash::HashMap;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_scenario_logic_controller_activation",
-    uids: &["asam.net:xosc:1.2.0:scenario_logic.controller_activation"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.2.0..",
-    after: super::READABLE,
-    page: include_str!("scenario_logic_controller_activation.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// The domains: their name, and the attributes of `AssignControllerAction` and

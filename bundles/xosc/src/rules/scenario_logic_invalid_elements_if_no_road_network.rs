@@ -1,13 +1,9 @@
 use crate::families::road_network::{ON_ROADS, ON_SIGNALS, used};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_scenario_logic_invalid_elements_if_no_road_network",
-    uids: &["asam.net:xosc:1.0.0:scenario_logic.invalid_elements_if_no_road_network"],
-    after: super::READABLE,
-    page: include_str!("scenario_logic_invalid_elements_if_no_road_network.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,17 +1,13 @@
 use crate::families::actions::{short, slowest, stated};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_scenario_logic_targetspeed_maxspeed_general",
-    uids: &["asam.net:xosc:1.2.0:scenario_logic.targetspeed_maxspeed_general"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.2.0..",
     backport: Backport::Alike { since: "" },
     params: &[TOLERANCE],
-    after: super::READABLE,
-    page: include_str!("scenario_logic_targetspeed_maxspeed_general.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TOLERANCE: Param = Param::number(

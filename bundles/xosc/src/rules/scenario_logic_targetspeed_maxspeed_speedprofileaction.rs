@@ -1,16 +1,12 @@
 use crate::families::actions::{short, slowest, stated};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_asam_xosc_scenario_logic_targetspeed_maxspeed_speedprofileaction",
-    uids: &["asam.net:xosc:1.2.0:scenario_logic.targetspeed_maxspeed_speedprofileaction"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.2.0..",
     params: &[TOLERANCE],
-    after: super::READABLE,
-    page: include_str!("scenario_logic_targetspeed_maxspeed_speedprofileaction.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const TOLERANCE: Param = Param::number(

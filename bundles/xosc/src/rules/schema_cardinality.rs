@@ -1,15 +1,11 @@
 use crate::families::triggers::called;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_schema_cardinality",
-    uids: &["qcbus.dev:xosc:1.0.0:schema.cardinality"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("schema_cardinality.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Elements that may be empty by the schema: children of which they need at least one to have an

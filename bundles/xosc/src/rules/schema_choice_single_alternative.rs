@@ -1,12 +1,8 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_schema_choice_single_alternative",
-    uids: &["qcbus.dev:xosc:1.0.0:schema.choice_single_alternative"],
-    after: super::READABLE,
-    page: include_str!("schema_choice_single_alternative.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Types of elements that must have one of several children, and a list of these. The schemas up to

@@ -5,14 +5,10 @@ use crate::families::references::quoted;
 use crate::prelude::*;
 use foldhash::HashMap;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_signal_condition_never",
-    uids: &["qcbus.dev:xosc:1.0.0:signal.condition_never"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("signal_condition_never.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,13 +1,9 @@
 use crate::families::signals::Controllers;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_signal_delay_without_reference",
-    uids: &["qcbus.dev:xosc:1.0.0:signal.delay_without_reference"],
-    after: super::READABLE,
-    page: include_str!("signal_delay_without_reference.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

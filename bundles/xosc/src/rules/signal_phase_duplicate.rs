@@ -2,14 +2,10 @@ use crate::families::references::quoted;
 use crate::prelude::*;
 use foldhash::HashMap;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_signal_phase_duplicate",
-    uids: &["qcbus.dev:xosc:1.0.0:signal.phase_duplicate"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("signal_phase_duplicate.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::prelude::*;
 use foldhash::{HashMap, HashMapExt as _};
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_signal_state_unknown",
-    uids: &["qcbus.dev:xosc:1.0.0:signal.state_unknown"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
-    after: super::READABLE,
-    page: include_str!("signal_state_unknown.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const WITH_STATE: &[&str] = &[

@@ -1,14 +1,10 @@
 use crate::families::signals::Controllers;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_signal_zero_cycle",
-    uids: &["qcbus.dev:xosc:1.0.0:signal.zero_cycle"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("signal_zero_cycle.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

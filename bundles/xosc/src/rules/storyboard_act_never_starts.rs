@@ -1,15 +1,11 @@
 use crate::families::triggers;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_storyboard_act_never_starts",
-    uids: &["qcbus.dev:xosc:1.0.0:storyboard.act_never_starts"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("storyboard_act_never_starts.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Checks whether the act has any content. Scenarios that only place entities have an empty act

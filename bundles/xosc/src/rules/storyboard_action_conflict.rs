@@ -3,15 +3,11 @@ use crate::families::triggers::{Kinds, called, events};
 use crate::prelude::*;
 use foldhash::{HashMap, HashMapExt as _};
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_storyboard_action_conflict",
-    uids: &["qcbus.dev:xosc:1.0.0:storyboard.action_conflict"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("storyboard_action_conflict.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// An action and its event.

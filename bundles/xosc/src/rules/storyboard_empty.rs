@@ -1,15 +1,11 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_storyboard_empty",
-    uids: &["qcbus.dev:xosc:1.0.0:storyboard.empty"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     // Before 1.2 the schema requires a story.
     versions: "1.2.0..",
-    after: super::READABLE,
-    page: include_str!("storyboard_empty.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,14 +2,10 @@ use crate::families::actions::stated;
 use crate::families::triggers::{groups, holds_at_once, time};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_storyboard_ends_at_once",
-    uids: &["qcbus.dev:xosc:1.0.0:storyboard.ends_at_once"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("storyboard_ends_at_once.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,15 +1,11 @@
 use crate::families::triggers;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_storyboard_event_never_starts",
-    uids: &["qcbus.dev:xosc:1.0.0:storyboard.event_never_starts"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("storyboard_event_never_starts.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

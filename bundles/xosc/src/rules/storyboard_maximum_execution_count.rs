@@ -2,13 +2,10 @@ use crate::families::ranges;
 use crate::families::ranges::tables::EXECUTIONS;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_storyboard_maximum_execution_count",
+pub const RULE: Rule<Scene> = Rule {
     uids: &UIDS,
-    after: super::READABLE,
-    page: include_str!("storyboard_maximum_execution_count.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const OWN: [&str; 1] = ["qcbus.dev:xosc:1.0.0:storyboard.maximum_execution_count"];

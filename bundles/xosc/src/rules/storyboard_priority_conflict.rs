@@ -2,15 +2,11 @@ use crate::families::triggers::{Kinds, called};
 use crate::prelude::*;
 use foldhash::{HashMap, HashMapExt as _};
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_storyboard_priority_conflict",
-    uids: &["qcbus.dev:xosc:1.0.0:storyboard.priority_conflict"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("storyboard_priority_conflict.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

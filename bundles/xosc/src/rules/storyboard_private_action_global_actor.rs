@@ -1,15 +1,11 @@
 use crate::families::triggers::called;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_storyboard_private_action_global_actor",
-    uids: &["qcbus.dev:xosc:1.0.0:storyboard.private_action_global_actor"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("storyboard_private_action_global_actor.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,15 +2,11 @@ use crate::families::states::{StateCondition, own_triggers};
 use crate::families::triggers::called;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_storyboard_reference_to_self_or_parent_end",
-    uids: &["qcbus.dev:xosc:1.0.0:storyboard.reference_to_self_or_parent_end"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("storyboard_reference_to_self_or_parent_end.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run<'d>(scenario: &Scenario<'d>, found: &mut Sink<'_>) {

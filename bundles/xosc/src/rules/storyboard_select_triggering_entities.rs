@@ -1,15 +1,11 @@
 use crate::families::triggers::called;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_storyboard_select_triggering_entities",
-    uids: &["qcbus.dev:xosc:1.0.0:storyboard.select_triggering_entities"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("storyboard_select_triggering_entities.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

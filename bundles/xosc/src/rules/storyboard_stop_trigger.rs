@@ -1,14 +1,10 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_storyboard_stop_trigger",
-    uids: &["qcbus.dev:xosc:1.0.0:storyboard.stop_trigger"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("storyboard_stop_trigger.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,15 +2,11 @@ use crate::families::states::Waiting;
 use crate::families::triggers::called;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_storyboard_unreachable_by_reference",
-    uids: &["qcbus.dev:xosc:1.0.0:storyboard.unreachable_by_reference"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("storyboard_unreachable_by_reference.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,13 +2,9 @@ use crate::families::positions::shown;
 use crate::families::trajectories::{Timing, timing_of};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_trajectory_clothoid_time_order",
-    uids: &["qcbus.dev:xosc:1.0.0:trajectory.clothoid_time_order"],
-    after: super::READABLE,
-    page: include_str!("trajectory_clothoid_time_order.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

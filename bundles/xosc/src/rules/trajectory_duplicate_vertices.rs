@@ -2,14 +2,10 @@ use crate::families::positions::Spot;
 use crate::families::trajectories::{TimedPoint, Timing, named, shape, timed_points, timing_of};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_trajectory_duplicate_vertices",
-    uids: &["qcbus.dev:xosc:1.0.0:trajectory.duplicate_vertices"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("trajectory_duplicate_vertices.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,13 +1,9 @@
 use crate::families::positions::shown;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_trajectory_knots_non_decreasing",
-    uids: &["qcbus.dev:xosc:1.0.0:trajectory.knots_non_decreasing"],
-    after: super::READABLE,
-    page: include_str!("trajectory_knots_non_decreasing.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,15 +2,11 @@ use crate::families::positions::moved;
 use crate::families::trajectories::{Timing, followed, shape, timed_points, timing_of};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_trajectory_speed_plausible",
-    uids: &["qcbus.dev:xosc:1.0.0:trajectory.speed_plausible"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
     params: &[SPEED, ACCELERATION, SPAN],
-    page: include_str!("trajectory_speed_plausible.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const SPEED: Param = Param::number(

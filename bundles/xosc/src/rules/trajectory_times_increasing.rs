@@ -2,13 +2,9 @@ use crate::families::positions::shown;
 use crate::families::trajectories::{TimedPoint, Timing, named, shape, timed_points, timing_of};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_trajectory_times_increasing",
-    uids: &["qcbus.dev:xosc:1.0.0:trajectory.times_increasing"],
-    after: super::READABLE,
-    page: include_str!("trajectory_times_increasing.md"),
+pub const RULE: Rule<Scene> = Rule {
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

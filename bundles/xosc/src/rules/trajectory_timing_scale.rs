@@ -2,13 +2,10 @@ use crate::families::ranges;
 use crate::families::ranges::tables::TIMING;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_trajectory_timing_scale",
+pub const RULE: Rule<Scene> = Rule {
     uids: &UIDS,
-    after: super::READABLE,
-    page: include_str!("trajectory_timing_scale.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 const OWN: [&str; 1] = ["qcbus.dev:xosc:1.0.0:trajectory.timing_scale"];

@@ -2,15 +2,11 @@ use crate::families::demands::{self, Demand};
 use crate::prelude::*;
 use foldhash::{HashMap, HashMapExt as _};
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_trigger_contradiction",
-    uids: &["qcbus.dev:xosc:1.0.0:trigger.contradiction"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("trigger_contradiction.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

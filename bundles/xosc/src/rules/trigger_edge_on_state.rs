@@ -2,15 +2,11 @@ use crate::families::actions::stated;
 use crate::families::triggers;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_trigger_edge_on_state",
-    uids: &["qcbus.dev:xosc:1.0.0:trigger.edge_on_state"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("trigger_edge_on_state.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

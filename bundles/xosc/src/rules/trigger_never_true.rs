@@ -1,14 +1,10 @@
 use crate::families::actions::stated;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_trigger_never_true",
-    uids: &["qcbus.dev:xosc:1.0.0:trigger.never_true"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
-    after: super::READABLE,
-    page: include_str!("trigger_never_true.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Conditions about quantities that are never below zero, and their names.

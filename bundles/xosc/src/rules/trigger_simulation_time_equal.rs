@@ -1,15 +1,11 @@
 use crate::families::actions::stated;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_trigger_simulation_time_equal",
-    uids: &["qcbus.dev:xosc:1.0.0:trigger.simulation_time_equal"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("trigger_simulation_time_equal.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

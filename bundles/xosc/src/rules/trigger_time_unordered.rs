@@ -2,15 +2,11 @@ use crate::families::actions::short;
 use crate::families::triggers::{self, called, earliest, groups, holds_at_once, time};
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_trigger_time_unordered",
-    uids: &["qcbus.dev:xosc:1.0.0:trigger.time_unordered"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("trigger_time_unordered.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// A time that a condition names.

@@ -2,15 +2,11 @@ use crate::families::actions::acting;
 use crate::prelude::*;
 use foldhash::{HashSet, HashSetExt as _};
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_trigger_traveled_distance_stopped",
-    uids: &["qcbus.dev:xosc:1.0.0:trigger.traveled_distance_stopped"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.0.0..",
-    after: super::READABLE,
-    page: include_str!("trigger_traveled_distance_stopped.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run<'d>(scenario: &Scenario<'d>, found: &mut Sink<'_>) {

@@ -1,14 +1,10 @@
 use crate::families::values;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_variables_dollar_reference",
-    uids: &["qcbus.dev:xosc:1.0.0:variables.dollar_reference"],
+pub const RULE: Rule<Scene> = Rule {
     versions: "1.2.0..",
-    after: super::READABLE,
-    page: include_str!("variables_dollar_reference.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -2,15 +2,11 @@ use crate::families::declared;
 use crate::prelude::*;
 use qcbus_openscenario::is_identifier;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_variables_name_syntax",
-    uids: &["qcbus.dev:xosc:1.0.0:variables.name_syntax"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
     versions: "1.2.0..",
-    after: super::READABLE,
-    page: include_str!("variables_name_syntax.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

@@ -1,15 +1,11 @@
 use crate::families::declared;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_variables_never_written_condition",
-    uids: &["qcbus.dev:xosc:1.0.0:variables.never_written_condition"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.2.0..",
-    after: super::READABLE,
-    page: include_str!("variables_never_written_condition.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {

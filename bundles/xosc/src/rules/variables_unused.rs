@@ -1,15 +1,11 @@
 use crate::families::declared;
 use crate::prelude::*;
 
-pub static RULE: Rule<Scene> = Rule {
-    id: "check_qcbus_xosc_variables_unused",
-    uids: &["qcbus.dev:xosc:1.0.0:variables.unused"],
+pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,
     versions: "1.2.0..",
-    after: super::READABLE,
-    page: include_str!("variables_unused.md"),
     run,
-    ..Rule::DEFAULTS
+    ..Rule::after(READABLE)
 };
 
 /// Elements that use a variable.

@@ -1,10 +1,7 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Document> = Rule {
-    id: "check_asam_xosc_xml_fileheader_is_present",
-    uids: &["asam.net:xosc:1.0.0:xml.fileheader_is_present"],
+pub const RULE: Rule<Document> = Rule {
     after: &["check_asam_xosc_xml_root_tag_is_openscenario"],
-    page: include_str!("xml_fileheader_is_present.md"),
     run,
     ..Rule::DEFAULTS
 };

@@ -1,9 +1,6 @@
 use crate::prelude::*;
 
-pub static RULE: Rule<Document> = Rule {
-    id: "check_asam_xosc_xml_valid_xml_document",
-    uids: &["asam.net:xosc:1.0.0:xml.valid_xml_document"],
-    page: include_str!("xml_valid_xml_document.md"),
+pub const RULE: Rule<Document> = Rule {
     run,
     ..Rule::DEFAULTS
 };

@@ -15,7 +15,10 @@ use crate::Args;
 /// Name of the bundle.
 pub const NAME: &str = "polite";
 
-static RULES: &[&dyn AnyRule] = &[&root_has_children::RULE, &no_blank_values::RULE];
+static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
+    polite root_has_children "example.org:xodr:1.0.0:polite.root_has_children",
+    polite no_blank_values "example.org:xodr:1.0.0:polite.no_blank_values",
+};
 
 /// The bundle.
 pub static BUNDLE: Bundle = Bundle {

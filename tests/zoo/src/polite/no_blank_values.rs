@@ -2,11 +2,8 @@ use qcbus_document::Document;
 use qcbus_formats::xqar::Level;
 use qcbus_sdk::{Rule, Sink};
 
-pub static RULE: Rule<Document> = Rule {
-    id: "check_polite_no_blank_values",
-    uids: &["example.org:xodr:1.0.0:polite.no_blank_values"],
+pub const RULE: Rule<Document> = Rule {
     level: Level::Warning,
-    page: include_str!("no_blank_values.md"),
     run,
     ..Rule::DEFAULTS
 };

@@ -2,11 +2,8 @@ use qcbus_document::Document;
 use qcbus_formats::xqar::Level;
 use qcbus_sdk::{Rule, Sink};
 
-pub static RULE: Rule<Document> = Rule {
-    id: "check_polite_root_has_children",
-    uids: &["example.org:xodr:1.0.0:polite.root_has_children"],
+pub const RULE: Rule<Document> = Rule {
     level: Level::Warning,
-    page: include_str!("root_has_children.md"),
     run,
     ..Rule::DEFAULTS
 };
