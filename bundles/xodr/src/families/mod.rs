@@ -10,6 +10,7 @@ pub(crate) mod corner_references;
 pub(crate) mod crg;
 pub(crate) mod cross_paths;
 pub(crate) mod curve_length;
+pub(crate) mod dates;
 pub(crate) mod direct_overlap;
 pub(crate) mod driving;
 pub(crate) mod edges;

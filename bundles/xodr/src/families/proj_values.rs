@@ -29,19 +29,3 @@ pub(crate) fn degrees(text: &str) -> Option<f64> {
     }
     Some(sign * sum)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::degrees;
-
-    #[test]
-    fn degrees_are_parsed_in_proj_notation() {
-        assert_eq!(degrees("11.5"), Some(11.5));
-        assert_eq!(degrees("-12d30'"), Some(-12.5));
-        assert_eq!(degrees("12d30'36\"W"), Some(-12.51));
-        assert_eq!(degrees("9E"), Some(9.0));
-        for wrong in ["48,1", "north", "", "d", "12x"] {
-            assert_eq!(degrees(wrong), None, "{wrong}");
-        }
-    }
-}

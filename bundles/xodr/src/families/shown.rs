@@ -56,29 +56,3 @@ fn with_exponent(value: f64) -> String {
         _ => text,
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::{beside, number};
-
-    #[test]
-    fn numbers_are_shown_with_significant_digits_only() {
-        assert_eq!(number(3.5), "3.5");
-        assert_eq!(number(0.004_999_999_999_995_452_5), "0.005");
-        assert_eq!(number(-0.0), "0");
-        assert_eq!(number(4.9e-8), "4.9e-8");
-        assert_eq!(number(5e-324), "4.94e-324");
-        assert_eq!(number(-1e300), "-1e300");
-        assert_eq!(number(f64::NAN), "NaN");
-    }
-
-    #[test]
-    fn number_is_shown_distinct_from_its_limit() {
-        assert_eq!(beside(-0.010_921, 0.0), "-0.011");
-        assert_eq!(beside(-0.000_1, 0.0), "-0.0001");
-        assert_eq!(beside(-3e-7, 0.0), "-3e-7");
-        assert_eq!(beside(3.000_04, 3.0), "3.00004");
-        assert_eq!(beside(3.000_000_000_1, 3.0), "3.0000000001");
-        assert_eq!(beside(12.5, 3.0), "12.5");
-    }
-}
