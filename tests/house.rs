@@ -51,7 +51,10 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-broker", Some(BROKER)),
     ("qcbus-sdk", Some(PROCESS)),
     // This crate has the tests of all bundles: edits, damage and comparison of findings.
-    ("qcbus-rule-tests", Some(&["qcbus-sdk", "qcbus-ingest"])),
+    (
+        "qcbus-rule-tests",
+        Some(&["qcbus-sdk", "qcbus-ingest", "qcbus-fuzzing"]),
+    ),
     ("qcbus-opendrive", Some(&[])),
     // A scenario refers to a map, and its values have the types of its schema.
     (
@@ -72,6 +75,8 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-reporter-sdk", Some(PROCESS)),
     // This crate draws a road network for a report.
     ("qcbus-plan", Some(&["qcbus-opendrive"])),
+    // This crate makes random and damaged images for tests.
+    ("qcbus-fuzzing", Some(&["qcbus-document"])),
     ("qcbus", None),
     ("qcbus-zoo", None),
     ("qcbus-benches", None),
@@ -207,9 +212,9 @@ fn crates_link_only_allowed_crates() {
                 wrong.push(format!("{} links {other}", package.name));
             }
         }
-        // Tests may read files as input and edit them, but must not use any other crate in addition.
+        // Tests may read files, edit and damage them, but must not use any other crate in addition.
         for other in linked(package, &[DependencyKind::Development]).intersection(&ours) {
-            let tests = ["qcbus-ingest", "qcbus-rule-tests"].contains(other);
+            let tests = ["qcbus-ingest", "qcbus-rule-tests", "qcbus-fuzzing"].contains(other);
             if !IDL.contains(other) && !tests && !allowed.contains(other) {
                 wrong.push(format!("the tests of {} link {other}", package.name));
             }

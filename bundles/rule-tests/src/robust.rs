@@ -15,7 +15,7 @@
 
 use std::path::{Path, PathBuf};
 
-use qcbus_document::fuzzing::Random;
+use qcbus_fuzzing::Random;
 
 use qcbus_sdk::{Bundle, Issue, Listener, Loaded, Outcome, Plan, Status, check};
 
