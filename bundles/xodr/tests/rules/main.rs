@@ -13,4 +13,5 @@ mod mutation;
 mod pages;
 mod robust;
 mod seeded;
+mod templates;
 mod tricky;
