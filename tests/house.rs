@@ -51,7 +51,10 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
     ("qcbus-broker", Some(BROKER)),
     ("qcbus-sdk", Some(PROCESS)),
     // This crate has the tests of all bundles: edits, damage and comparison of findings.
-    ("qcbus-rule-tests", Some(&["qcbus-sdk", "qcbus-ingest"])),
+    (
+        "qcbus-rule-tests",
+        Some(&["qcbus-sdk", "qcbus-ingest", "qcbus-fuzzing"]),
+    ),
     ("qcbus-opendrive", Some(&[])),
     // A scenario refers to a map, and its values have the types of its schema.
     (
@@ -70,8 +73,12 @@ const MAY_KNOW: &[(&str, Option<&[&str]>)] = &[
         Some(&["qcbus-sdk", "qcbus-disk", "qcbus-confine"]),
     ),
     ("qcbus-reporter-sdk", Some(PROCESS)),
+    // This crate has sample results for the tests of reporters.
+    ("qcbus-reporter-samples", Some(&["qcbus-reporter-sdk"])),
     // This crate draws a road network for a report.
     ("qcbus-plan", Some(&["qcbus-opendrive"])),
+    // This crate makes random and damaged images for tests.
+    ("qcbus-fuzzing", Some(&["qcbus-document"])),
     ("qcbus", None),
     ("qcbus-zoo", None),
     ("qcbus-benches", None),
@@ -120,6 +127,14 @@ const BUNDLE: &[&str] = &[
     "qcbus-openscenario",
     "qcbus-schema",
     "qcbus-schema-rule",
+];
+
+/// Crates that every test may link: they read, edit and damage files, and have sample results.
+const FOR_TESTS: &[&str] = &[
+    "qcbus-ingest",
+    "qcbus-rule-tests",
+    "qcbus-fuzzing",
+    "qcbus-reporter-samples",
 ];
 
 /// Prefix of the crate name of a reporter. A further reporter needs no row in [`MAY_KNOW`].
@@ -207,10 +222,8 @@ fn crates_link_only_allowed_crates() {
                 wrong.push(format!("{} links {other}", package.name));
             }
         }
-        // Tests may read files as input and edit them, but must not use any other crate in addition.
         for other in linked(package, &[DependencyKind::Development]).intersection(&ours) {
-            let tests = ["qcbus-ingest", "qcbus-rule-tests"].contains(other);
-            if !IDL.contains(other) && !tests && !allowed.contains(other) {
+            if !IDL.contains(other) && !FOR_TESTS.contains(other) && !allowed.contains(other) {
                 wrong.push(format!("the tests of {} link {other}", package.name));
             }
         }

@@ -162,7 +162,7 @@ def generated(size, name):
 
 def ours(maps, runs):
     """Returns the best and median CPU milliseconds per map."""
-    command = ["cargo", "run", "--quiet", "--release", "-p", "qcbus-xodr", "--example", "rule_times"]
+    command = ["cargo", "bench", "--quiet", "-p", "qcbus-xodr", "--bench", "rule_times"]
     command += ["--", "--runs", str(runs), *map(str, maps)]
     lines = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
     words = [line.split() for line in lines.splitlines()]

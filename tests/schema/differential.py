@@ -3,7 +3,7 @@
 xmlschema (OpenDRIVE 1.8) on real files and on seeded mutants.
 
     pip install lxml xmlschema
-    differential.py --tool TARGET/release/examples/schema_tool --xsd DIR [--files DIR]... [--mutants N]
+    differential.py --tool TARGET/release/deps/schema_tool-HASH --xsd DIR [--files DIR]... [--mutants N]
                     [--seed N]... [--record FILE]
 
 DIR has one folder of XSDs per table, named like the table: `xodr-1.7/`, `xosc-1.3/` (the script

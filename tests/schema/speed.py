@@ -6,7 +6,7 @@ As in the bundle, xmlschema gets a tree parsed by lxml and lists all findings. C
 parsing the file do not count, for both. The bundle needs `xmlschema<4`.
 
     pip install 'lxml<6' 'xmlschema>=3.3.1,<4'
-    speed.py --tool TARGET/release/examples/schema_tool --xsd FOLDER_OF_1.8_XSDS [--megabytes 1.3]
+    speed.py --tool TARGET/release/deps/schema_tool-HASH --xsd FOLDER_OF_1.8_XSDS [--megabytes 1.3]
 """
 
 import argparse

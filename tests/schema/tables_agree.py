@@ -6,7 +6,7 @@ with `bundles/schema/tables`, byte by byte. OpenDRIVE 1.8.1 is in no wheel. Give
 seven XSDs (ASAM's free download, or the repository asam-ev/qc-opendrive) with --opendrive-1-8-1.
 Without it, this table is reported as not compared.
 
-    tables_agree.py --tool TARGET/release/examples/schema_tool [--opendrive-1-8-1 DIR] [--keep DIR] [--write]
+    tables_agree.py --tool TARGET/release/deps/schema_tool-HASH [--opendrive-1-8-1 DIR] [--keep DIR] [--write]
 """
 
 import argparse

@@ -88,7 +88,6 @@ pub(crate) fn bundle(hosted: Hosted, learned: Learned, runners: Runners) -> &'st
         reads: Reads::Written,
         version_of,
         rules: Vec::leak(rules),
-        templates: &[],
     })
 }
 

@@ -7,7 +7,6 @@
 //! Each rule is one file in `rules/` with its page beside it; `rules/mod.rs` is the list.
 
 mod assembly;
-mod examples;
 mod families;
 mod prelude;
 mod rules;
@@ -33,5 +32,4 @@ pub static BUNDLE: Bundle = Bundle {
     ],
     version_of: |document| basic::version_of(document, "FileHeader"),
     rules: rules::RULES,
-    templates: examples::TEMPLATES,
 };

@@ -24,26 +24,23 @@ pub use types::contacts::{LaneEnd, LaneJoint, LaneKey, RoadContact, RoadEnd, Tou
 pub use types::crg::Crg;
 pub use types::frame::{BorderPoint, Frame};
 pub use types::junction::{
-    Connection, CrossPath, CrossPathLaneLink, Junction, JunctionController, JunctionGroup,
-    JunctionLaneLink, JunctionReference, JunctionType, Priority, RoadSection,
+    Connection, CrossPath, CrossPathLaneLink, Junction, JunctionController, JunctionLaneLink,
+    JunctionType, Priority, RoadSection,
 };
 pub use types::junction_area::{Boundary, BoundarySegment, ElevationGrid, GridRow, SegmentStation};
 pub use types::lane::{Lane, LaneGroup, LaneHeight, LaneLink, LaneRecord};
 pub use types::lane_section::{LaneLayer, LaneSection};
 pub use types::lateral::{LateralProfile, Shape, ShapeRow};
-pub use types::objects::{
-    CornerReference, Marking, Object, ObjectBorder, ObjectMaterial, ObjectReference, Repeat,
-    Structure, Validity,
-};
+pub use types::objects::{Object, ObjectReference, Repeat, Validity};
 pub use types::outlines::{Corner, CornerKind, CurveLocal, ObjectPoint, Outline, Polyline};
 pub use types::plan_view::{Geometry, Located, PlanView, ShapeKind};
 pub use types::profile::{Profile, Record, Stretch, Valid};
 pub use types::railroad::{Platform, PlatformSegment, RailroadStation, Switch, Track};
 pub use types::road::{Road, RoadLink, RoadType, TrafficRule};
 pub use types::signals::{
-    Control, Controller, DisplayArea, ElementReference, Signal, SignalBoard, SignalDependency,
-    SignalReference, VmsBoardReference, VmsGroup,
+    Control, Controller, ElementReference, Signal, SignalBoard, SignalDependency,
+    VmsBoardReference, VmsGroup,
 };
 pub use types::station::Station;
 pub use types::strips::{CrossSectionSurface, Strip, StripMode};
-pub use types::value::{ContactPoint, Direction, LayerKind, Side, is_user_data};
+pub use types::value::{ContactPoint, LayerKind, Side, is_user_data};

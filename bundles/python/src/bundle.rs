@@ -233,7 +233,6 @@ impl Native {
                 reads: self.says.reads,
                 version_of,
                 rules: Box::leak(rules.into_boxed_slice()),
-                templates: &[],
             }))
         })
     }

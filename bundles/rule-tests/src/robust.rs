@@ -15,17 +15,19 @@
 
 use std::path::{Path, PathBuf};
 
-use qcbus_document::fuzzing::Random;
+use qcbus_fuzzing::Random;
 
 use qcbus_sdk::{Bundle, Issue, Listener, Loaded, Outcome, Plan, Status, check};
 
-use crate::pages::evidence;
+use crate::pages::{Template, evidence};
 
 /// A bundle under test.
 #[derive(Clone, Copy)]
 pub struct Robust {
     /// The bundle.
     pub bundle: &'static Bundle,
+    /// Templates for the examples of its pages.
+    pub templates: &'static [Template],
     /// Extension of the files that it checks, without the dot.
     pub extension: &'static str,
     /// Values that replace others: [`NUMBERS`] and further values that are likely to cause faults.
@@ -52,7 +54,7 @@ impl Robust {
     pub fn assert_truncated_examples(&self) {
         let plan = Plan::by_default(self.bundle);
         let places = places();
-        for shown in evidence::documents(self.bundle) {
+        for shown in evidence::documents(self.bundle, self.templates) {
             self.assert_truncations(&plan, shown.text.as_bytes(), places, shown.rule);
         }
     }
@@ -63,7 +65,7 @@ impl Robust {
     /// If a checker does not complete. The message names the first such checker and the file.
     pub fn assert_mutated_examples(&self) {
         let plan = Plan::by_default(self.bundle);
-        let documents = evidence::documents(self.bundle);
+        let documents = evidence::documents(self.bundle, self.templates);
         let mut dice = dice();
         for round in 0..setting("QCBUS_FUZZ_ROUNDS", 1_000) {
             let shown = &documents[round % documents.len()];

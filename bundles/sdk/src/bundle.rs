@@ -8,7 +8,7 @@ use qcbus_document::{Document, FileKind};
 use qcbus_formats::xqar::Level;
 use qcbus_messages::{BUILD_DATE, Catalogue, CheckerInfo, ParamInfo};
 
-use crate::pages::{Head, Template};
+use crate::pages::Head;
 use crate::rule::Facts;
 use crate::{AnyRule, Backport, Version, VersionRange};
 
@@ -34,8 +34,6 @@ pub struct Bundle {
     pub version_of: fn(&Document<'_>) -> Option<Version>,
     /// The rules in the order of the result. A rule comes after its preconditions.
     pub rules: &'static [&'static dyn AnyRule],
-    /// Templates for the short examples of the pages.
-    pub templates: &'static [Template],
 }
 
 /// Checkers by address and length of their list of rules.

@@ -3,18 +3,6 @@
 //! A page is Markdown. Its first heading is the title, its first paragraph the summary. The crate
 //! `qcbus-rule-tests` reads the examples and runs them.
 
-/// A minimal document with a placeholder, so that an example shows only its subject.
-///
-/// `{major}` and `{minor}` stand for the version. `{example}`, alone on its line, stands for the
-/// example.
-#[derive(Debug, Clone, Copy)]
-pub struct Template {
-    /// Name for `in=NAME`. An example without a name uses the bundle's first template.
-    pub name: &'static str,
-    /// The document.
-    pub text: &'static str,
-}
-
 /// Title and summary of a page, each on one line and empty if it is missing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Head {

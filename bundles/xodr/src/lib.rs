@@ -3,7 +3,6 @@
 //! Each rule has its own file in `rules/` with its page beside it. `rules/mod.rs` is the list.
 //! `docs/writing-a-rule.md` shows how to add a rule.
 
-mod examples;
 mod families;
 mod model;
 mod prelude;
@@ -34,5 +33,4 @@ pub static BUNDLE: Bundle = Bundle {
     reads: qcbus_sdk::Reads::Written,
     version_of: |document| basic::version_of(document, "header"),
     rules: rules::RULES,
-    templates: examples::TEMPLATES,
 };

@@ -4,7 +4,6 @@
 //! Algorithms that several rules share are in `families/`. `docs/writing-a-rule.md` shows how to
 //! add a rule.
 
-mod examples;
 mod families;
 mod model;
 mod prelude;
@@ -31,5 +30,4 @@ pub static BUNDLE: Bundle = Bundle {
     reads: qcbus_sdk::Reads::Expanded,
     version_of: |document| basic::version_of(document, "FileHeader"),
     rules: rules::RULES,
-    templates: examples::TEMPLATES,
 };

@@ -216,11 +216,6 @@ impl<'a> ValueError<'a> {
             }
         }
     }
-
-    /// Checks whether the attribute is missing rather than wrong.
-    pub fn is_missing(&self) -> bool {
-        matches!(self, ValueError::Missing { .. })
-    }
 }
 
 impl fmt::Display for ValueError<'_> {

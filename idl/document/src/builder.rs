@@ -294,11 +294,6 @@ impl<'out> ImageBuilder<'out> {
     pub fn depth(&self) -> usize {
         self.open.len()
     }
-
-    /// Checks whether a root element already exists.
-    pub fn has_root(&self) -> bool {
-        self.used[Section::Nodes as usize] > 0
-    }
 }
 
 /// Returns the part of a name after the first colon, or the whole name if it has no prefix.

@@ -14,8 +14,6 @@ mod attribute;
 mod builder;
 mod document;
 mod fault;
-#[doc(hidden)]
-pub mod fuzzing;
 mod image;
 mod kind;
 mod layout;

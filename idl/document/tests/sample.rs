@@ -4,7 +4,7 @@
 
 #![expect(clippy::unwrap_used, reason = "test helpers may panic")]
 
-use qcbus_document::fuzzing::{self, Outcome, Random, Tree};
+use qcbus_fuzzing::{Outcome, Random, Tree};
 
 /// Number of corrupted images that are walked.
 const SPOILT: u64 = if cfg!(miri) { 6 } else { 2_000 };
@@ -21,10 +21,10 @@ fn small() -> Vec<u8> {
 #[test]
 fn corrupted_small_image_is_read_safely() {
     let sound = small();
-    assert_eq!(fuzzing::read_image(&sound), Outcome::Sound);
+    assert_eq!(qcbus_fuzzing::read_image(&sound), Outcome::Sound);
     for seed in 0..SPOILT {
         let mut image = sound.clone();
-        fuzzing::corrupt(&mut image, &mut Random(seed));
-        fuzzing::read_image(&image);
+        qcbus_fuzzing::corrupt(&mut image, &mut Random(seed));
+        qcbus_fuzzing::read_image(&image);
     }
 }

@@ -18,6 +18,3 @@ mod xml;
 
 pub use text::Text;
 pub use verdict::Verdict;
-
-#[doc(hidden)]
-pub mod fuzzing;

@@ -166,26 +166,6 @@ pub fn load(path: &Path, sources: &Sources<'_>) -> Result<Vec<Module>, ManifestE
     unique(modules)
 }
 
-/// Returns the paths that a framework manifest lists, environment variables expanded.
-///
-/// # Errors
-/// The file is not JSON, or `manifest_file_path` is not a list of texts.
-pub fn parse_framework(
-    path: &Path,
-    bytes: &[u8],
-    variable: &dyn Fn(&str) -> Option<String>,
-) -> Result<Vec<PathBuf>, ManifestError> {
-    let read = |_: &Path| Err(String::from("not read"));
-    listed_files(
-        path,
-        &object(path, bytes)?,
-        &Sources {
-            read: &read,
-            variable,
-        },
-    )
-}
-
 /// Returns the modules of a module manifest.
 ///
 /// # Errors

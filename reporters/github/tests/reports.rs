@@ -13,6 +13,7 @@ use qcbus_formats::location::OtherPlace;
 use qcbus_formats::xqar::{Level, Location, Param, Status};
 use qcbus_messages::Verdict;
 use qcbus_report_github::{Annotations, LONGEST_TEXT, REPORTER};
+use qcbus_reporter_samples::plain_run;
 use qcbus_reporter_sdk::{NoSources, ReportFormat as _, Setting};
 
 #[test]
@@ -244,7 +245,7 @@ fn restarted_daemon_keeps_earlier_report() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("github.txt");
     let make = |keep| {
-        let plain = Setting::plain_run();
+        let plain = plain_run();
         (REPORTER.make)(&Setting {
             keep,
             is_run: false,

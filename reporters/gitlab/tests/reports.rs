@@ -10,7 +10,7 @@ use qcbus_formats::pool::BLOCKED;
 use qcbus_formats::xqar::{Checker, Issue, Level, Location, Locations, Metadata, Status};
 use qcbus_messages::{ResultMessage, Verdict};
 use qcbus_report_gitlab::{CodeQuality, MOST_ENTRIES, Section};
-use qcbus_reporter_sdk::samples::result;
+use qcbus_reporter_samples::result;
 use qcbus_reporter_sdk::{Destination, NoSources, ReportFormat as _};
 use serde_json::Value;
 

@@ -8,6 +8,7 @@ use qcbus_formats::xqar::{
 };
 use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
 use qcbus_report_json::{REPORTER, render};
+use qcbus_reporter_samples::plain_run;
 use qcbus_reporter_sdk::{NoSources, Reporter, Setting};
 use serde_json::Value;
 
@@ -183,6 +184,6 @@ fn new_reporter(keep: bool) -> Box<dyn Reporter> {
     (REPORTER.make)(&Setting {
         keep,
         is_run: false,
-        ..Setting::plain_run()
+        ..plain_run()
     })
 }

@@ -12,7 +12,7 @@ use qcbus_messages::{ResultMessage, Verdict};
 use qcbus_report_sarif::{
     MOST_PACKED_BYTES, MOST_PLACES, MOST_RESULTS, SHOWN_RESULTS, Sarif, Section, UNANSWERED,
 };
-use qcbus_reporter_sdk::samples::result;
+use qcbus_reporter_samples::result;
 use qcbus_reporter_sdk::{Destination, NoSources, ReportFormat as _, RulePage};
 use serde_json::Value;
 

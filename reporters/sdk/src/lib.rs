@@ -24,7 +24,6 @@ mod output_target;
 mod registration;
 mod responder;
 mod road_network;
-pub mod samples;
 mod silence;
 mod sources;
 mod underline;

@@ -34,18 +34,6 @@ pub struct Setting {
     pub pages: Pages,
 }
 
-impl Setting {
-    /// Returns the setting of a separate run, without colours and pages.
-    pub fn plain_run() -> Setting {
-        Setting {
-            color: false,
-            keep: false,
-            is_run: true,
-            pages: |_, _| None,
-        }
-    }
-}
-
 /// Function that returns a rule's page by UID and checker id; either may be empty.
 pub type Pages = fn(uid: &str, checker: &str) -> Option<RulePage>;
 

@@ -17,10 +17,12 @@
 //! * `host` with `options`, `session`, `receive_budget`, `documents`; `peer` with `membership`,
 //!   `library`; `mapped_image`; `wake`.
 
+// The helpers that both kinds of tests share name this crate as an integration test does.
+#[cfg(test)]
+extern crate self as qcbus_bus;
+
 mod admission;
 mod documents;
-#[doc(hidden)]
-pub mod fuzzing;
 mod generation;
 mod host;
 mod instance;
@@ -43,6 +45,8 @@ mod runtime_files;
 mod send_side;
 mod session;
 mod stream;
+#[cfg(test)]
+mod tests;
 mod wake;
 
 pub use admission::LAUNCH;

@@ -390,10 +390,11 @@ mod tests {
             "open_or_create",
             "global_config()",
         ];
-        let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-        for entry in fs::read_dir(sources).unwrap() {
+        let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let folders = ["src", "src/tests"].map(|folder| package.join(folder));
+        for entry in folders.iter().flat_map(|it| fs::read_dir(it).unwrap()) {
             let path = entry.unwrap().path();
-            if path.ends_with("ports.rs") {
+            if path.is_dir() || path.ends_with("ports.rs") {
                 continue;
             }
             let text = fs::read_to_string(&path).unwrap();

@@ -10,8 +10,6 @@ mod archive;
 mod count;
 mod decode;
 mod error;
-#[doc(hidden)]
-pub mod fuzzing;
 mod gather;
 mod limits;
 pub mod modular;

@@ -13,3 +13,4 @@ mod combined;
 mod pages;
 mod readme;
 mod robust;
+mod templates;

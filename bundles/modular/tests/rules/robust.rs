@@ -3,8 +3,11 @@
 use qcbus_modular::BUNDLE;
 use qcbus_rule_tests::robust::Robust;
 
+use crate::templates::TEMPLATES;
+
 const ROBUST: Robust = Robust {
     bundle: &BUNDLE,
+    templates: TEMPLATES,
     extension: "xosc",
     hostile: &[
         "",

@@ -38,11 +38,4 @@ impl<'a> IdIndex<'a> {
             .take_while(move |(at, (other, _))| *at == 0 || *other == rest[0].0);
         same.map(|(_, (_, place))| *place as usize)
     }
-
-    /// Returns the ids that occur more than once, each with all its places, in order of id.
-    pub(crate) fn duplicates(&self) -> impl Iterator<Item = &[(&'a str, u32)]> {
-        self.ids
-            .chunk_by(|(one, _), (next, _)| one == next)
-            .filter(|same| same.len() > 1)
-    }
 }

@@ -22,14 +22,6 @@ pub enum Edge {
 impl Edge {
     /// Both borders.
     pub const BOTH: [Edge; 2] = [Edge::Inner, Edge::Outer];
-
-    /// Returns the word `inner` or `outer`.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Edge::Inner => "inner",
-            Edge::Outer => "outer",
-        }
-    }
 }
 
 /// A lane with its section, layer and road.

@@ -8,7 +8,7 @@ use crate::queries::index::IdIndex;
 use crate::queries::lane_ref::LaneRef;
 use crate::queries::section_ref::SectionRef;
 use crate::types::contacts::{LaneJoint, LaneKey, RoadContact, RoadEnd, TouchingLanes};
-use crate::types::junction::{Connection, Junction, JunctionGroup};
+use crate::types::junction::{Connection, Junction};
 use crate::types::names::Names;
 use crate::types::objects::Object;
 use crate::types::railroad::RailroadStation;
@@ -24,19 +24,6 @@ pub struct Version {
     pub major: u16,
     /// `@revMinor`
     pub minor: u16,
-}
-
-impl Version {
-    /// Returns the edition of the standard for this version. 1.8 stands for 1.8.1, which replaced
-    /// 1.8.0 without a new number in the header.
-    pub fn edition(self) -> (u16, u16, u16) {
-        let patch = if (self.major, self.minor) == (1, 8) {
-            1
-        } else {
-            0
-        };
-        (self.major, self.minor, patch)
-    }
 }
 
 impl std::fmt::Display for Version {
@@ -202,11 +189,6 @@ impl<'a> RoadMap<'a> {
         listed(self.root, "controller").map(Controller::of)
     }
 
-    /// Returns the junction groups (12.13).
-    pub fn junction_groups(&self) -> impl Iterator<Item = JunctionGroup<'a>> + use<'a> {
-        listed(self.root, "junctionGroup").map(JunctionGroup::of)
-    }
-
     /// Returns the railroad stations (15.4).
     pub fn stations(&self) -> impl Iterator<Item = RailroadStation<'a>> + use<'a> {
         listed(self.root, "station").map(RailroadStation::of)
@@ -292,16 +274,6 @@ impl<'a> RoadMap<'a> {
 
     fn node_at(&self, place: usize) -> Option<Node<'a>> {
         self.root?.document().node(u32::try_from(place).ok()?)
-    }
-
-    /// Returns the ids that several roads share, each with its roads in document order.
-    pub fn shared_road_ids(&self) -> impl Iterator<Item = (&'a str, Vec<&Road<'a>>)> {
-        self.road_ids.duplicates().map(|same| {
-            let roads = same
-                .iter()
-                .filter_map(|(_, place)| self.roads.get(*place as usize));
-            (same[0].0, roads.collect())
-        })
     }
 
     /// Returns the lane sections of all roads and layers, in document order.

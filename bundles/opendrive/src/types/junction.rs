@@ -1,4 +1,4 @@
-//! Junctions of all types and their groups (OpenDRIVE 1.9, chapter 12).
+//! Junctions of all types (OpenDRIVE 1.9, chapter 12).
 
 use std::sync::OnceLock;
 
@@ -6,7 +6,6 @@ use qcbus_document::Node;
 
 use crate::types::junction_area::{Boundary, ElevationGrid};
 use crate::types::plan_view::PlanView;
-use crate::types::road::RoadLink;
 use crate::types::value::{ContactPoint, number};
 use crate::types::view::{children, view};
 
@@ -98,11 +97,6 @@ impl<'a> Junction<'a> {
         number(self.node, "sEnd")
     }
 
-    /// Returns `@orientation` of a virtual junction: `+`, `-` or `none`.
-    pub fn orientation(&self) -> Option<&'a str> {
-        self.node.attr("orientation")
-    }
-
     /// Returns the junction reference line (12.9). It is empty without `<planView>`.
     pub fn plan_view(&self) -> &PlanView<'a> {
         self.plan_view
@@ -164,11 +158,6 @@ impl<'a> Connection<'a> {
         self.connecting_road().or(self.linked_road())
     }
 
-    /// Returns `<predecessor>` or `<successor>` of a virtual connection.
-    pub fn link(&self, end: ContactPoint) -> Option<RoadLink<'a>> {
-        self.node.child(end.link_name()).map(RoadLink::of)
-    }
-
     children! {
         /// The lane links.
         lane_links: JunctionLaneLink "laneLink",
@@ -186,8 +175,6 @@ view! {
         from_layer: layer "fromLayer",
         /// `@toLayer`; permanent when missing.
         to_layer: layer "toLayer",
-        /// `@overlapZone`, in metres.
-        overlap_zone: number "overlapZone",
     }
 }
 
@@ -206,18 +193,12 @@ view! {
     JunctionController {
         /// `@id` of the signal controller.
         id: text "id",
-        /// `@type`.
-        kind: text "type",
-        /// `@sequence`.
-        sequence: integer "sequence",
     }
 }
 
 view! {
     /// A `<crossPath>` (12.5).
     CrossPath {
-        /// `@id`.
-        id: text "id",
         /// `@crossingRoad`.
         crossing_road: text "crossingRoad",
         /// `@roadAtStart`.
@@ -261,40 +242,11 @@ view! {
 view! {
     /// A `<roadSection>` of a crossing (12.8).
     RoadSection {
-        /// `@id`.
-        id: text "id",
         /// `@roadId`.
         road_id: text "roadId",
         /// `@sStart`, in metres.
         s_start: number "sStart",
         /// `@sEnd`, in metres.
         s_end: number "sEnd",
-    }
-}
-
-view! {
-    /// A `<junctionGroup>` (12.13).
-    JunctionGroup {
-        /// `@id`.
-        id: text "id",
-        /// `@name`.
-        name: text "name",
-        /// `@type`.
-        kind: text "type",
-    }
-}
-
-impl<'a> JunctionGroup<'a> {
-    children! {
-        /// The junctions of the group.
-        references: JunctionReference "junctionReference",
-    }
-}
-
-view! {
-    /// A `<junctionReference>` (12.13).
-    JunctionReference {
-        /// `@junction`: the junction's id.
-        junction: text "junction",
     }
 }

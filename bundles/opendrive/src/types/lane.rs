@@ -24,16 +24,6 @@ pub enum LaneGroup {
 }
 
 impl LaneGroup {
-    /// Returns the group of an element.
-    pub fn of(node: Node<'_>) -> Option<LaneGroup> {
-        match node.name() {
-            "left" => Some(LaneGroup::Left),
-            "center" => Some(LaneGroup::Center),
-            "right" => Some(LaneGroup::Right),
-            _ => None,
-        }
-    }
-
     /// Returns the side of the road, or `None` for the center.
     pub fn side(self) -> Option<Side> {
         match self {
@@ -204,12 +194,6 @@ impl<'a> Lane<'a> {
         self.node.attr("advisory")
     }
 
-    /// Returns the `<link>` element.
-    #[inline]
-    pub fn link_node(&self) -> Option<Node<'a>> {
-        self.link
-    }
-
     /// Returns the links at an end: any number of `<predecessor>` or `<successor>` elements.
     #[inline]
     pub fn links(&self, end: ContactPoint) -> impl Iterator<Item = LaneLink<'a>> + use<'a> {
@@ -364,8 +348,6 @@ view! {
     LaneLink {
         /// `@id`, if it is an integer.
         id: integer "id",
-        /// `@id` as written.
-        id_text: text "id",
         /// `@layer` of the linked lane; permanent when missing.
         layer: layer "layer",
     }

@@ -1,4 +1,4 @@
-//! Objects, tunnels and bridges (OpenDRIVE 1.9, chapter 13).
+//! Objects (OpenDRIVE 1.9, chapter 13).
 
 use crate::types::crg::Crg;
 use crate::types::outlines::{Outline, Polyline};
@@ -15,16 +15,6 @@ impl<'a> Road<'a> {
     pub fn object_references(&self) -> impl Iterator<Item = ObjectReference<'a>> + use<'a> {
         listed(self.objects_node(), "objectReference").map(ObjectReference::of)
     }
-
-    /// Returns the tunnels (13.11).
-    pub fn tunnels(&self) -> impl Iterator<Item = Structure<'a>> + use<'a> {
-        listed(self.objects_node(), "tunnel").map(Structure::of)
-    }
-
-    /// Returns the bridges (13.12).
-    pub fn bridges(&self) -> impl Iterator<Item = Structure<'a>> + use<'a> {
-        listed(self.objects_node(), "bridge").map(Structure::of)
-    }
 }
 
 view! {
@@ -34,16 +24,12 @@ view! {
         id: text "id",
         /// `@type`.
         kind: text "type",
-        /// `@subtype`.
-        subtype: text "subtype",
         /// `@s`, in metres.
         s: number "s",
         /// `@t`, in metres.
         t: number "t",
         /// `@zOffset` above the elevation at s, in metres.
         z_offset: number "zOffset",
-        /// `@orientation`: `+`, `-` or `none`.
-        orientation: text "orientation",
         /// `@hdg` relative to the road, in radians.
         hdg: number "hdg",
         /// `@pitch`, in radians.
@@ -60,10 +46,6 @@ view! {
         radius: number "radius",
         /// `@height` of the bounding volume, in metres.
         height: number "height",
-        /// `@validLength` along s, in metres.
-        valid_length: number "validLength",
-        /// `@dynamic`.
-        dynamic: flag "dynamic",
     }
 }
 
@@ -71,10 +53,6 @@ impl<'a> Object<'a> {
     children! {
         /// The `<repeat>` records (13.4).
         repeats: Repeat "repeat",
-        /// The lanes for which the object is valid (13.6).
-        validities: Validity "validity",
-        /// The materials (13.5).
-        materials: ObjectMaterial "material",
     }
 
     /// Returns the outlines (13.2): in `<outlines>`, or directly in the object as before 1.5.
@@ -88,16 +66,6 @@ impl<'a> Object<'a> {
     /// Returns the polylines of the skeleton (13.3).
     pub fn polylines(&self) -> impl Iterator<Item = Polyline<'a>> + use<'a> {
         listed(self.node.child("skeleton"), "polyline").map(Polyline::of)
-    }
-
-    /// Returns the markings (13.8).
-    pub fn markings(&self) -> impl Iterator<Item = Marking<'a>> + use<'a> {
-        listed(self.node.child("markings"), "marking").map(Marking::of)
-    }
-
-    /// Returns the borders (13.9).
-    pub fn borders(&self) -> impl Iterator<Item = ObjectBorder<'a>> + use<'a> {
-        listed(self.node.child("borders"), "border").map(ObjectBorder::of)
     }
 
     /// Returns the CRG records of the object's surface (13.13).
@@ -125,82 +93,8 @@ view! {
         c_t: number "cT",
         /// `@dT`: cubic coefficient of t (since 1.9).
         d_t: number "dT",
-        /// `@zOffsetStart`, in metres.
-        z_offset_start: number "zOffsetStart",
-        /// `@zOffsetEnd`, in metres.
-        z_offset_end: number "zOffsetEnd",
         /// `@detachFromReferenceLine`.
         detached: flag "detachFromReferenceLine",
-    }
-}
-
-view! {
-    /// A `<marking>` of an object (13.8).
-    Marking {
-        /// `@side` of the bounding box.
-        side: text "side",
-        /// `@color`.
-        color: text "color",
-        /// `@outlineId`.
-        outline_id: text "outlineId",
-        /// `@startOffset`, in metres.
-        start_offset: number "startOffset",
-        /// `@stopOffset`, in metres.
-        stop_offset: number "stopOffset",
-        /// `@lineLength`, in metres.
-        line_length: number "lineLength",
-        /// `@spaceLength`, in metres.
-        space_length: number "spaceLength",
-    }
-}
-
-impl<'a> Marking<'a> {
-    children! {
-        /// The outline points at the ends of the marking.
-        corner_references: CornerReference "cornerReference",
-    }
-}
-
-view! {
-    /// A `<border>` of an object (13.9).
-    ObjectBorder {
-        /// `@outlineId`.
-        outline_id: text "outlineId",
-        /// `@type`.
-        kind: text "type",
-        /// `@useCompleteOutline`.
-        use_complete_outline: flag "useCompleteOutline",
-        /// `@width`, in metres.
-        width: number "width",
-    }
-}
-
-impl<'a> ObjectBorder<'a> {
-    children! {
-        /// The outline points at the ends of the border.
-        corner_references: CornerReference "cornerReference",
-    }
-}
-
-view! {
-    /// A `<cornerReference>` (13.8, 13.9).
-    CornerReference {
-        /// `@id` of an outline point.
-        id: text "id",
-    }
-}
-
-view! {
-    /// A `<material>` of an object (13.5).
-    ObjectMaterial {
-        /// `@surface`.
-        surface: text "surface",
-        /// `@friction`.
-        friction: number "friction",
-        /// `@roughness`.
-        roughness: number "roughness",
-        /// `@roadMarkColor`.
-        road_mark_color: text "roadMarkColor",
     }
 }
 
@@ -209,44 +103,6 @@ view! {
     ObjectReference {
         /// `@id` of the object.
         id: text "id",
-        /// `@s`, in metres.
-        s: number "s",
-        /// `@t`, in metres.
-        t: number "t",
-        /// `@zOffset`, in metres.
-        z_offset: number "zOffset",
-        /// `@orientation`: `+`, `-` or `none`.
-        orientation: text "orientation",
-        /// `@validLength`, in metres.
-        valid_length: number "validLength",
-    }
-}
-
-impl<'a> ObjectReference<'a> {
-    children! {
-        /// The lanes for which the reference is valid.
-        validities: Validity "validity",
-    }
-}
-
-view! {
-    /// A `<tunnel>` (13.11) or a `<bridge>` (13.12).
-    Structure {
-        /// `@id`.
-        id: text "id",
-        /// `@type`.
-        kind: text "type",
-        /// `@s`, in metres.
-        s: number "s",
-        /// `@length`, in metres.
-        length: number "length",
-    }
-}
-
-impl<'a> Structure<'a> {
-    children! {
-        /// The lanes for which the structure is valid.
-        validities: Validity "validity",
     }
 }
 

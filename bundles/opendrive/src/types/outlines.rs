@@ -9,16 +9,10 @@ use crate::types::view::{children, view};
 view! {
     /// An `<outline>` (13.2).
     Outline {
-        /// `@id`.
-        id: text "id",
         /// `@outer`; true when missing.
         outer: flag "outer",
         /// `@closed`.
         closed: flag "closed",
-        /// `@laneType`.
-        lane_type: text "laneType",
-        /// `@fillType`.
-        fill_type: text "fillType",
     }
 }
 
@@ -70,8 +64,6 @@ impl<'a> Corner<'a> {
 view! {
     /// A corner of an outline or a vertex of a skeleton. The element determines its coordinates.
     ObjectPoint {
-        /// `@id`.
-        id: text "id",
         /// `@s` of a road point, in metres.
         s: number "s",
         /// `@t` of a road point, in metres.
@@ -92,22 +84,16 @@ view! {
         width: number "width",
         /// `@length` of the object at this point, or of the curve, in metres.
         length: number "length",
-        /// `@intersectionPoint`.
-        intersection_point: flag "intersectionPoint",
     }
 }
 
 view! {
     /// A `<curveLocal>` of an outline (13.2.3).
     CurveLocal {
-        /// `@id`.
-        id: text "id",
         /// `@u` of the start, in metres.
         u: number "u",
         /// `@v` of the start, in metres.
         v: number "v",
-        /// `@z` of the start, in metres.
-        z: number "z",
         /// `@hdg` of the start in the local system, in radians.
         hdg: number "hdg",
         /// `@length`, in metres.
@@ -132,10 +118,7 @@ impl<'a> CurveLocal<'a> {
 
 view! {
     /// A `<polyline>` of a skeleton (13.3).
-    Polyline {
-        /// `@id`.
-        id: text "id",
-    }
+    Polyline {}
 }
 
 impl<'a> Polyline<'a> {

@@ -15,10 +15,6 @@ view! {
     Switch {
         /// `@id`.
         id: text "id",
-        /// `@name`.
-        name: text "name",
-        /// `@position`: `dynamic`, `straight` or `turn`.
-        position: text "position",
     }
 }
 
@@ -44,23 +40,12 @@ view! {
     Track {
         /// `@id` of the road.
         id: text "id",
-        /// `@s` on that road, in metres.
-        s: number "s",
-        /// `@dir`: the direction on that road.
-        dir: direction "dir",
     }
 }
 
 view! {
     /// A `<station>` (15.4), where trains stop.
-    RailroadStation {
-        /// `@id`.
-        id: text "id",
-        /// `@name`.
-        name: text "name",
-        /// `@type`.
-        kind: text "type",
-    }
+    RailroadStation {}
 }
 
 impl<'a> RailroadStation<'a> {
@@ -72,12 +57,7 @@ impl<'a> RailroadStation<'a> {
 
 view! {
     /// A `<platform>` of a station (15.4).
-    Platform {
-        /// `@id`.
-        id: text "id",
-        /// `@name`.
-        name: text "name",
-    }
+    Platform {}
 }
 
 impl<'a> Platform<'a> {
@@ -89,14 +69,5 @@ impl<'a> Platform<'a> {
 
 view! {
     /// A `<segment>` of a platform (15.4).
-    PlatformSegment {
-        /// `@roadId`.
-        road_id: text "roadId",
-        /// `@sStart`, in metres.
-        s_start: number "sStart",
-        /// `@sEnd`, in metres.
-        s_end: number "sEnd",
-        /// `@side`: `left` or `right`.
-        side: text "side",
-    }
+    PlatformSegment {}
 }

@@ -309,8 +309,6 @@ view! {
         contact_point: contact "contactPoint",
         /// `@elementS`: a place within the linked road, in metres.
         element_s: number "elementS",
-        /// `@elementDir`: the direction in which the linked road is entered.
-        element_dir: direction "elementDir",
     }
 }
 
@@ -335,7 +333,5 @@ view! {
         s: number "s",
         /// `@type`.
         kind: text "type",
-        /// `@country`.
-        country: text "country",
     }
 }

@@ -76,15 +76,6 @@ pub(crate) fn contact(node: Node<'_>, name: &str) -> Option<ContactPoint> {
     ContactPoint::parse(node.attr(name)?)
 }
 
-/// Reads a direction along or against s.
-pub(crate) fn direction(node: Node<'_>, name: &str) -> Option<Direction> {
-    match node.attr(name)? {
-        "+" => Some(Direction::Along),
-        "-" => Some(Direction::Against),
-        _ => None,
-    }
-}
-
 /// Reads the lane layer of an element, or [`LayerKind::Permanent`] if the attribute is missing.
 pub(crate) fn layer(node: Node<'_>, name: &str) -> LayerKind {
     LayerKind::of_text(node.attr(name))
@@ -162,15 +153,6 @@ impl fmt::Display for ContactPoint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.as_str())
     }
-}
-
-/// A direction relative to s (`e_elementDir`, `e_orientation`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Direction {
-    /// `+`: with ascending s.
-    Along,
-    /// `-`: with descending s.
-    Against,
 }
 
 /// A side of the center lane.

@@ -46,7 +46,6 @@ macro_rules! reading {
     (integer) => { Option<i64> };
     (flag) => { Option<bool> };
     (contact) => { Option<$crate::types::value::ContactPoint> };
-    (direction) => { Option<$crate::types::value::Direction> };
     (layer) => { $crate::types::value::LayerKind };
 }
 

@@ -101,11 +101,6 @@ fn ids_are_strings_and_duplicates_are_kept() {
             [0, 2]
         );
         assert_eq!(map.road("7").unwrap().index(), 1);
-        let shared: Vec<_> = map
-            .shared_road_ids()
-            .map(|(id, roads)| (id, roads.len()))
-            .collect();
-        assert_eq!(shared, [("007", 2)]);
         assert!(map.road("8").is_none());
         assert_eq!(map.junction("7").unwrap().index(), 0);
     });

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use qcbus_sdk::{Bundle, Issue, Listener, Outcome, Plan, check};
 
 use super::example::{Staged, version_of};
-use super::{Example, Page, Verdict};
+use super::{Example, Page, Template, Verdict};
 
 /// A complete document of a page.
 #[derive(Debug, Clone)]
@@ -19,10 +19,10 @@ pub struct Shown {
 }
 
 /// Returns every single-file example of a bundle's pages without parameters.
-pub fn documents(bundle: &'static Bundle) -> Vec<Shown> {
+pub fn documents(bundle: &'static Bundle, templates: &[Template]) -> Vec<Shown> {
     let mut all = Vec::new();
     for (rule, example) in examples(bundle) {
-        let Some(staged) = stage(bundle, rule, &example) else {
+        let Some(staged) = stage(bundle, templates, rule, &example) else {
             continue;
         };
         if let [(_, text)] = staged.files.as_slice()
@@ -40,7 +40,10 @@ pub fn documents(bundle: &'static Bundle) -> Vec<Shown> {
 }
 
 /// Returns, for each rule, the UIDs of its findings in its own bad examples.
-pub fn fired(bundle: &'static Bundle) -> BTreeMap<&'static str, BTreeSet<String>> {
+pub fn fired(
+    bundle: &'static Bundle,
+    templates: &[Template],
+) -> BTreeMap<&'static str, BTreeSet<String>> {
     let plan = Plan::new(bundle, |_| true, |_, _| None);
     let mut all: BTreeMap<&'static str, BTreeSet<String>> = BTreeMap::new();
     for (rule, example) in examples(bundle) {
@@ -48,7 +51,7 @@ pub fn fired(bundle: &'static Bundle) -> BTreeMap<&'static str, BTreeSet<String>
             continue;
         }
         // The staged files must live longer than the documents loaded from them.
-        let Some(staged) = stage(bundle, rule, &example) else {
+        let Some(staged) = stage(bundle, templates, rule, &example) else {
             continue;
         };
         let Ok(loaded) = staged.load() else { continue };
@@ -76,16 +79,24 @@ fn examples(bundle: &'static Bundle) -> Vec<(&'static str, Example)> {
         .collect()
 }
 
-fn stage(bundle: &'static Bundle, rule: &str, example: &Example) -> Option<Staged> {
+fn stage(
+    bundle: &'static Bundle,
+    templates: &[Template],
+    rule: &str,
+    example: &Example,
+) -> Option<Staged> {
     let rule = bundle.rules.iter().find(|it| it.facts().id == rule)?;
     let version = version_of(bundle, *rule, example).ok()?;
-    Staged::new(bundle, example, version).ok()
+    Staged::new(bundle, templates, example, version).ok()
 }
 
 /// Returns, for each UID, its checker, and whether it has a finding under this UID in its own bad
 /// examples.
-pub fn by_uid(bundle: &'static Bundle) -> BTreeMap<&'static str, (&'static str, bool)> {
-    let fired = fired(bundle);
+pub fn by_uid(
+    bundle: &'static Bundle,
+    templates: &[Template],
+) -> BTreeMap<&'static str, (&'static str, bool)> {
+    let fired = fired(bundle, templates);
     let mut all: BTreeMap<&'static str, (&'static str, bool)> = BTreeMap::new();
     for rule in bundle.rules {
         let facts = rule.facts();

@@ -8,6 +8,18 @@ use qcbus_sdk::{AnyRule, Bundle, LoadError, Loaded, Version, VersionRange};
 
 use super::{Example, ExampleFile};
 
+/// A minimal document with a placeholder, so that an example shows only its subject.
+///
+/// `{major}` and `{minor}` stand for the version. `{example}`, alone on its line, stands for the
+/// example.
+#[derive(Debug, Clone, Copy)]
+pub struct Template {
+    /// Name for `in=NAME`. An example without a name uses the first template.
+    pub name: &'static str,
+    /// The document.
+    pub text: &'static str,
+}
+
 /// Expected result of a rule for an example.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -73,7 +85,12 @@ impl Staged {
     /// Puts an example into its template. A text that begins with `<?xml` or the first template's
     /// root element is a complete document and stays unchanged. A further file stays unchanged
     /// unless it names a template.
-    pub fn new(bundle: &Bundle, example: &Example, version: Version) -> Result<Staged, String> {
+    pub fn new(
+        bundle: &Bundle,
+        templates: &[Template],
+        example: &Example,
+        version: Version,
+    ) -> Result<Staged, String> {
         let Some((ExampleFile { name, text, .. }, others)) = example.files.split_first() else {
             return Err("an example needs a document".to_owned());
         };
@@ -82,16 +99,16 @@ impl Staged {
             .clone()
             .unwrap_or_else(|| format!("example.{extension}"));
         let shown_rows = text.lines().count() as u64;
-        let (text, hidden_rows) = if example.template.is_none() && is_whole(bundle, text) {
+        let (text, hidden_rows) = if example.template.is_none() && is_whole(templates, text) {
             (text.clone(), 0)
         } else {
-            fill(bundle, example.template.as_deref(), version, text)?
+            fill(templates, example.template.as_deref(), version, text)?
         };
         let mut files = vec![(name, text)];
         for file in others {
             let name = file.name.clone().unwrap_or_default();
             let text = match &file.template {
-                Some(template) => fill(bundle, Some(template), version, &file.text)?.0,
+                Some(template) => fill(templates, Some(template), version, &file.text)?.0,
                 None => file.text.clone(),
             };
             files.push((name, text));
@@ -191,9 +208,8 @@ fn packed(files: &[NamedBytes]) -> std::io::Result<Vec<NamedBytes>> {
     Ok(whole)
 }
 
-fn is_whole(bundle: &Bundle, text: &str) -> bool {
-    let root = bundle
-        .templates
+fn is_whole(templates: &[Template], text: &str) -> bool {
+    let root = templates
         .first()
         .map_or("", |template| root_tag(template.text));
     text.starts_with("<?xml") || text.trim_start().starts_with(root)
@@ -211,19 +227,17 @@ fn root_tag(text: &str) -> &str {
 const HOLE: &str = "{example}\n";
 
 fn fill(
-    bundle: &Bundle,
+    templates: &[Template],
     name: Option<&str>,
     version: Version,
     text: &str,
 ) -> Result<(String, u64), String> {
-    let mut templates = bundle.templates.iter();
     let template = match name {
-        None => templates.next(),
-        Some(name) => templates.find(|template| template.name == name),
+        None => templates.first(),
+        Some(name) => templates.iter().find(|template| template.name == name),
     };
     let names = || {
-        bundle
-            .templates
+        templates
             .iter()
             .map(|template| template.name)
             .collect::<Vec<_>>()

@@ -8,22 +8,22 @@ use qcbus_sdk::{AnyRule, Bundle, Checker, Issue, Listener, Outcome, Plan, Status
 use super::bless::blessed;
 use super::example::{Staged, Verdict, version_of};
 use super::render::render;
-use super::{Example, Page};
+use super::{Example, Page, Template};
 
 /// Fails the running test if [`check_pages`] returns complaints.
 ///
 /// ```text
 /// #[test]
 /// fn pages_keep_their_word() {
-///     qcbus_rule_tests::pages::assert_pages(&BUNDLE, concat!(env!("CARGO_MANIFEST_DIR"), "/src/rules"));
+///     qcbus_rule_tests::pages::assert_pages(&BUNDLE, &[], concat!(env!("CARGO_MANIFEST_DIR"), "/src/rules"));
 /// }
 /// ```
 ///
 /// # Panics
 /// Panics with all complaints.
 #[expect(clippy::panic, reason = "it is an assertion for tests")]
-pub fn assert_pages(bundle: &'static Bundle, rules_dir: &str) {
-    let complaints = check_pages(bundle, Path::new(rules_dir));
+pub fn assert_pages(bundle: &'static Bundle, templates: &[Template], rules_dir: &str) {
+    let complaints = check_pages(bundle, templates, Path::new(rules_dir));
     if !complaints.is_empty() {
         panic!(
             "{} complaints about the pages of {} (QCBUS_BLESS=1 writes the findings of the rules into their \
@@ -35,11 +35,16 @@ pub fn assert_pages(bundle: &'static Bundle, rules_dir: &str) {
     }
 }
 
-/// Compares a bundle's rules, their files and their pages, and runs every example.
+/// Compares a bundle's rules, their files and their pages, and runs every example. Short examples
+/// are inserted into `templates`. Without templates, every example must be a whole document.
 ///
 /// If `QCBUS_BLESS` is set, the `issues` blocks are rewritten. With `QCBUS_PAGE=NAME`, only the
 /// examples of pages with NAME in their file name run.
-pub fn check_pages(bundle: &'static Bundle, rules_dir: &Path) -> Vec<String> {
+pub fn check_pages(
+    bundle: &'static Bundle,
+    templates: &[Template],
+    rules_dir: &Path,
+) -> Vec<String> {
     let mut complaints = of_the_list(bundle);
     let files = match rule_files(rules_dir) {
         Ok(files) => files,
@@ -52,6 +57,7 @@ pub fn check_pages(bundle: &'static Bundle, rules_dir: &Path) -> Vec<String> {
         if path.to_string_lossy().contains(&wanted) {
             let page = PageTest {
                 bundle,
+                templates,
                 plan: &plan,
                 path: &path,
                 rule,
@@ -181,6 +187,7 @@ fn id_names(id: &str, name: &str) -> bool {
 
 struct PageTest<'t> {
     bundle: &'static Bundle,
+    templates: &'t [Template],
     plan: &'t Plan,
     path: &'t Path,
     rule: &'static dyn AnyRule,
@@ -288,7 +295,7 @@ impl PageTest<'_> {
     /// Returns the findings of the rule, or an error if the example does not behave as marked.
     fn example(&self, example: &Example) -> Result<String, String> {
         let version = version_of(self.bundle, self.rule, example)?;
-        let staged = Staged::new(self.bundle, example, version)?;
+        let staged = Staged::new(self.bundle, self.templates, example, version)?;
         let loaded = staged.load().map_err(|error| error.to_string())?;
         let subject = loaded
             .subject(self.bundle)

@@ -11,6 +11,6 @@ mod harness;
 mod parse;
 mod render;
 
-pub use example::Verdict;
+pub use example::{Template, Verdict};
 pub use harness::{assert_pages, check_pages};
 pub use parse::{Example, ExampleFile, Page, PageError};

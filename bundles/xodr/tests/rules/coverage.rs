@@ -10,6 +10,8 @@ use qcbus_rule_tests::corpus::agrees_or_says;
 use qcbus_rule_tests::pages::evidence;
 use qcbus_xodr::BUNDLE;
 
+use crate::templates::TEMPLATES;
+
 const ANNEX: &str = include_str!("../../annex_f.tsv");
 
 /// Returns the rules that the standard prints, with the reason for those that cannot be checked.
@@ -18,7 +20,7 @@ fn annex() -> Vec<(&'static str, Option<&'static str>)> {
 }
 
 fn table() -> String {
-    let evidence = evidence::by_uid(&BUNDLE);
+    let evidence = evidence::by_uid(&BUNDLE, TEMPLATES);
     let annex = annex();
     let known: BTreeSet<&str> = annex.iter().map(|(uid, _)| *uid).collect();
     let (mut own, mut twins, mut definitions, mut open) = (0, 0, 0, 0);

@@ -13,5 +13,6 @@ mod mutation;
 mod pages;
 mod robust;
 mod seeded;
+mod templates;
 mod text;
 mod tricky;

@@ -4,6 +4,7 @@
 fn pages_keep_their_word() {
     qcbus_rule_tests::pages::assert_pages(
         &qcbus_xodr::BUNDLE,
+        crate::templates::TEMPLATES,
         concat!(env!("CARGO_MANIFEST_DIR"), "/src/rules"),
     );
 }

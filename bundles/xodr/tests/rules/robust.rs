@@ -8,8 +8,11 @@ use qcbus_rule_tests::robust::{NUMBERS, Robust, places};
 use qcbus_sdk::Plan;
 use qcbus_xodr::BUNDLE;
 
+use crate::templates::TEMPLATES;
+
 const ROBUST: Robust = Robust {
     bundle: &BUNDLE,
+    templates: TEMPLATES,
     extension: "xodr",
     hostile: NUMBERS,
 };
@@ -39,7 +42,10 @@ const IMPOSSIBLE: [&str; 3] = ["-1", "0", "-9223372036854775808"];
 fn no_rule_fails_on_impossible_lengths() {
     let plan = Plan::by_default(&BUNDLE);
     let tried = if places() > 2 { IMPOSSIBLE.len() } else { 1 };
-    for (index, shown) in evidence::documents(&BUNDLE).into_iter().enumerate() {
+    for (index, shown) in evidence::documents(&BUNDLE, TEMPLATES)
+        .into_iter()
+        .enumerate()
+    {
         for length in IMPOSSIBLE.iter().cycle().skip(index).take(tried) {
             let mut parts = shown.text.split(" length=\"");
             let mut text = parts.next().unwrap_or_default().to_owned();

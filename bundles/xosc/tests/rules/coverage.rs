@@ -9,6 +9,8 @@ use qcbus_rule_tests::corpus::agrees_or_says;
 use qcbus_rule_tests::pages::evidence;
 use qcbus_xosc::BUNDLE;
 
+use crate::templates::TEMPLATES;
+
 const RULES: &str = include_str!("../../rules.tsv");
 
 /// Number of checked rules, by kind of check.
@@ -21,7 +23,7 @@ struct Count {
 }
 
 fn table() -> String {
-    let evidence = evidence::by_uid(&BUNDLE);
+    let evidence = evidence::by_uid(&BUNDLE, TEMPLATES);
     let mut rows = String::new();
     let mut count = Count::default();
     for (uid, why) in evidence::listed(RULES) {
@@ -72,14 +74,16 @@ fn every_rule_of_a_checker_is_listed_once() {
     let listed = evidence::listed(RULES);
     let uids: BTreeSet<&str> = listed.iter().map(|(uid, _)| *uid).collect();
     assert_eq!(uids.len(), listed.len(), "a UID is listed twice");
-    let unlisted: Vec<&str> = evidence::by_uid(&BUNDLE)
+    let unlisted: Vec<&str> = evidence::by_uid(&BUNDLE, TEMPLATES)
         .into_keys()
         .filter(|uid| !uids.contains(uid))
         .collect();
     assert!(unlisted.is_empty(), "not in rules.tsv: {unlisted:?}");
     let both: Vec<&str> = listed
         .iter()
-        .filter(|(uid, why)| why.is_some() && evidence::by_uid(&BUNDLE).contains_key(uid))
+        .filter(|(uid, why)| {
+            why.is_some() && evidence::by_uid(&BUNDLE, TEMPLATES).contains_key(uid)
+        })
         .map(|(uid, _)| *uid)
         .collect();
     assert!(

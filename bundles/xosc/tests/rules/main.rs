@@ -9,3 +9,4 @@ mod mutation;
 mod pages;
 mod robust;
 mod seeded;
+mod templates;

@@ -6,8 +6,11 @@ use std::path::Path;
 use qcbus_rule_tests::robust::Robust;
 use qcbus_xosc::BUNDLE;
 
+use crate::templates::TEMPLATES;
+
 const ROBUST: Robust = Robust {
     bundle: &BUNDLE,
+    templates: TEMPLATES,
     extension: "xosc",
     hostile: &[
         "",

@@ -1,7 +1,7 @@
 //! Tests with invalid or corrupted images. They must be rejected or walked, and must never cause a
 //! panic.
 
-use qcbus_document::fuzzing::{self, Outcome, Random, Tree};
+use qcbus_fuzzing::{Outcome, Random, Tree};
 
 /// Returns the number of rounds. They are seeded, so that a failure can be repeated.
 /// `QCBUS_FUZZ_ROUNDS` sets a larger number than that of CI.
@@ -32,12 +32,12 @@ fn road_network() -> Tree {
 #[test]
 fn corrupted_image_is_refused_or_walked_safely() {
     let sound = road_network().image("maps/straight.xodr").unwrap();
-    assert_eq!(fuzzing::read_image(&sound), Outcome::Sound);
+    assert_eq!(qcbus_fuzzing::read_image(&sound), Outcome::Sound);
     let (mut refused, mut contradictory, mut still_sound) = (0, 0, 0);
     for seed in 0..rounds(4_000) {
         let mut image = sound.clone();
-        fuzzing::corrupt(&mut image, &mut Random(seed));
-        match fuzzing::read_image(&image) {
+        qcbus_fuzzing::corrupt(&mut image, &mut Random(seed));
+        match qcbus_fuzzing::read_image(&image) {
             Outcome::Refused => refused += 1,
             Outcome::Contradictory => contradictory += 1,
             // Values, padding and the content hash may change without a contradiction.
@@ -54,7 +54,8 @@ fn any_event_order_is_refused_or_gives_sound_image() {
     for seed in 0..rounds(4_000) {
         let mut random = Random(seed);
         let script: Vec<u8> = (0..300).map(|_| random.number() as u8).collect();
-        built += u32::from(fuzzing::build_image(&script).is_ok_and(|image| image.len() > 700));
+        built +=
+            u32::from(qcbus_fuzzing::build_image(&script).is_ok_and(|image| image.len() > 700));
     }
     assert!(
         built > 100,
@@ -67,7 +68,7 @@ fn every_prefix_of_an_image_is_refused() {
     let sound = road_network().image("maps/straight.xodr").unwrap();
     for len in 0..sound.len() {
         assert_eq!(
-            fuzzing::read_image(&sound[..len]),
+            qcbus_fuzzing::read_image(&sound[..len]),
             Outcome::Refused,
             "{len} bytes"
         );
@@ -82,7 +83,7 @@ fn image_is_read_at_any_address_in_longer_buffer() {
         buffer.extend_from_slice(&sound);
         buffer.extend_from_slice(&[0xEE; 100]);
         assert_eq!(
-            fuzzing::read_image(&buffer[shift..]),
+            qcbus_fuzzing::read_image(&buffer[shift..]),
             Outcome::Sound,
             "shifted by {shift}"
         );

@@ -1,7 +1,7 @@
 //! Tests of positions (files, rows and columns), XPaths, and numbers in attributes.
 
-use qcbus_document::fuzzing::Tree;
 use qcbus_document::{BuildError, Capacities, Document, FaultCode, ImageBuilder};
+use qcbus_fuzzing::Tree;
 
 fn road(id: &str) -> Tree {
     Tree::new("road").with("id", id)

@@ -1,8 +1,8 @@
 //! Tests that an image returns its input: any tree, any values, any position.
 
 use proptest::prelude::*;
-use qcbus_document::fuzzing::{Child, Tree};
 use qcbus_document::{Document, Node, XPaths};
+use qcbus_fuzzing::{Child, Tree};
 
 fn name() -> impl Strategy<Value = String> {
     prop::sample::select(vec![

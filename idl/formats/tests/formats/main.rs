@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot continue panics")]
 
+#[path = "../../fuzz/bodies.rs"]
+mod bodies;
 mod common;
 
 mod config;

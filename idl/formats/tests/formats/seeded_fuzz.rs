@@ -2,9 +2,9 @@
 //! damages.
 
 use fastrand::Rng;
-use qcbus_formats::fuzzing;
 use qcbus_formats::xqar::{Dialect, write};
 
+use crate::bodies;
 use crate::common::full;
 
 const CONFIG: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
@@ -63,7 +63,7 @@ fn run(seeds: &[String], body: fn(&[u8]), rounds: u64) {
 
 #[test]
 fn mutated_configurations_make_no_parser_panic() {
-    run(&[CONFIG.to_owned()], fuzzing::config, 4000);
+    run(&[CONFIG.to_owned()], bodies::config, 4000);
 }
 
 #[test]
@@ -73,5 +73,5 @@ fn mutated_results_make_no_parser_panic() {
         write(&full, Dialect::Current),
         write(&full, Dialect::Qc4Openx),
     ];
-    run(&seeds, fuzzing::xqar, 2000);
+    run(&seeds, bodies::xqar, 2000);
 }

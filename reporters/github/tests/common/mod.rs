@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use qcbus_formats::xqar::{Checker, Issue, Level, Status};
 use qcbus_messages::ResultMessage;
 use qcbus_report_github::{Annotations, Section};
-use qcbus_reporter_sdk::samples;
-pub use qcbus_reporter_sdk::samples::{blocked, checker, result};
+use qcbus_reporter_samples as samples;
+pub use qcbus_reporter_samples::{blocked, checker, result};
 use qcbus_reporter_sdk::{Destination, NoSources, ReportFormat as _, Subject};
 
 pub fn issue(level: Level, rule: &str, text: &str, row: u64) -> Issue {

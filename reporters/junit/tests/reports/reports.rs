@@ -5,6 +5,7 @@ use qcbus_formats::location::OtherPlace;
 use qcbus_formats::xqar::{Level, Location, Locations, Param, Status};
 use qcbus_messages::Verdict;
 use qcbus_report_junit::{LONGEST_FINDING, MOST_FINDINGS, REPORTER, Suites};
+use qcbus_reporter_samples::plain_run;
 use qcbus_reporter_sdk::{NoSources, ReportFormat as _, Setting};
 
 fn set(name: &str, value: &str) -> Param {
@@ -162,7 +163,7 @@ fn restarted_daemon_keeps_earlier_reports() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("all.junit.xml");
     let make = |keep| {
-        let plain = Setting::plain_run();
+        let plain = plain_run();
         (REPORTER.make)(&Setting {
             keep,
             is_run: false,

@@ -5,7 +5,7 @@ use qcbus_formats::pool::BLOCKED;
 use qcbus_formats::xqar::{Checker, Issue, Level, Metadata, Param, Status};
 use qcbus_messages::{ResultMessage, Verdict};
 use qcbus_report_text::{CONCISE, Folding, concise};
-use qcbus_reporter_sdk::samples;
+use qcbus_reporter_samples as samples;
 use qcbus_reporter_sdk::{NoSources, Reporter, Setting};
 
 fn issue(level: Level, text: &str, row: u64) -> Issue {
@@ -123,7 +123,7 @@ fn restarted_daemon_keeps_lines_of_other_files() {
         (CONCISE.make)(&Setting {
             keep: true,
             is_run: false,
-            ..Setting::plain_run()
+            ..samples::plain_run()
         })
     };
     let of = |path: &str, text: &str| {

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use qcbus_formats::xqar::Param;
 use qcbus_report_text::REPORTER;
-use qcbus_reporter_sdk::{OnceError, OneShot, Setting, report_once};
+use qcbus_reporter_samples::plain_run;
+use qcbus_reporter_sdk::{OnceError, OneShot, report_once};
 
 const RESULT: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <CheckerResults version="1.0.0">
@@ -108,6 +109,6 @@ fn unusable_input_is_named_in_error() {
 }
 
 fn once(what: &OneShot) -> Result<(), OnceError> {
-    let mut reporter = (REPORTER.make)(&Setting::plain_run());
+    let mut reporter = (REPORTER.make)(&plain_run());
     report_once(reporter.as_mut(), &REPORTER, what)
 }

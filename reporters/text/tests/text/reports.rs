@@ -10,6 +10,7 @@ use qcbus_formats::xqar::{
 };
 use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
 use qcbus_report_text::{Options, REPORTER, render};
+use qcbus_reporter_samples::plain_run;
 use qcbus_reporter_sdk::{Line, NoSources, Reporter, Setting, Sources};
 
 const UNIQUE: &str = "asam.net:xodr:1.4.0:ids.id_unique_in_class";
@@ -341,6 +342,6 @@ fn new_reporter(color: bool, keep: bool) -> Box<dyn Reporter> {
         color,
         keep,
         is_run: false,
-        ..Setting::plain_run()
+        ..plain_run()
     })
 }

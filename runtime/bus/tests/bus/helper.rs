@@ -427,7 +427,7 @@ fn rewrite_images(instance: &Instance) {
             Some((file, at))
         })
         .expect("an image exists");
-    let mut random = qcbus_document::fuzzing::Random(crate::support::fresh_number());
+    let mut random = qcbus_fuzzing::Random(crate::support::fresh_number());
     let mut sound = vec![0; IMAGE_AT_MOST];
     let len = segment.read_at(&mut sound, at).unwrap();
     sound.truncate(len);
@@ -435,7 +435,7 @@ fn rewrite_images(instance: &Instance) {
     loop {
         let mut spoilt = sound.clone();
         for _ in 0..20 {
-            qcbus_document::fuzzing::corrupt(&mut spoilt, &mut random);
+            qcbus_fuzzing::corrupt(&mut spoilt, &mut random);
             spoilt.resize(sound.len(), 0);
             for (byte, whole) in spoilt.iter_mut().zip(&sound) {
                 *byte = if byte == whole { *byte } else { *byte & 0x7F };

@@ -16,8 +16,6 @@ mod deaths;
 mod delivery;
 mod documents;
 mod ending;
-mod fuzz;
-mod hostile;
 mod liars;
 mod memory;
 mod privacy;

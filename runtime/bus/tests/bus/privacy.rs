@@ -7,8 +7,8 @@ use std::process::Command;
 use std::time::Duration;
 
 use qcbus_bus::{MappedImage, PeerEvent};
-use qcbus_document::fuzzing::{Tree, walk};
 use qcbus_document::{Document, FileKind};
+use qcbus_fuzzing::{Tree, walk};
 use qcbus_messages::{Digest, DocId};
 
 use crate::helper::Helper;

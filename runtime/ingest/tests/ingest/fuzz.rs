@@ -1,7 +1,8 @@
 //! The bodies of the fuzz targets on seeded input: real syntax, then damaged.
 
 use proptest::prelude::*;
-use qcbus_ingest::fuzzing;
+
+use crate::fuzzing;
 
 const SEEDS: [&str; 4] = [
     "<?xml version='1.0' encoding='UTF-8'?><OpenDRIVE><header revMajor='1'/><road id='1'>\

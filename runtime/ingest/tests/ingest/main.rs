@@ -10,6 +10,7 @@
 mod corpus;
 mod digests;
 mod fuzz;
+mod fuzzing;
 mod gather;
 mod hostile;
 mod includes;

@@ -1,8 +1,8 @@
 //! Modular scenarios: their expansion, and its robustness against arbitrary archives.
 
+use crate::fuzzing::{self, Outcome};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
-use qcbus_ingest::fuzzing::{self, Outcome};
 
 fn main_with(groups: &str) -> String {
     format!(

@@ -32,7 +32,6 @@ pub static BUNDLE: Bundle = Bundle {
     reads: qcbus_sdk::Reads::Written,
     version_of: |document| basic::version_of(document, "header"),
     rules: RULES,
-    templates: &[],
 };
 
 /// Runs the bundle under the requested name and version.
@@ -76,6 +75,7 @@ mod tests {
     fn rule_pages_are_consistent() {
         qcbus_rule_tests::pages::assert_pages(
             &super::BUNDLE,
+            &[],
             concat!(env!("CARGO_MANIFEST_DIR"), "/src/polite"),
         );
     }

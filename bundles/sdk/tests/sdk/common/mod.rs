@@ -15,5 +15,4 @@ pub const BUNDLE: Bundle = Bundle {
     reads: qcbus_sdk::Reads::Written,
     version_of: |document| basic::version_of(document, "header"),
     rules: &[],
-    templates: &[],
 };

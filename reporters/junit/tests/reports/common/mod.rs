@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use qcbus_formats::xqar::{Checker, Issue, Level, Status};
 use qcbus_messages::ResultMessage;
 use qcbus_report_junit::Suites;
-use qcbus_reporter_sdk::samples;
-pub use qcbus_reporter_sdk::samples::{blocked, checker, result};
+use qcbus_reporter_samples as samples;
+pub use qcbus_reporter_samples::{blocked, checker, result};
 use qcbus_reporter_sdk::{Destination, NoSources, ReportError, ReportFormat as _, Subject};
 
 use markup::Element;

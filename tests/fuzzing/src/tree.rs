@@ -1,7 +1,7 @@
 //! A plain tree that is written as XML and as an image at once, so its content is known without
 //! parsing.
 
-use crate::{BuildError, Capacities, ImageBuilder};
+use qcbus_document::{BuildError, Capacities, ImageBuilder};
 
 /// An element.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

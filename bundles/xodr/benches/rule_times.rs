@@ -1,15 +1,12 @@
 //! Measures the time of the rules on maps, from the image of the document.
 //!
-//! `cargo run --release -p qcbus-xodr --example rule_times -- [--rules] [--runs N] [--threads N] MAP.xodr…`
+//! `cargo bench -p qcbus-xodr --bench rule_times -- [--rules] [--runs N] [--threads N] $PWD/MAP.xodr…`
 //! prints the time of all rules together per map. With one thread (the default) it is CPU time,
 //! with more threads it is wall-clock time. `--rules` prints the wall-clock time of each rule (the
 //! minimum of all runs) for each map, sorted by the last map. `tests/xodr_speed.py` makes large
 //! maps for measurements.
 
-#![expect(
-    clippy::print_stdout,
-    reason = "an example that prints its measurements"
-)]
+#![expect(clippy::print_stdout, reason = "it prints its measurements")]
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -25,6 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             "--rules" => rules = true,
             "--runs" => runs = arguments.next().unwrap_or_default().parse()?,
             "--threads" => threads = arguments.next().unwrap_or_default().parse()?,
+            "--bench" => {} // cargo adds it
             _ => maps.push(argument),
         }
     }

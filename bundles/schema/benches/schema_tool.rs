@@ -1,5 +1,6 @@
 //! A tool for the scripts under `tests/`: compiles XSDs, validates files against tables, and
-//! measures the time of both.
+//! measures the time of both. `cargo bench -p qcbus-schema --bench schema_tool --no-run` builds it and
+//! prints its path.
 //!
 //! ```text
 //! schema_tool compile TITLE OUT XSD...   write tables
@@ -25,7 +26,10 @@ use qcbus_ingest::prepare_bytes;
 use qcbus_schema::{Limits, SHIPPED, Schema, compile};
 
 fn main() -> ExitCode {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|argument| argument != "--bench") // cargo adds it
+        .collect();
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let outcome = match words.as_slice() {
         ["compile", title, out, files @ ..] => compile_files(title, out, files),

@@ -9,7 +9,7 @@
 //! | `libraryAct` | the maneuver groups of a library file |
 //! | `libraryAction` | the content of the only `<PrivateAction>` of a library file |
 
-use qcbus_sdk::pages::Template;
+use qcbus_rule_tests::pages::Template;
 
 macro_rules! document {
     ($($text:expr),* $(,)?) => {
@@ -112,7 +112,7 @@ macro_rules! drive {
 }
 
 /// The templates. The first one is for examples without `in=`.
-pub static TEMPLATES: &[Template] = &[
+pub const TEMPLATES: &[Template] = &[
     Template {
         name: "file",
         text: document!("{example}\n"),

@@ -14,7 +14,7 @@
 //! | `signal` | the content of a `<signal>` in that road |
 //! | `junction` | the content of `<junction id="100">`, with the roads 1 (into it), 2 (within) and 3 (out of it) |
 
-use qcbus_sdk::pages::Template;
+use qcbus_rule_tests::pages::Template;
 
 macro_rules! map {
     ($($text:expr),*) => {
@@ -77,7 +77,7 @@ macro_rules! short_road {
 }
 
 /// The templates. The first one is the default for examples that name no template.
-pub(crate) const TEMPLATES: &[Template] = &[
+pub const TEMPLATES: &[Template] = &[
     Template {
         name: "map",
         text: map!("{example}\n"),

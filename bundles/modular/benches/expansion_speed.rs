@@ -1,6 +1,6 @@
 //! Measures the time of the expansion of a modular scenario in this process.
 //!
-//!     cargo run --release -p qcbus-modular --example expansion_speed FILE…
+//!     cargo bench -p qcbus-modular --bench expansion_speed -- $PWD/FILE…
 //!
 //! Prints, for each file, the median of 201 runs in microseconds. The times cover reading the file
 //! with all its dependencies (including its expanded image), expanding its documents, and writing
@@ -30,7 +30,8 @@ fn median(mut run: impl FnMut()) -> u128 {
 
 fn main() -> Result<(), LoadError> {
     println!("| file | references | load | expand | write |\n|---|--:|--:|--:|--:|");
-    for argument in std::env::args().skip(1) {
+    let is_file = |argument: &String| argument != "--bench"; // cargo adds it
+    for argument in std::env::args().skip(1).filter(is_file) {
         let path = Path::new(&argument);
         let folder = path.parent().unwrap_or(Path::new("."));
         let loaded = Loaded::from_path(path, folder)?;

@@ -10,15 +10,15 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use crate::{Host, HostEvent, Instance, Peer, PeerEvent, PeerId};
 use fastrand::Rng;
-use qcbus_bus::fuzzing::{Header, Rogue};
-use qcbus_bus::{Host, HostEvent, Instance, Peer, PeerEvent, PeerId};
 use qcbus_document::FileKind;
 use qcbus_formats::xqar::{Issue, Level};
 use qcbus_messages::services::{FRAME_BYTES, HELLO_BYTES};
 use qcbus_messages::{Catalogue, CheckerInfo, DocId, FromPeer, Hello, JobId, ToPeer, codec};
 
-use crate::support::{
+use super::rogue::{Header, Rogue};
+use super::support::{
     Site, fresh_number, hello, join, numbered, numbered_job, run_forever, watched, welcome,
 };
 
@@ -389,10 +389,10 @@ fn whatever_rogues_say_a_polite_peer_is_served() {
 }
 
 async fn join_among_the_late(table: &mut Table, site: &Site) {
-    let options = qcbus_bus::PeerOptions {
+    let options = crate::PeerOptions {
         patience: Duration::from_secs(60),
         grace: Duration::from_secs(60),
-        ..qcbus_bus::PeerOptions::default()
+        ..crate::PeerOptions::default()
     };
     let joining = Peer::join(&site.instance, hello("late"), options);
     tokio::pin!(joining);

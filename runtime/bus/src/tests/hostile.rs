@@ -6,12 +6,12 @@ use std::task::Poll;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use qcbus_bus::fuzzing::{Header, Rogue};
-use qcbus_bus::{Host, HostEvent, Instance, PeerEvent, PeerId};
+use crate::{Host, HostEvent, Instance, PeerEvent, PeerId};
 use qcbus_messages::services::FRAME_BYTES;
 use qcbus_messages::{ToPeer, codec};
 
-use crate::support::{
+use super::rogue::{Header, Rogue};
+use super::support::{
     Site, fresh_number, hello, join, numbered, numbered_job, run, watched, welcome,
 };
 

@@ -7,6 +7,17 @@ use qcbus_formats::xqar::{
     Checker, CheckerBundle, Issue, Level, Location, Locations, Metadata, Results, Status,
 };
 use qcbus_messages::{Digest, JobId, ResultMessage, Verdict};
+use qcbus_reporter_sdk::Setting;
+
+/// Returns the setting of a separate run, without colours and pages.
+pub fn plain_run() -> Setting {
+    Setting {
+        color: false,
+        keep: false,
+        is_run: true,
+        pages: |_, _| None,
+    }
+}
 
 /// Creates an issue at a row and a column of the checked file; 0 means unknown.
 pub fn issue(level: Level, uid: &str, text: &str, (row, column): (u64, u64)) -> Issue {

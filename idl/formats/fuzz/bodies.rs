@@ -1,8 +1,8 @@
 //! Bodies of fuzz targets, which take any bytes and panic if a guarantee is broken. Seeded tests
 //! run them on stable, and the wrappers for cargo-fuzz call them.
 
-use crate::config::Config;
-use crate::xqar::{self, Dialect};
+use qcbus_formats::config::{Config, Known};
+use qcbus_formats::xqar::{self, Dialect};
 
 /// Reads a configuration. Reading never panics, and a configuration that was read answers every
 /// query.
@@ -17,7 +17,7 @@ pub fn config(bytes: &[u8]) {
             .iter()
             .all(|notice| notice.row > 0 && notice.column > 0)
     );
-    let _ = config.check(&crate::config::Known::default());
+    let _ = config.check(&Known::default());
     let _ = config.input_file();
     for bundle in &config.bundles {
         assert!(config.bundle(&bundle.application, "").is_some());

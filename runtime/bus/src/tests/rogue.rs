@@ -1,4 +1,4 @@
-//! A misbehaving peer for tests of the broker's end of the bus. For tests only.
+//! A misbehaving peer.
 
 use std::collections::VecDeque;
 use std::os::unix::net::UnixStream;

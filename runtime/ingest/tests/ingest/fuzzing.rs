@@ -6,15 +6,14 @@ use std::path::Path;
 use qcbus_document::{Document, Node};
 use qcbus_messages::{Absence, DocumentRole};
 
-use crate::modular::{ExpandedImage, Expansion, Piece, SearchPath, expand, pack};
-use crate::{Limits, Reader, Source, Walking, gather, prepare_bytes, references};
+use qcbus_ingest::modular::{ExpandedImage, Expansion, Piece, SearchPath, expand, pack};
+use qcbus_ingest::{Limits, Reader, Source, Walking, gather, prepare_bytes, references};
 
 /// Checks arbitrary bytes under names of every kind. An image exists, it is valid, its places can
 /// be found, and it does not exceed its bound.
 ///
 /// # Panics
 /// If one of these conditions is violated.
-#[expect(clippy::panic, reason = "a fuzz target reports failures by panicking")]
 pub fn ingest(bytes: &[u8]) {
     let limits = Limits {
         max_file: 1 << 20,
@@ -155,7 +154,6 @@ pub fn assembled(files: &[(String, Vec<u8>)]) -> Outcome {
     }
 }
 
-#[expect(clippy::panic, reason = "a fuzz target reports failures by panicking")]
 fn sound(expansion: &Expansion<'_>, image: &[u8]) -> String {
     let text = expansion.text();
     let whole = expansion.pieces[0].document.root().is_some();

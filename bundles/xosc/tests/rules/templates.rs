@@ -33,7 +33,7 @@
 //! | `catalog` | the entries of a catalog |
 //! | `distribution` | the content of a `<ParameterValueDistribution>` |
 
-use qcbus_sdk::pages::Template;
+use qcbus_rule_tests::pages::Template;
 
 macro_rules! document {
     ($($text:expr),* $(,)?) => {
@@ -212,7 +212,7 @@ macro_rules! by_name {
 }
 
 /// The templates. The first one is the default for an example that names none.
-pub(crate) const TEMPLATES: &[Template] = by_name![
+pub const TEMPLATES: &[Template] = by_name![
     "scenario": document!("{example}\n"),
     "parameters": document!(
         "<ParameterDeclarations>\n{example}\n</ParameterDeclarations>\n<CatalogLocations/>\n<RoadNetwork/>\n",

@@ -1,13 +1,11 @@
-//! Bodies of fuzz targets, shared by `cargo fuzz` and the seeded tests, and a small writer that
+//! Random and damaged document images for tests: bodies of fuzz targets, and a small writer that
 //! makes images without a parser.
-//!
-//! This module is not part of the public interface. It may change at any time.
 
 mod tree;
 
 pub use tree::{Child, Tree};
 
-use crate::{BuildError, Capacities, Document, FaultCode, ImageBuilder, Node, XPaths};
+use qcbus_document::{BuildError, Capacities, Document, FaultCode, ImageBuilder, Node, XPaths};
 
 /// A small random generator (SplitMix64) with the same numbers on every machine.
 #[derive(Clone, Debug)]
