@@ -195,7 +195,8 @@ fn named_paths(text: &str, root: &Path) -> BTreeSet<String> {
     };
     let ours = |word: &&str| {
         let first = word.split('/').next().unwrap_or_default();
-        !first.is_empty() && first != ".." && first != "target" && root.join(first).is_dir()
+        let made = ["", "..", "target", "qcbus-out"];
+        !made.contains(&first) && root.join(first).is_dir()
     };
     quoted
         .filter(plain)
