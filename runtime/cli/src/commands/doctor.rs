@@ -321,8 +321,8 @@ fn journal(state: &Path) -> Remark {
         Some(wrong) => bad(
             what,
             wrong,
-            "stop the broker, move journal.sqlite (with -wal and -shm) away and start the broker again: all \
-             files are judged again, results stay",
+            "stop the broker, move journal.sqlite (with -wal and -shm) away and start the broker again: the \
+             results and the gate are removed, and all files are judged again",
         ),
     }
 }
