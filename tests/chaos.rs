@@ -2,7 +2,7 @@
 //! bytes.
 //!
 //! `QCBUS_CHAOS_SECONDS` makes the storm longer (8 by default), `QCBUS_CHAOS_SEED` repeats one,
-//! `QCBUS_MANY_FILES` sets how many files are dropped at once (300 by default).
+//! `QCBUS_MANY_FILES` sets how many files are dropped at once (1,500 by default).
 
 #![allow(
     clippy::unwrap_used,
@@ -82,7 +82,7 @@ fn broker_killed_under_load_loses_and_doubles_no_file() {
 
 #[test]
 fn memory_does_not_grow_with_the_number_of_files() {
-    let many = number_from("QCBUS_MANY_FILES", 300);
+    let many = number_from("QCBUS_MANY_FILES", 1500);
     let (few_kib, few) = (peak_with(many / 5), many / 5);
     let many_kib = peak_with(many);
     report(&format!(
