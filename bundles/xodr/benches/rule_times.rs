@@ -75,7 +75,7 @@ struct Measured {
 fn measure(
     map: &str,
     runs: usize,
-    hands: &Permits,
+    permits: &Permits,
 ) -> Result<Measured, Box<dyn std::error::Error>> {
     let path = Path::new(map);
     let loaded = Loaded::from_path(path, path.parent().unwrap_or(path))?;
@@ -84,11 +84,11 @@ fn measure(
     let (mut totals, mut issues) = (Vec::new(), 0);
     for _ in 0..runs.max(1) {
         // A bundle also creates a new subject for each run, so that cached data is not reused.
-        let before = clock(hands);
+        let before = clock(permits);
         let subject = loaded.subject(&qcbus_xodr::BUNDLE)?;
         let mut times = Times::default();
-        check_with(&plan, &subject, hands, &mut times);
-        totals.push(clock(hands).saturating_sub(before));
+        check_with(&plan, &subject, permits, &mut times);
+        totals.push(clock(permits).saturating_sub(before));
         issues = times.issues;
         for (checker, took) in times.took {
             let slot = rules.entry(plan.checkers()[checker].id.clone());
@@ -106,8 +106,8 @@ fn measure(
 }
 
 /// Returns the CPU time of this thread if it is the only one, otherwise the wall-clock time.
-fn clock(hands: &Permits) -> Duration {
-    let clock = match hands.count() {
+fn clock(permits: &Permits) -> Duration {
+    let clock = match permits.count() {
         1 => libc::CLOCK_THREAD_CPUTIME_ID,
         _ => libc::CLOCK_MONOTONIC,
     };

@@ -222,30 +222,25 @@ impl fmt::Display for ValueError<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let element = self.node().name();
         let name = self.attribute_name();
-        match self {
-            ValueError::Missing { .. } => write!(f, "<{element}> has no attribute '{name}'"),
+        let (attribute, expected, is_malformed) = match self {
+            ValueError::Missing { .. } => {
+                return write!(f, "<{element}> has no attribute '{name}'");
+            }
             ValueError::Malformed {
                 attribute,
                 expected,
-            } => {
-                write!(
-                    f,
-                    "attribute '{name}' of <{element}> is {}, ",
-                    Shown(attribute.value())
-                )?;
-                expected.teach_spelling(attribute.value(), f)
-            }
+            } => (attribute, expected, true),
             ValueError::OutOfRange {
                 attribute,
                 expected,
-            } => {
-                write!(
-                    f,
-                    "attribute '{name}' of <{element}> is {}, ",
-                    Shown(attribute.value())
-                )?;
-                f.write_str(expected.range())
-            }
+            } => (attribute, expected, false),
+        };
+        let value = attribute.value();
+        write!(f, "attribute '{name}' of <{element}> is {}, ", Shown(value))?;
+        if is_malformed {
+            expected.teach_spelling(value, f)
+        } else {
+            f.write_str(expected.range())
         }
     }
 }

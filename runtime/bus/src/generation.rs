@@ -338,7 +338,7 @@ mod tests {
         while !is_stray(root) {
             assert!(
                 begin.elapsed() < Duration::from_secs(120),
-                "the broker has died"
+                "memory of a dead broker must be stray"
             );
             std::thread::sleep(Duration::from_millis(1));
         }
