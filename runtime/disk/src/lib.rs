@@ -19,6 +19,7 @@ use std::sync::{LazyLock, Mutex, PoisonError, RwLock};
 use rustix::fs::{FlockOperation, flock};
 use tempfile::NamedTempFile;
 
+use temporary::parent;
 pub use temporary::{Temporary, Unnamed, remove_left};
 
 /// Prefix of temporary names. The process id and start time of the writer follow. The writer holds
@@ -177,15 +178,12 @@ fn start_writing(file: &File) {
 
 /// Writes `content` under a temporary name beside `path`.
 fn write_aside(path: &Path, content: &[u8]) -> io::Result<(File, Temporary)> {
-    let directory = match path.parent() {
-        Some(directory) if !directory.as_os_str().is_empty() => directory,
-        _ => Path::new("."),
-    };
+    let directory = parent(path);
     sweep_once(directory);
     remove_left();
     let made = make_temporary_in(directory).map_err(without_path)?;
     let (mut file, path) = made.into_parts();
-    let temporary = Temporary::new(path);
+    let temporary = Temporary::new(path).map_err(without_path)?;
     // Some file systems have no locks. There the name must suffice.
     let _ = flock(&file, FlockOperation::NonBlockingLockExclusive);
     file.write_all(content)?;
