@@ -128,11 +128,15 @@ fn report(one: &SurfaceBox<'_, '_>, roads: &[&Road<'_>], found: &mut Sink<'_>) {
     if roads.is_empty() {
         return;
     }
-    let names: Vec<String> = roads
+    let mut names: Vec<String> = roads
         .iter()
         .take(MAX_PLACES)
         .map(|road| format!("`{}`", road.id()))
         .collect();
+    let more = roads.len() - names.len();
+    if more > 0 {
+        names.push(format!("and {more} more"));
+    }
     let text = format!(
         "the surface of object `{}` extends onto road{} {} without an `objectReference` there; each road that it \
          covers must refer to it",

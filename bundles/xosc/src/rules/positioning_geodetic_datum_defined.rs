@@ -37,8 +37,11 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
         }
     );
     let finding = found.about(first, "", text);
-    match reference.or_else(|| map.header()).or_else(|| map.root()) {
-        Some(place) => finding.at(place, "the header of the map"),
+    let header = || Some((map.header()?, "the header of the map"));
+    let root = || Some((map.root()?, "the map, which has no header"));
+    let empty = reference.map(|it| (it, "the empty `geoReference` of the map"));
+    match empty.or_else(header).or_else(root) {
+        Some((place, label)) => finding.at(place, label),
         None => finding,
     };
 }
