@@ -168,7 +168,7 @@ fn pages_of_rules(
         {
             Some(index) => pairs.push((path, open.remove(index))),
             None => complaints.push(format!(
-                "{}: no listed rule has an id that ends in `{name}`",
+                "{}: no listed rule has an id that ends in `{name}`; add it to `mod.rs`, twice",
                 path.display()
             )),
         }

@@ -263,7 +263,7 @@ fn every_rule_has_edits_or_a_reason() {
     let unknown: Vec<_> = listed.iter().filter(|it| !rules.contains(it)).collect();
     assert!(
         missing.is_empty() && unknown.is_empty(),
-        "missing: {missing:#?}\nunknown: {unknown:#?}"
+        "rules without edits (add edits or `none: REASON` to edits.txt): {missing:#?}\nedits of unknown rules: {unknown:#?}"
     );
     assert_eq!(listed.len(), rules.len(), "a rule is listed twice");
     for entry in &entries {

@@ -47,7 +47,7 @@ fn every_rule_has_edits_or_a_reason() {
     let unknown: Vec<_> = listed.difference(&rules).collect();
     assert!(
         missing.is_empty() && unknown.is_empty(),
-        "missing: {missing:#?}\nunknown: {unknown:#?}"
+        "rules without edits (add edits or `none: REASON` to edits.txt): {missing:#?}\nedits of unknown rules: {unknown:#?}"
     );
     for entry in &entries {
         let one = entry.edits.is_empty() == entry.without.is_some();

@@ -71,6 +71,12 @@ impl Study<'_> {
             .filter(|entry| entry.id.contains(&wanted))
             .collect();
         let (faults, harmless, errors) = self.try_all(&entries).split();
+        if errors.is_empty() && faults.done.is_empty() && harmless.done.is_empty() {
+            return tell(&format!(
+                "skipped: none of the {} is available\n",
+                self.what
+            ));
+        }
         tell(&counts("faults", &faults, "found", |it| {
             it.found.is_enough()
         }));
@@ -78,12 +84,6 @@ impl Study<'_> {
             it.is_alarm()
         }));
         assert!(errors.is_empty(), "cannot be tried:\n{}", errors.join("\n"));
-        if faults.done.is_empty() && harmless.done.is_empty() {
-            return tell(&format!(
-                "skipped: none of the {} is available\n",
-                self.what
-            ));
-        }
         if !wanted.is_empty() {
             return told(&faults, &harmless);
         }
@@ -106,8 +106,8 @@ impl Study<'_> {
     }
 }
 
-/// Returns the number of tried, counted and skipped entries of each producer. Missing files are
-/// reported as skipped.
+/// Returns the number of tried, counted and skipped entries of each producer. Files that are
+/// missing are skipped.
 fn counts(
     sort: &str,
     trials: &Trials<'_>,
