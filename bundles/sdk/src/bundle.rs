@@ -180,10 +180,6 @@ fn checkers_of(rule: &'static dyn AnyRule) -> Vec<Checker> {
     let backport = Checker {
         id: format!("{}{BACKPORT_SUFFIX}", facts.id),
         is_backport: true,
-        description: format!(
-            "In versions before the rule was introduced: {}",
-            plain.description
-        ),
         ..plain.clone()
     };
     vec![plain, backport]

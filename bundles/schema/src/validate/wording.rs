@@ -10,7 +10,7 @@ use crate::defects;
 use crate::model::{AttributeUse, ElementDecl, Model, Schema};
 use crate::names::NameId;
 use crate::similar::closest;
-use crate::simple::{EXPRESSION, Expectation, SimpleType};
+use crate::simple::{EXPRESSION, Expectation, SimpleType, XML_SPACE};
 use crate::work::steps;
 
 /// The text of a violation, and the schema defect that causes it, if one is known.
@@ -244,7 +244,7 @@ fn unknown_child(
     schema: &Schema,
 ) -> Wording {
     let (name, parent) = (node.name(), parent.name());
-    let mut text = format!("<{parent}> has no child <{name}>, expected {expected}");
+    let mut text = format!("<{name}> is not allowed in <{parent}>, expected {expected}");
     if suggestion.is_none() {
         text += &homes(name, schema);
     }
@@ -442,8 +442,18 @@ pub(super) fn missing_attribute(
 }
 
 pub(super) fn unexpected_text(node: Node<'_>, text: &str) -> Wording {
-    let (name, text) = (node.name(), quote(text.trim()));
-    format!("<{name}> may not contain text, but contains {text}").into()
+    let text = text.trim_matches(XML_SPACE);
+    // Some editors insert spaces that are no white space in XML. In quotes they would be invisible.
+    let invisible = text.chars().next().filter(|_| text.trim().is_empty());
+    let shown = match invisible {
+        Some(c) => format!("the invisible character U+{:04X}", u32::from(c)),
+        None => quote(text),
+    };
+    format!(
+        "<{}> may not contain text, but contains {shown}",
+        node.name()
+    )
+    .into()
 }
 
 pub(super) fn blank_text(node: Node<'_>) -> Wording {

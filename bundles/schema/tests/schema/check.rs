@@ -447,3 +447,22 @@ fn violation_message_explains_attribute_conflict() {
         "{dangling:?}"
     );
 }
+
+#[test]
+fn invisible_text_is_named_by_its_code_point() {
+    let text = map("revMajor=\"1\" revMinor=\"7\"", "").replace("<planView>", "\u{a0}<planView>");
+    let bytes = image("t.xodr", &text);
+    let Outcome::Checked(checked) = check(&open(&bytes), FileKind::Xodr, &Options::default())
+    else {
+        panic!("not checked");
+    };
+    let texts: Vec<&str> = checked
+        .violations
+        .iter()
+        .map(|it| it.text.as_str())
+        .collect();
+    assert_eq!(
+        texts,
+        ["<road> may not contain text, but contains the invisible character U+00A0"]
+    );
+}

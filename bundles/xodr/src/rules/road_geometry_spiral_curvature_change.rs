@@ -29,10 +29,14 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 if change.is_nan() || change > least {
                     continue;
                 }
-                let instead = if start.abs() <= least { "line" } else { "arc" };
+                let instead = if start.abs() <= least {
+                    "a `line`"
+                } else {
+                    "an `arc`"
+                };
                 let text = format!(
                     "the spiral starts with curvature {} and ends with {}; they should differ; a geometry of \
-                     constant curvature should be a `{instead}`",
+                     constant curvature should be {instead}",
                     shown::number(start),
                     shown::number(end)
                 );

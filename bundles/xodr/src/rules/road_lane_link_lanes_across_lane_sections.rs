@@ -94,11 +94,12 @@ fn not_returned(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
         }
         let back = joint.to.end.link_name();
         let text = format!(
-            "{} has {} as its {}, but that lane does not have the first one as its {back}; lanes that continue \
-             must be linked in both directions",
+            "{} has {} as its {}, which does not have {} as its {back}; lanes that continue must be linked in both \
+             directions",
             lane_name(from),
             lane_name(to),
-            joint.from.end.link_name()
+            joint.from.end.link_name(),
+            lane_name(from)
         );
         found
             .issue(to.node(), text)

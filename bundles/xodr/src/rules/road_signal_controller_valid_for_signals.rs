@@ -32,11 +32,17 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         });
         let names = |control: Control<'_>| control.signal_id().is_none_or(|id| known.contains(id));
         if !controller.controls().any(names) {
-            let text = format!(
-                "none of the {} signals that {} controls exists; it must control at least one existing signal",
-                controller.controls().count(),
-                named(node)
-            );
+            let subject = match controller.controls().count() {
+                1 => format!(
+                    "the only signal that {} controls does not exist",
+                    named(node)
+                ),
+                count => format!(
+                    "none of the {count} signals that {} controls exists",
+                    named(node)
+                ),
+            };
+            let text = format!("{subject}; it must control at least one existing signal");
             found.issue(node, text);
         }
     }

@@ -197,13 +197,13 @@ fn not_looked_for(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         return;
     };
     let more = match positions.count() {
-        0 => String::new(),
-        1 => ", nor the road of one more position".to_owned(),
-        count => format!(", nor the roads of {count} more positions"),
+        0 => " was".to_owned(),
+        1 => " and one more road were".to_owned(),
+        count => format!(" and the roads of {count} more positions were"),
     };
     let road = first.text("roadId").unwrap_or_default();
     let text = format!(
-        "the road {} cannot be looked up{more}, because the map could not be read",
+        "the road {}{more} not checked, because the map could not be read",
         quoted(first, "roadId", &road)
     );
     found.about(first, "roadId", text).level(Level::Warning);

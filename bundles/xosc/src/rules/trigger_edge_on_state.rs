@@ -39,13 +39,18 @@ fn of_time(time: Element<'_, '_>, edge: &str) -> Option<(Level, String)> {
                  `rising` one does"
             ),
         )),
-        ("rising", "lessThan" | "lessOrEqual") => Some((
-            Level::Warning,
-            format!(
-                "the time is less than {wanted} s from the beginning or never; a `rising` edge never occurs, \
-                 only a `falling` one does"
-            ),
-        )),
+        // The rule `trigger_never_true` reports smaller values.
+        ("rising", "lessThan" | "lessOrEqual")
+            if value > 0.0 || (value == 0.0 && &*rule == "lessOrEqual") =>
+        {
+            Some((
+                Level::Warning,
+                format!(
+                    "the time is less than {wanted} s from the beginning; a `rising` edge never occurs, only a \
+                     `falling` one does"
+                ),
+            ))
+        }
         ("rising", "equalTo" | "greaterOrEqual") if value == 0.0 => Some((
             Level::Information,
             format!(

@@ -28,9 +28,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 "lessOrEqual" | "equalTo" => value < 0.0,
                 _ => false,
             };
-            // Other rules report numbers below zero and edges that never occur.
-            let is_time = condition.is("SimulationTimeCondition");
-            if !never || (value < 0.0 && !is_time) || (is_time && rises(condition, &rule)) {
+            // For the other quantities, the range rules report numbers below zero.
+            if !never || (value < 0.0 && !condition.is("SimulationTimeCondition")) {
                 continue;
             }
             let text = format!(
@@ -40,11 +39,4 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             found.about(condition, "value", text);
         }
     }
-}
-
-fn rises(condition: Element<'_, '_>, rule: &str) -> bool {
-    let edge = condition
-        .ancestor("Condition")
-        .and_then(|around| around.word("conditionEdge"));
-    rule != "equalTo" && edge.as_deref() == Some("rising")
 }

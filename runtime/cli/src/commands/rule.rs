@@ -153,7 +153,10 @@ fn page(checker: &Checker) -> String {
     let level = facts.level.as_str();
     let versions = match &checker.range {
         Ok(range) if range.is_everything() => "every version".to_owned(),
-        Ok(range) => format!("versions {range}"),
+        Ok(range) => match range.to_string() {
+            text if text.starts_with("versions ") => text,
+            text => format!("versions {text}"),
+        },
         Err(why) => why.clone(),
     };
     let _ = writeln!(head, "  level {level}, {versions}");

@@ -164,8 +164,12 @@ fn peer_line(peer: &PeerStatus) -> String {
     if let Some(trials) = &peer.trials {
         let _ = write!(line, ", {}", super::trials::counted(trials));
     }
-    if peer.restarts > 0 {
-        let _ = write!(line, ", restarted {} times", peer.restarts);
+    match peer.restarts {
+        0 => {}
+        1 => line.push_str(", restarted once"),
+        times => {
+            let _ = write!(line, ", restarted {times} times");
+        }
     }
     if let Some(sandbox) = &peer.sandbox {
         let _ = match sandbox.state.as_str() {

@@ -328,6 +328,8 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
     fn bad_name(&mut self, file: File<'t>, from: usize, name: &str) -> Result<(), Stop> {
         let text = if name.is_empty() {
             "no element name follows <; a literal < is written &lt;".to_string()
+        } else if name.starts_with("<<<<<<") {
+            "merge conflict marker; resolve the conflict".to_string()
         } else {
             format!("{:?} is not a valid element name", shown(name))
         };
@@ -450,7 +452,10 @@ impl<'p, 't, S: Sink> Parser<'p, 't, S> {
         };
         let Some(name) = repeated else { return Ok(()) };
         let at = offset_in(file.text, name);
-        let text = format!("the attribute {} appears twice in one element", shown(name));
+        let text = format!(
+            "the attribute `{}` appears twice in one element",
+            shown(name)
+        );
         self.fault(file, FaultCode::DuplicateAttribute, at, &text)
     }
 

@@ -176,7 +176,7 @@ impl<'t> AttributeScanner<'t> {
 
     #[cold]
     fn no_value(&self, name: Range<usize>) -> TagFault {
-        let text = format!("the attribute {} has no value", &self.text[name.clone()]);
+        let text = format!("the attribute `{}` has no value", &self.text[name.clone()]);
         TagFault {
             code: FaultCode::BadAttribute,
             offset: name.start,
@@ -186,10 +186,13 @@ impl<'t> AttributeScanner<'t> {
 
     #[cold]
     fn unquoted(&self, offset: usize, name: Range<usize>) -> TagFault {
-        let text = format!(
-            "the value of the attribute {} is not in quotes",
-            &self.text[name]
-        );
+        let name = &self.text[name];
+        let rest = &self.text[self.text.ceil_char_boundary(offset)..self.end];
+        // Word processors replace straight quotes.
+        let text = match rest.starts_with(['“', '”', '„', '‘', '’']) {
+            true => format!("the value of the attribute `{name}` has typographic quotes; use \""),
+            false => format!("the value of the attribute `{name}` is not in quotes"),
+        };
         TagFault {
             code: FaultCode::BadAttribute,
             offset,
@@ -287,25 +290,31 @@ mod tests {
                 " a",
                 FaultCode::BadAttribute,
                 1,
-                "the attribute a has no value",
+                "the attribute `a` has no value",
             ),
             (
                 " a b='1'",
                 FaultCode::BadAttribute,
                 1,
-                "the attribute a has no value",
+                "the attribute `a` has no value",
             ),
             (
                 " a=1",
                 FaultCode::BadAttribute,
                 3,
-                "the value of the attribute a is not in quotes",
+                "the value of the attribute `a` is not in quotes",
             ),
             (
                 " a=",
                 FaultCode::BadAttribute,
                 3,
-                "the value of the attribute a is not in quotes",
+                "the value of the attribute `a` is not in quotes",
+            ),
+            (
+                " a=“1”",
+                FaultCode::BadAttribute,
+                3,
+                "the value of the attribute `a` has typographic quotes; use \"",
             ),
             (
                 " a='1",

@@ -161,3 +161,25 @@ fn values_and_character_data_are_resolved() {
         " < b\r"
     );
 }
+
+/// Returns the text of the first fault.
+fn first_text(text: &str) -> String {
+    let image = image(text);
+    let document = Document::open(&image).unwrap();
+    let first = document.faults().next();
+    first.map_or_else(String::new, |fault| fault.text.to_owned())
+}
+
+#[test]
+fn common_content_of_other_kinds_is_named() {
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
+    let conflict = "<a>\n<<<<<<< HEAD\n<b/>\n=======\n<c/>\n>>>>>>> other\n</a>";
+    for (text, expected) in [
+        (pointer, "Git LFS pointer"),
+        (conflict, "merge conflict marker"),
+        ("<a b=“1”/>", "typographic quotes"),
+    ] {
+        let found = first_text(text);
+        assert!(found.contains(expected), "{found}");
+    }
+}

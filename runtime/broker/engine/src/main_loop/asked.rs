@@ -100,9 +100,7 @@ impl Broker {
                 notices: self.loaded.notices.clone(),
             },
             Err(error) => Response::Failed {
-                reason: format!(
-                    "nothing was changed, the previous settings stay in force: {error}"
-                ),
+                reason: format!("reload failed, the previous settings stay in force: {error}"),
             },
         }
     }

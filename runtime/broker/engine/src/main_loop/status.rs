@@ -50,7 +50,7 @@ impl Broker {
         troubles.extend(self.state.hindrances());
         if let Some(why) = &self.not_in_force {
             troubles.push(format!(
-                "the configuration on disk is not in force, because no broker would start with it: {why}"
+                "the configuration on disk is not in force, because it has an error: {why}"
             ));
         }
         troubles

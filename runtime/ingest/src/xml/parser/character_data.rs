@@ -58,10 +58,12 @@ impl<'t, S: Sink> Parser<'_, 't, S> {
         }
         let at = from + (text.len() - text.trim_ascii_start().len());
         let place = if after { "after" } else { "before" };
-        let message = format!(
-            "text {place} the root element: {:?}",
-            shown(text.trim_ascii())
-        );
+        let text = text.trim_ascii();
+        let message = if text.starts_with("version https://git-lfs") {
+            "this is a Git LFS pointer instead of the file; run `git lfs pull`".to_owned()
+        } else {
+            format!("text {place} the root element: {:?}", shown(text))
+        };
         self.fault(file, FaultCode::TextOutsideRoot, at, &message)
     }
 
