@@ -308,6 +308,7 @@ mod tests {
     use std::time::SystemTime;
 
     use super::*;
+    use crate::tests::unlocked;
 
     fn root() -> PathBuf {
         let prefix = format!("qc{:015x}g1_", random() >> 4);
@@ -331,19 +332,6 @@ mod tests {
         removal_lock::lock_and_remove(&root).unwrap();
     }
 
-    /// Waits until nobody locks the root. A test in another thread that starts a process passes the locked
-    /// descriptor to it until its `exec`.
-    fn wait_until_stray(root: &Path) {
-        let begin = std::time::Instant::now();
-        while !is_stray(root) {
-            assert!(
-                begin.elapsed() < Duration::from_secs(120),
-                "memory of a dead broker must be stray"
-            );
-            std::thread::sleep(Duration::from_millis(1));
-        }
-    }
-
     #[test]
     fn memory_of_a_starting_broker_is_not_stray() {
         let root = root();
@@ -351,7 +339,7 @@ mod tests {
         let life = lock_life(&root, || seen = Some(is_stray(&root))).unwrap();
         assert_eq!((seen, is_stray(&root)), (Some(false), false));
         drop(life);
-        wait_until_stray(&root);
+        unlocked("the memory of a dead broker is stray", || is_stray(&root));
         removal_lock::lock_and_remove(&root).unwrap();
     }
 
@@ -363,7 +351,7 @@ mod tests {
         age(&root, UNLOCKED_FOR);
         assert!(!is_stray(&root));
         drop(life);
-        wait_until_stray(&root);
+        unlocked("the memory of a dead broker is stray", || is_stray(&root));
         removal_lock::lock_and_remove(&root).unwrap();
     }
 
