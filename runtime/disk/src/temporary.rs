@@ -55,13 +55,8 @@ impl Temporary {
             return Err(Unnamed { error, file: self });
         }
         // The name is no longer temporary, so it must not be removed.
-        match self.path.take().map(TempPath::keep).transpose() {
-            Ok(_) => Ok(()),
-            Err(refused) => Err(Unnamed {
-                error: refused.error,
-                file: self,
-            }),
-        }
+        drop(self.path.take().map(TempPath::keep));
+        Ok(())
     }
 
     fn rename(&self, place: &Path) -> io::Result<()> {
