@@ -267,7 +267,7 @@ impl Driver {
     }
 
     /// Returns the last actions, the log of the broker and its current state.
-    fn what_is(&self) -> String {
+    pub(super) fn what_is(&self) -> String {
         let status = self.farm.status();
         let peers = status.iter().flat_map(|it| &it.peers);
         let peers: Vec<String> = peers.map(|it| format!("{it:?}")).collect();

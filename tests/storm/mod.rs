@@ -24,7 +24,7 @@ use crate::support::cli::files_below;
 use crate::support::content::Content;
 use crate::support::farm::{Farm, shm_segments, tail};
 use crate::support::inside::is_inside;
-use crate::support::judge::{judge_with, verdicts_in_journal};
+use crate::support::judge::{bases_in_journal, judge_with, verdicts_in_journal};
 use crate::support::processes::{peak_private_kib, private_kib};
 use crate::support::reports::{REPORTS, reported};
 use crate::support::watchdog::until_or;
@@ -154,18 +154,31 @@ fn condemned_are_few(driver: &Driver, condemned: &BTreeMap<String, u64>) {
     }
 }
 
-/// Restarts the broker and returns how many unchanged files are checked a second time. A file with
-/// a verdict must keep it over a restart.
-fn judged_again_for_nothing(driver: &mut Driver) -> u64 {
+/// Restarts the broker and returns how many unchanged files are checked a second time, and why. A
+/// file with a verdict must keep it over a restart.
+fn judged_again_for_nothing(driver: &mut Driver) -> (u64, String) {
     let jobs =
         |driver: &Driver| -> u64 { verdicts_in_journal(&driver.farm.journal()).values().sum() };
-    let before = jobs(driver);
+    let (before, bases) = (jobs(driver), bases_in_journal(&driver.farm.journal()));
     if let Some(broker) = &mut driver.broker {
         broker.kill();
     }
     driver.start_broker();
     driver.farm.settle(driver.files.len());
-    jobs(driver) - before
+    let doubled = jobs(driver) - before;
+    if doubled == 0 {
+        return (0, String::new());
+    }
+    let after = bases_in_journal(&driver.farm.journal());
+    let changed = after
+        .iter()
+        .filter(|(path, now)| bases.get(*path) != Some(*now));
+    let changed = changed.take(3).map(|(path, now)| {
+        let before = bases.get(path);
+        format!("{path}:\n  before {before:?}\n  after  {now:?}\n")
+    });
+    let why = format!("{}{}", changed.collect::<String>(), driver.what_is());
+    (doubled, why)
 }
 
 fn demand(mut driver: Driver, seen: usize, start_kib: u64, end_kib: u64, seconds: u64) {
@@ -192,7 +205,7 @@ fn demand(mut driver: Driver, seen: usize, start_kib: u64, end_kib: u64, seconds
     let verdict = driver.farm.verdict("fresh.xodr");
     assert_eq!(verdict.verdict, fresh.verdict(), "{verdict:?}");
     driver.sample();
-    let doubled = judged_again_for_nothing(&mut driver);
+    let (doubled, why) = judged_again_for_nothing(&mut driver);
     let verdicts: u64 = verdicts_in_journal(&driver.farm.journal()).values().sum();
     let condemned: u64 = judgement.condemned.values().sum();
     let (files, peak) = (driver.files.len(), driver.peak_kib);
@@ -217,8 +230,7 @@ fn demand(mut driver: Driver, seen: usize, start_kib: u64, end_kib: u64, seconds
     assert_eq!(
         (lost, doubled),
         (0, 0),
-        "no verdict may be lost or doubled\n{}",
-        tally.last_lines()
+        "no verdict may be lost or doubled\n{why}"
     );
     report(&format!(
         "chaos: {seconds} s: {} kills survived ({tally}); {files} files in the end, {verdicts} \

@@ -277,6 +277,20 @@ pub fn verdicts_in_journal(journal: &Path) -> BTreeMap<(String, String, String),
     rows.unwrap().map(Result::unwrap).collect()
 }
 
+/// Returns what the present verdict on each path is based on: the digests of the file and the
+/// configuration, and the bundles with their versions.
+pub fn bases_in_journal(journal: &Path) -> BTreeMap<String, [String; 4]> {
+    let connection = rusqlite::Connection::open(journal).unwrap();
+    let mut query = connection
+        .prepare("SELECT path, digest, config, required_set, inputs FROM files")
+        .unwrap();
+    let rows = query.query_map([], |row| {
+        let basis = [row.get(1)?, row.get(2)?, row.get(3)?, row.get(4)?];
+        Ok((row.get(0)?, basis))
+    });
+    rows.unwrap().map(Result::unwrap).collect()
+}
+
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
