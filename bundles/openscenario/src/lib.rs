@@ -10,6 +10,7 @@
 pub mod expr;
 
 mod queries;
+mod timeline;
 mod types;
 
 pub use qcbus_schema::closest;
@@ -17,6 +18,10 @@ pub use queries::actors::Actors;
 pub use queries::element::Element;
 pub use queries::network::Network;
 pub use queries::scenario::Scenario;
+pub use timeline::{
+    Comparison, Condition, Edge, Logic, Moment, Part, Plan, Priority, Span, Spans, Start, State,
+    Strictness, Takes, Trigger,
+};
 pub use types::catalogs::{CatalogKind, Entry, Resolution};
 pub use types::data_type::{DataType, Value, parse_double};
 pub use types::date_time::{DateTime, DateTimeError};

@@ -6,4 +6,5 @@ mod catalogs;
 mod expressions;
 mod expressions_hostile;
 mod expressions_oracle;
+mod played;
 mod values;

@@ -1,0 +1,58 @@
+//! The bounds of the timeline hold in random runs of random storyboards.
+
+mod player;
+mod storyboards;
+
+use player::{Run, play};
+use proptest::prelude::*;
+use qcbus_openscenario::{Moment, Plan, Spans, Strictness};
+
+/// Tolerance for comparisons of times, in seconds.
+const CLOSE: f64 = 1e-3;
+
+/// Checks a moment of a run against its bounds. `until` is the end of the run.
+fn holds(what: &str, place: usize, bounds: Moment, found: Option<f64>, until: f64) {
+    match found {
+        Some(time) => assert!(
+            time >= bounds.earliest - CLOSE && time <= bounds.latest + CLOSE,
+            "{what} of {place} at {time}, expected within {bounds:?}"
+        ),
+        None => assert!(
+            bounds.latest + CLOSE >= until,
+            "{what} of {place} never came before {until}, expected within {bounds:?}"
+        ),
+    }
+}
+
+fn check(plan: &Plan, run: &Run) {
+    for strictness in [Strictness::Standard, Strictness::Tolerant] {
+        let spans = Spans::of(plan, strictness);
+        for (place, lived) in run.lives.iter().enumerate() {
+            let span = spans.get(place).unwrap();
+            holds("start", place, span.start, lived.start, run.until);
+            holds("end", place, span.end, lived.end, run.until);
+            holds("completion", place, span.complete, lived.complete, run.until);
+            if let Some(time) = lived.stopped {
+                assert!(time >= span.stopped.earliest - CLOSE, "stop of {place} at {time}: {span:?}");
+            }
+        }
+        match run.stopped {
+            true => holds("end of the run", 0, spans.ends, Some(run.until), run.until),
+            false => holds("end of the run", 0, spans.ends, None, run.until),
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(), ..ProptestConfig::default() })]
+
+    #[test]
+    fn bounds_hold_in_every_run(plan in storyboards::random(), seed in any::<u64>()) {
+        check(&plan.0, &play(&plan.0, seed));
+    }
+}
+
+fn cases() -> u32 {
+    let wanted = std::env::var("QCBUS_RUNS").ok();
+    wanted.and_then(|it| it.parse().ok()).unwrap_or(2000)
+}
