@@ -20,7 +20,7 @@ pub use queries::network::Network;
 pub use queries::scenario::Scenario;
 pub use timeline::{
     Comparison, Condition, Edge, Logic, Moment, Part, Plan, Priority, Span, Spans, Start, State,
-    Strictness, Takes, Trigger,
+    Strictness, Takes, Timeline, Trigger,
 };
 pub use types::catalogs::{CatalogKind, Entry, Resolution};
 pub use types::data_type::{DataType, Value, parse_double};

@@ -7,6 +7,7 @@ use qcbus_document::{Attribute, Document, FileKind};
 use qcbus_schema::Typing;
 
 use crate::Version;
+use crate::timeline::Timeline;
 use crate::types::catalogs::{AssignmentProblem, Catalogs, Link};
 use crate::types::data_type::{DataType, Value};
 use crate::types::declaration::Declared;
@@ -40,6 +41,7 @@ pub struct Scenario<'d> {
     pub(super) entry_faults: OnceLock<Vec<(ContextId, ValueFault<'d>)>>,
     pub(super) entities: OnceLock<Entities<'d>>,
     pub(super) storyboard: OnceLock<Storyboard<'d>>,
+    pub(crate) timeline: OnceLock<Option<Timeline>>,
 }
 
 /// Version that is assumed for files without a version.
@@ -73,6 +75,7 @@ impl<'d> Scenario<'d> {
             entry_faults: OnceLock::new(),
             entities: OnceLock::new(),
             storyboard: OnceLock::new(),
+            timeline: OnceLock::new(),
         })
     }
 

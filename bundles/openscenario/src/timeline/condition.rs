@@ -1,7 +1,7 @@
 //! When conditions and triggers are true.
 
 use super::moment::{Moment, Times};
-use super::plan::{Comparison, Condition, Edge, Logic, Plan, Priority, State, Trigger};
+use super::plan::{Comparison, Condition, Edge, Logic, Priority, State, Tree, Trigger};
 use super::play::{STEP, Spans, Strictness};
 use crate::types::storyboard::StoryKind;
 
@@ -47,7 +47,7 @@ impl Truth {
 
 /// What is known while conditions are evaluated.
 pub(super) struct Known<'p> {
-    pub(super) plan: &'p Plan,
+    pub(super) tree: &'p Tree<'p>,
     pub(super) spans: &'p Spans,
     pub(super) strictness: Strictness,
 }
@@ -70,6 +70,7 @@ impl Known<'_> {
             must: must.later(delay),
             once: edged
                 .once
+                .filter(|(from, _)| *from > since.latest)
                 .map(|(from, to)| (from + delay, to + delay)),
         }
     }
@@ -80,7 +81,11 @@ impl Known<'_> {
                 let times = time(*comparison, *value);
                 let is_moment = *comparison == Comparison::EqualTo;
                 // A step may miss a single moment.
-                let must = if is_moment { Times::none() } else { times.clone() };
+                let must = if is_moment {
+                    Times::none()
+                } else {
+                    times.clone()
+                };
                 Truth::level(times, must)
             }
             Logic::State(place, state) => {
@@ -101,7 +106,7 @@ impl Known<'_> {
         let Some(span) = self.spans.get(place) else {
             return Truth::unknown();
         };
-        let repeats = self.plan.repeats(place);
+        let repeats = self.tree.plan.repeats(place);
         let last = |once: f64| self.last(place, once);
         match state {
             State::Standby => self.standby(place),
@@ -114,7 +119,7 @@ impl Known<'_> {
                 )
             }
             State::Complete => {
-                let must = match self.plan.is_looped(place) {
+                let must = match self.tree.plan.is_looped(place) {
                     true => Times::none(),
                     false => Times::from(span.complete.latest),
                 };
@@ -137,10 +142,10 @@ impl Known<'_> {
 
     /// Returns the latest time of something that happens at `once` in each execution.
     fn last(&self, place: usize, once: f64) -> f64 {
-        if self.plan.is_looped(place) {
+        if self.tree.plan.is_looped(place) {
             return f64::INFINITY;
         }
-        match self.plan.repeated_event(place) {
+        match self.tree.plan.repeated_event(place) {
             Some(event) => {
                 let event = self.spans.get(event);
                 event.map_or(f64::INFINITY, |it| it.complete.latest)
@@ -150,7 +155,8 @@ impl Known<'_> {
     }
 
     fn standby(&self, place: usize) -> Truth {
-        let (Some(span), Some(part)) = (self.spans.get(place), self.plan.parts.get(place)) else {
+        let (Some(span), Some(part)) = (self.spans.get(place), self.tree.plan.parts.get(place))
+        else {
             return Truth::unknown();
         };
         let until = self.last(place, span.start.latest);
@@ -168,25 +174,16 @@ impl Known<'_> {
     /// Returns the earliest time at which an event can be skipped, or infinity. Only events of
     /// priority `skip` are, and only if another event of their maneuver can run.
     fn skipped(&self, place: usize) -> f64 {
-        let Some(part) = self.plan.parts.get(place) else {
+        let Some(part) = self.tree.plan.parts.get(place) else {
             return 0.0;
         };
         let is_known = matches!(part.priority, Priority::Parallel | Priority::Override);
         if part.kind != StoryKind::Event || is_known {
             return f64::INFINITY;
         }
-        let others = self.siblings(place);
+        let others = self.tree.siblings(place);
         let running = others.filter_map(|other| Some(self.spans.get(other)?.start.earliest));
         running.fold(f64::INFINITY, f64::min)
-    }
-
-    /// Returns the other elements with the same parent.
-    pub(super) fn siblings(&self, place: usize) -> impl Iterator<Item = usize> + '_ {
-        let parent = self.plan.parent(place);
-        let parts = self.plan.parts.iter().enumerate();
-        parts
-            .filter(move |(at, part)| *at != place && part.parent == parent)
-            .map(|(at, _)| at)
     }
 
     fn edge(&self, truth: Truth, edge: Edge, since: Moment) -> Truth {
@@ -239,13 +236,14 @@ impl Known<'_> {
         let must = truths
             .iter()
             .fold(looked, |must, truth| must.intersect(&truth.must));
-        let mut by = must.first();
+        // A step may miss what is true for less than a step.
+        let mut by = must.first_lasting(STEP);
         for (at, truth) in truths.iter().enumerate() {
             let Some((from, to)) = truth.once.filter(|(from, _)| *from > since.latest) else {
                 continue;
             };
             let mut others = truths.iter().enumerate().filter(|(other, _)| *other != at);
-            if others.all(|(_, other)| other.must.covers(from, to)) {
+            if others.all(|(_, other)| other.must.covers(from, to + STEP)) {
                 by = by.min(to);
             }
         }
@@ -284,7 +282,7 @@ impl Known<'_> {
             Logic::Time(Comparison::NotEqualTo, _) | Logic::Unknown => None,
             Logic::Time(..) => (condition.edge != Edge::None).then_some(1),
             Logic::State(place, state) => {
-                if self.plan.repeats(*place) {
+                if self.tree.plan.repeats(*place) {
                     return None;
                 }
                 let lasts = matches!(state, State::Standby | State::Running | State::Complete);
@@ -311,8 +309,6 @@ fn time(comparison: Comparison, value: f64) -> Times {
         Comparison::LessThan if value <= 0.0 => Times::none(),
         Comparison::LessThan | Comparison::LessOrEqual => Times::between(0.0, value),
         Comparison::NotEqualTo if value < 0.0 => Times::always(),
-        Comparison::NotEqualTo => {
-            Times::between(0.0, value).unite(&Times::between(after, never))
-        }
+        Comparison::NotEqualTo => Times::between(0.0, value).unite(&Times::between(after, never)),
     }
 }

@@ -5,11 +5,46 @@
 
 mod condition;
 mod moment;
+mod of_scenario;
 mod plan;
 mod play;
+mod rivals;
+mod takes;
 
 pub use moment::Moment;
 pub use plan::{
     Comparison, Condition, Edge, Logic, Part, Plan, Priority, Start, State, Takes, Trigger,
 };
 pub use play::{Span, Spans, Strictness};
+
+use crate::queries::scenario::Scenario;
+
+/// When the elements of a storyboard start and end.
+#[derive(Debug)]
+pub struct Timeline {
+    /// The storyboard that was played.
+    pub plan: Plan,
+    /// Bounds by the standard.
+    pub standard: Spans,
+    /// Bounds that hold in every known simulator.
+    pub tolerant: Spans,
+}
+
+impl Timeline {
+    fn of(scenario: &Scenario<'_>) -> Option<Timeline> {
+        let plan = of_scenario::plan(scenario)?;
+        Some(Timeline {
+            standard: Spans::of(&plan, Strictness::Standard),
+            tolerant: Spans::of(&plan, Strictness::Tolerant),
+            plan,
+        })
+    }
+}
+
+impl Scenario<'_> {
+    /// Plays the storyboard. Returns `None` if a part of it is unknown, such as a maneuver of a
+    /// missing catalog.
+    pub fn timeline(&self) -> Option<&Timeline> {
+        self.timeline.get_or_init(|| Timeline::of(self)).as_ref()
+    }
+}

@@ -87,6 +87,12 @@ impl Times {
         self.0.first().map_or(f64::INFINITY, |(from, _)| *from)
     }
 
+    /// Returns the begin of the first interval that lasts so long, or infinity.
+    pub(super) fn first_lasting(&self, seconds: f64) -> f64 {
+        let mut lasting = self.0.iter().filter(|(from, to)| to - from >= seconds);
+        lasting.next().map_or(f64::INFINITY, |(from, _)| *from)
+    }
+
     pub(super) fn intersect(&self, other: &Times) -> Times {
         let mut found = Vec::new();
         for (from, to) in &self.0 {
@@ -151,7 +157,8 @@ impl Times {
                     rest.push((from, to.min(*low)));
                 }
                 let keeps_end = *high < f64::INFINITY && (to > *high || (ends && to >= *high));
-                if keeps_end && !(keeps_begin && *high <= *low) {
+                let is_same = keeps_begin && *high <= *low && to <= *high;
+                if keeps_end && !is_same {
                     rest.push((from.max(*high), to));
                 }
             }

@@ -29,8 +29,10 @@ pub struct Part {
     pub priority: Priority,
     /// How long an action takes.
     pub takes: Takes,
-    /// Whether something may stop an action: indices of actions that control the same thing.
+    /// Actions that stop this action when they start, because they control the same thing.
     pub rivals: Vec<usize>,
+    /// Whether further actions may stop it.
+    pub is_open: bool,
 }
 
 /// What starts an element.
@@ -157,9 +159,7 @@ impl Plan {
     pub(super) fn is_looped(&self, place: usize) -> bool {
         self.around(place).any(|at| {
             let part = self.parts.get(at);
-            part.is_some_and(|it| {
-                it.kind == StoryKind::ManeuverGroup && it.executions != Some(1)
-            })
+            part.is_some_and(|it| it.kind == StoryKind::ManeuverGroup && it.executions != Some(1))
         })
     }
 
@@ -174,5 +174,34 @@ impl Plan {
     /// Checks whether the element may start more than once.
     pub(super) fn repeats(&self, place: usize) -> bool {
         self.is_looped(place) || self.repeated_event(place).is_some()
+    }
+}
+
+/// A plan with the children of each element.
+pub(super) struct Tree<'p> {
+    pub(super) plan: &'p Plan,
+    children: Vec<Vec<usize>>,
+}
+
+impl<'p> Tree<'p> {
+    pub(super) fn of(plan: &'p Plan) -> Tree<'p> {
+        let mut children = vec![Vec::new(); plan.parts.len()];
+        for (at, part) in plan.parts.iter().enumerate() {
+            if let Some(of) = part.parent.and_then(|parent| children.get_mut(parent)) {
+                of.push(at);
+            }
+        }
+        Tree { plan, children }
+    }
+
+    pub(super) fn children(&self, place: usize) -> &[usize] {
+        self.children.get(place).map_or(&[], Vec::as_slice)
+    }
+
+    /// Returns the other elements with the same parent.
+    pub(super) fn siblings(&self, place: usize) -> impl Iterator<Item = usize> + '_ {
+        let parent = self.plan.parent(place);
+        let all = parent.map_or(&[][..], |parent| self.children(parent));
+        all.iter().copied().filter(move |at| *at != place)
     }
 }

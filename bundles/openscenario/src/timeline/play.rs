@@ -6,7 +6,7 @@
 
 use super::condition::Known;
 use super::moment::{Moment, Times};
-use super::plan::{Part, Plan, Priority, Start, Takes};
+use super::plan::{Part, Plan, Priority, Start, Takes, Tree};
 use crate::types::storyboard::StoryKind;
 
 /// How the standard is read where simulators differ.
@@ -62,12 +62,13 @@ const TURNS: usize = 3;
 impl Spans {
     /// Plays a storyboard.
     pub fn of(plan: &Plan, strictness: Strictness) -> Spans {
+        let tree = &Tree::of(plan);
         let mut spans = Spans::never(plan.parts.len());
         for _ in 0..TURNS {
             let before = spans.clone();
             spans.forget_earliest();
-            let settled = spans.settle(plan, strictness, Bound::Earliest)
-                && spans.settle(plan, strictness, Bound::Latest);
+            let settled = spans.settle(tree, strictness, Bound::Earliest)
+                && spans.settle(tree, strictness, Bound::Latest);
             if !settled {
                 return Spans::unknown(plan.parts.len());
             }
@@ -118,17 +119,17 @@ impl Spans {
     }
 
     /// Improves one bound until nothing changes. Returns `false` if that takes too long.
-    fn settle(&mut self, plan: &Plan, strictness: Strictness, bound: Bound) -> bool {
+    fn settle(&mut self, tree: &Tree<'_>, strictness: Strictness, bound: Bound) -> bool {
         for _ in 0..MOST_ROUNDS {
             let mut changed = false;
             // Parents first for the starts, children first for the ends.
-            for place in 0..plan.parts.len() {
-                changed |= self.start(plan, strictness, bound, place);
+            for place in 0..tree.plan.parts.len() {
+                changed |= self.start(tree, strictness, bound, place);
             }
-            for place in (0..plan.parts.len()).rev() {
-                changed |= self.end(plan, strictness, bound, place);
+            for place in (0..tree.plan.parts.len()).rev() {
+                changed |= self.end(tree, strictness, bound, place);
             }
-            changed |= self.run_ends(plan, strictness, bound);
+            changed |= self.run_ends(tree, strictness, bound);
             if !changed {
                 return true;
             }
@@ -136,24 +137,30 @@ impl Spans {
         false
     }
 
-    fn run_ends(&mut self, plan: &Plan, strictness: Strictness, bound: Bound) -> bool {
-        let Some(stop) = &plan.stop else {
+    fn run_ends(&mut self, tree: &Tree<'_>, strictness: Strictness, bound: Bound) -> bool {
+        let Some(stop) = &tree.plan.stop else {
             return false;
         };
-        let ends = self.known(plan, strictness).moment(stop, Moment::BEGIN);
+        let ends = self.known(tree, strictness).moment(stop, Moment::BEGIN);
         bound.set(&mut self.ends, ends)
     }
 
-    fn known<'s>(&'s self, plan: &'s Plan, strictness: Strictness) -> Known<'s> {
+    fn known<'s>(&'s self, tree: &'s Tree<'s>, strictness: Strictness) -> Known<'s> {
         Known {
-            plan,
+            tree,
             spans: self,
             strictness,
         }
     }
 
-    fn start(&mut self, plan: &Plan, strictness: Strictness, bound: Bound, place: usize) -> bool {
-        let Some(part) = plan.parts.get(place) else {
+    fn start(
+        &mut self,
+        tree: &Tree<'_>,
+        strictness: Strictness,
+        bound: Bound,
+        place: usize,
+    ) -> bool {
+        let Some(part) = tree.plan.parts.get(place) else {
             return false;
         };
         let parent = match part.parent.and_then(|parent| self.spans.get(parent)) {
@@ -167,9 +174,9 @@ impl Spans {
                 ..Moment::UNKNOWN
             },
             Start::By(trigger) => {
-                let known = self.known(plan, strictness);
+                let known = self.known(tree, strictness);
                 let (may, by) = known.trigger(trigger, parent);
-                let stop = self.enclosing_stop(plan, place).or(self.ends);
+                let stop = self.enclosing_stop(tree, place).or(self.ends);
                 let until = Times::between(0.0, stop.latest);
                 let mut may = may.intersect(&until);
                 if strictness == Strictness::Standard && part.priority == Priority::Skip {
@@ -186,17 +193,28 @@ impl Spans {
             Some(span) => bound.set(&mut span.start, start),
             None => false,
         };
-        changed | self.act_stops(plan, strictness, bound, place)
+        changed | self.act_stops(tree, strictness, bound, place)
     }
 
-    fn act_stops(&mut self, plan: &Plan, strictness: Strictness, bound: Bound, place: usize) -> bool {
-        let Some(trigger) = plan.parts.get(place).and_then(|part| part.stop.as_ref()) else {
+    fn act_stops(
+        &mut self,
+        tree: &Tree<'_>,
+        strictness: Strictness,
+        bound: Bound,
+        place: usize,
+    ) -> bool {
+        let Some(trigger) = tree
+            .plan
+            .parts
+            .get(place)
+            .and_then(|part| part.stop.as_ref())
+        else {
             return false;
         };
         let Some(since) = self.spans.get(place).map(|span| span.start) else {
             return false;
         };
-        let stops = self.known(plan, strictness).moment(trigger, since);
+        let stops = self.known(tree, strictness).moment(trigger, since);
         match self.stops.get_mut(place) {
             Some(stop) => bound.set(stop, stops),
             None => false,
@@ -205,20 +223,20 @@ impl Spans {
 
     /// Returns the moment at which the act around an element is stopped. The end of the run is not
     /// counted, because nothing happens after it.
-    fn enclosing_stop(&self, plan: &Plan, place: usize) -> Moment {
-        let stops = plan.around(place).filter_map(|at| self.stops.get(at));
+    fn enclosing_stop(&self, tree: &Tree<'_>, place: usize) -> Moment {
+        let stops = tree.plan.around(place).filter_map(|at| self.stops.get(at));
         stops.fold(Moment::NEVER, |first, stop| first.or(*stop))
     }
 
-    fn end(&mut self, plan: &Plan, strictness: Strictness, bound: Bound, place: usize) -> bool {
-        let (Some(part), Some(span)) = (plan.parts.get(place), self.spans.get(place).copied())
+    fn end(&mut self, tree: &Tree<'_>, strictness: Strictness, bound: Bound, place: usize) -> bool {
+        let (Some(part), Some(span)) = (tree.plan.parts.get(place), self.spans.get(place).copied())
         else {
             return false;
         };
-        let stopped = self.stopped(plan, place, part);
+        let stopped = self.stopped(tree, place, part);
         let by_itself = match part.kind {
             StoryKind::Action => takes(span.start, part.takes, strictness),
-            _ => self.children_complete(plan, place, span.start),
+            _ => self.children_complete(tree, place, span.start),
         };
         // A stop comes before the regular end, or may.
         let end = Moment {
@@ -228,8 +246,19 @@ impl Spans {
                 false => f64::INFINITY,
             },
         };
-        let regular = self.complete(plan, strictness, place, part, by_itself);
-        let complete = regular.or(self.enclosing_stop(plan, place)).or(Moment {
+        let regular = self.complete(tree, strictness, place, part, by_itself);
+        let mut stop = self.enclosing_stop(tree, place);
+        let event = part.parent.filter(|_| part.kind == StoryKind::Action);
+        let known = self.known(tree, strictness);
+        let is_skipped = event.is_some_and(|event| {
+            let event_part = tree.plan.parts.get(event);
+            event_part.is_some_and(|it| known.may_be_skipped(event, it))
+        });
+        if is_skipped {
+            // The actions of a skipped event never ran and are not stopped.
+            stop.latest = f64::INFINITY;
+        }
+        let complete = regular.or(stop).or(Moment {
             earliest: stopped.earliest,
             latest: f64::INFINITY,
         });
@@ -243,39 +272,40 @@ impl Spans {
 
     /// Returns when something stops an element: the end of its act, an event that overrides, or an
     /// action that controls the same thing.
-    fn stopped(&self, plan: &Plan, place: usize, part: &Part) -> Moment {
+    fn stopped(&self, tree: &Tree<'_>, place: usize, part: &Part) -> Moment {
         let started = self.spans.get(place).map_or(0.0, |it| it.start.earliest);
         let may_start = |other: usize| {
             let span = self.spans.get(other)?;
-            let is_over = span.start.latest < started && !plan.repeats(other);
+            let is_over = span.start.latest < started && !tree.plan.repeats(other);
             (!is_over).then_some(Moment {
                 earliest: span.start.earliest.max(started),
                 latest: f64::INFINITY,
             })
         };
-        let mut first = self.enclosing_stop(plan, place);
+        let mut first = self.enclosing_stop(tree, place);
         let event = match part.kind {
             StoryKind::Event => Some(place),
             StoryKind::Action => part.parent,
             _ => None,
         };
-        let known = self.known(plan, Strictness::Standard);
-        for other in event.into_iter().flat_map(|event| known.siblings(event)) {
-            let overrides = plan.parts.get(other).is_some_and(|it| {
-                matches!(it.priority, Priority::Override | Priority::Unknown)
-            });
+        for other in event.into_iter().flat_map(|event| tree.siblings(event)) {
+            let overrides =
+                tree.plan.parts.get(other).is_some_and(|it| {
+                    matches!(it.priority, Priority::Override | Priority::Unknown)
+                });
             if let Some(moment) = may_start(other).filter(|_| overrides) {
                 first = first.or(moment);
             }
+        }
+        if part.is_open {
+            first.earliest = first.earliest.min(started);
         }
         let rivals = part.rivals.iter().filter_map(|rival| may_start(*rival));
         rivals.fold(first, Moment::or)
     }
 
-    fn children_complete(&self, plan: &Plan, place: usize, start: Moment) -> Moment {
-        let mut children = plan.parts.iter().enumerate();
-        let mut children = children.by_ref().filter(|(_, it)| it.parent == Some(place));
-        let Some((first, _)) = children.next() else {
+    fn children_complete(&self, tree: &Tree<'_>, place: usize, start: Moment) -> Moment {
+        let Some((first, others)) = tree.children(place).split_first() else {
             // Simulators treat empty elements in different ways.
             return Moment {
                 earliest: start.earliest,
@@ -283,20 +313,21 @@ impl Spans {
             };
         };
         let complete = |at: usize| self.spans.get(at).map_or(Moment::UNKNOWN, |it| it.complete);
-        let all = children.fold(complete(first), |all, (at, _)| all.and(complete(at)));
+        let others = others.iter().map(|at| complete(*at));
+        let all = others.fold(complete(*first), Moment::and);
         later(all.and(start), STEP)
     }
 
     /// Returns when an element is complete without being stopped, after all its executions.
     fn complete(
         &self,
-        plan: &Plan,
+        tree: &Tree<'_>,
         strictness: Strictness,
         place: usize,
         part: &Part,
         by_itself: Moment,
     ) -> Moment {
-        let known = self.known(plan, strictness);
+        let known = self.known(tree, strictness);
         let repeated = match part.executions {
             Some(1) => by_itself,
             _ => Moment {
@@ -308,7 +339,7 @@ impl Spans {
             return repeated;
         };
         let is_short = match &part.start {
-            Start::By(trigger) if !plan.is_looped(place) => {
+            Start::By(trigger) if !tree.plan.is_looped(place) => {
                 known.occurrences(trigger).is_some_and(|it| it < most)
             }
             _ => false,
@@ -336,7 +367,7 @@ impl Known<'_> {
 
     /// Removes the times at which another event of the maneuver certainly runs.
     fn unless_others_run(&self, place: usize, may: Times) -> Times {
-        self.siblings(place).fold(may, |may, other| {
+        self.tree.siblings(place).fold(may, |may, other| {
             let Some(span) = self.spans.get(other) else {
                 return may;
             };
@@ -347,7 +378,7 @@ impl Known<'_> {
 
     fn may_be_skipped(&self, place: usize, part: &Part) -> bool {
         matches!(part.priority, Priority::Skip | Priority::Unknown)
-            && self.siblings(place).next().is_some()
+            && self.tree.siblings(place).next().is_some()
     }
 
     fn skipped_at(&self, place: usize, part: &Part) -> f64 {

@@ -31,9 +31,18 @@ fn check(plan: &Plan, run: &Run) {
             let span = spans.get(place).unwrap();
             holds("start", place, span.start, lived.start, run.until);
             holds("end", place, span.end, lived.end, run.until);
-            holds("completion", place, span.complete, lived.complete, run.until);
+            holds(
+                "completion",
+                place,
+                span.complete,
+                lived.complete,
+                run.until,
+            );
             if let Some(time) = lived.stopped {
-                assert!(time >= span.stopped.earliest - CLOSE, "stop of {place} at {time}: {span:?}");
+                assert!(
+                    time >= span.stopped.earliest - CLOSE,
+                    "stop of {place} at {time}: {span:?}"
+                );
             }
         }
         match run.stopped {

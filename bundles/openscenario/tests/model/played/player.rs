@@ -141,9 +141,13 @@ impl<'p> Player<'p> {
                 Takes::Unknown => (self.draw() % 40) as f64 / 2.0,
             };
             self.ends[place] = self.step + (seconds / STEP).round() as usize;
-            for rival in self.plan.parts.iter().enumerate().filter_map(|(at, part)| {
-                part.rivals.contains(&place).then_some(at)
-            }) {
+            for rival in self
+                .plan
+                .parts
+                .iter()
+                .enumerate()
+                .filter_map(|(at, part)| part.rivals.contains(&place).then_some(at))
+            {
                 if self.phases[rival] == Phase::Running {
                     self.stop(rival);
                 }
@@ -190,7 +194,10 @@ impl<'p> Player<'p> {
         let plan = self.plan;
         for place in 0..plan.parts.len() {
             let part = &plan.parts[place];
-            if let Some(stop) = part.stop.as_ref().filter(|_| self.before[place] == Phase::Running)
+            if let Some(stop) = part
+                .stop
+                .as_ref()
+                .filter(|_| self.before[place] == Phase::Running)
                 && self.triggers(stop)
                 && self.phases[place] == Phase::Running
             {
@@ -254,7 +261,9 @@ impl<'p> Player<'p> {
             StoryKind::Action => self.step >= self.ends[place],
             _ => {
                 let children = self.children(place);
-                children.iter().all(|it| self.phases[*it] == Phase::Complete)
+                children
+                    .iter()
+                    .all(|it| self.phases[*it] == Phase::Complete)
             }
         }
     }

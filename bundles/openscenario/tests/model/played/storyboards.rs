@@ -14,7 +14,10 @@ pub struct Random(pub Plan);
 impl std::fmt::Debug for Random {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         for (at, part) in self.0.parts.iter().enumerate() {
-            let depth = StoryKind::ALL.iter().position(|kind| *kind == part.kind).unwrap();
+            let depth = StoryKind::ALL
+                .iter()
+                .position(|kind| *kind == part.kind)
+                .unwrap();
             write!(f, "\n{}{at} {:?}", "  ".repeat(depth), part.kind)?;
             match &part.start {
                 Start::By(trigger) => write!(f, " starts by {}", shown(trigger))?,
@@ -40,7 +43,8 @@ impl std::fmt::Debug for Random {
 }
 
 fn shown(trigger: &Trigger) -> String {
-    let condition = |it: &Condition| format!("{:?}/{:?}+{:?}", it.logic, it.edge, it.delay.unwrap());
+    let condition =
+        |it: &Condition| format!("{:?}/{:?}+{:?}", it.logic, it.edge, it.delay.unwrap());
     let group = |it: &Vec<Condition>| it.iter().map(condition).collect::<Vec<_>>().join(" and ");
     let groups: Vec<String> = trigger.groups.iter().map(group).collect();
     groups.join(" or ")
@@ -180,6 +184,7 @@ impl Builder {
             priority: Priority::Parallel,
             takes: Takes::NoTime,
             rivals: Vec::new(),
+            is_open: false,
         });
         self.parts.len() - 1
     }
