@@ -10,12 +10,14 @@ mod plan;
 mod play;
 mod rivals;
 mod takes;
+mod why;
 
 pub use moment::Moment;
 pub use plan::{
     Comparison, Condition, Edge, Logic, Part, Plan, Priority, Start, State, Takes, Trigger,
 };
 pub use play::{Span, Spans, Strictness};
+pub use why::{At, Cause};
 
 use crate::queries::scenario::Scenario;
 
@@ -38,6 +40,26 @@ impl Timeline {
             tolerant: Spans::of(&plan, Strictness::Tolerant),
             plan,
         })
+    }
+
+    /// Returns the bounds of one reading.
+    pub fn spans(&self, strictness: Strictness) -> &Spans {
+        match strictness {
+            Strictness::Standard => &self.standard,
+            Strictness::Tolerant => &self.tolerant,
+        }
+    }
+
+    /// Returns the causes, one for each condition group, why an element never starts. The list is
+    /// empty if it may start, or if only its parent never starts.
+    pub fn never_starts(&self, place: usize, strictness: Strictness) -> Vec<Cause> {
+        why::never_starts(&self.plan, self.spans(strictness), strictness, place)
+    }
+
+    /// Returns the causes, one for each condition group, why the run never ends. The list is empty
+    /// if it may end, or if it has no stop trigger.
+    pub fn never_ends(&self, strictness: Strictness) -> Vec<Cause> {
+        why::never_ends(&self.plan, self.spans(strictness), strictness)
     }
 }
 

@@ -82,6 +82,10 @@ impl Times {
         Times::between(from, f64::INFINITY)
     }
 
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// Returns the first time, or infinity.
     pub(super) fn first(&self) -> f64 {
         self.0.first().map_or(f64::INFINITY, |(from, _)| *from)

@@ -84,6 +84,11 @@ impl Spans {
         self.spans.get(place)
     }
 
+    /// Returns the first moment at which the act around an element, or the run, is stopped.
+    pub(super) fn stop_of(&self, tree: &Tree<'_>, place: usize) -> Moment {
+        self.enclosing_stop(tree, place).or(self.ends)
+    }
+
     fn never(count: usize) -> Spans {
         Spans {
             spans: vec![Span::NEVER; count],
@@ -176,7 +181,7 @@ impl Spans {
             Start::By(trigger) => {
                 let known = self.known(tree, strictness);
                 let (may, by) = known.trigger(trigger, parent);
-                let stop = self.enclosing_stop(tree, place).or(self.ends);
+                let stop = self.stop_of(tree, place);
                 let until = Times::between(0.0, stop.latest);
                 let mut may = may.intersect(&until);
                 if strictness == Strictness::Standard && part.priority == Priority::Skip {
