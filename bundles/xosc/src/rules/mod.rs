@@ -186,12 +186,14 @@ mod storyboard_act_never_starts;
 mod storyboard_action_conflict;
 mod storyboard_empty;
 mod storyboard_ends_at_once;
+mod storyboard_event_always_skipped;
 mod storyboard_event_never_starts;
 mod storyboard_init_private_unknown;
 mod storyboard_maximum_execution_count;
 mod storyboard_priority_conflict;
 mod storyboard_private_action_global_actor;
 mod storyboard_reference_to_self_or_parent_end;
+mod storyboard_run_never_ends;
 mod storyboard_select_triggering_entities;
 mod storyboard_stop_trigger;
 mod storyboard_unreachable_by_reference;
@@ -201,11 +203,14 @@ mod trajectory_knots_non_decreasing;
 mod trajectory_speed_plausible;
 mod trajectory_times_increasing;
 mod trajectory_timing_scale;
+mod trigger_conditions_apart;
 mod trigger_contradiction;
 mod trigger_edge_on_state;
+mod trigger_edge_over;
 mod trigger_float_equal;
 mod trigger_never_true;
 mod trigger_simulation_time_equal;
+mod trigger_state_never_comes;
 mod trigger_time_unordered;
 mod trigger_traveled_distance_stopped;
 mod variables_dollar_reference;
@@ -435,4 +440,9 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc trajectory_speed_plausible "qcbus.dev:xosc:1.0.0:trajectory.speed_plausible",
     qcbus_xosc trajectory_clothoid_time_order "qcbus.dev:xosc:1.0.0:trajectory.clothoid_time_order",
     qcbus_xosc trajectory_knots_non_decreasing "qcbus.dev:xosc:1.0.0:trajectory.knots_non_decreasing",
+    qcbus_xosc storyboard_event_always_skipped "qcbus.dev:xosc:1.0.0:storyboard.event_always_skipped",
+    qcbus_xosc storyboard_run_never_ends "qcbus.dev:xosc:1.0.0:storyboard.run_never_ends",
+    qcbus_xosc trigger_conditions_apart "qcbus.dev:xosc:1.0.0:trigger.conditions_apart",
+    qcbus_xosc trigger_edge_over "qcbus.dev:xosc:1.0.0:trigger.edge_over",
+    qcbus_xosc trigger_state_never_comes "qcbus.dev:xosc:1.0.0:trigger.state_never_comes",
 };

@@ -1,0 +1,144 @@
+//! Elements that never start, and runs that never end, by the timeline of the scenario.
+
+use crate::families::triggers::called;
+use crate::prelude::*;
+use qcbus_openscenario::{At, Cause, Plan, StoryKind, Strictness, Takes, Timeline};
+
+/// A trigger that is never true.
+pub(crate) struct Never<'m, 'd> {
+    /// `StartTrigger` of an element, or `StopTrigger` of the storyboard.
+    trigger: Element<'m, 'd>,
+    /// The consequence, for messages.
+    pub(crate) so: String,
+    /// Reason of each condition group.
+    pub(crate) causes: Vec<Cause>,
+    /// Whether every known simulator agrees.
+    pub(crate) is_certain: bool,
+}
+
+impl<'m, 'd> Never<'m, 'd> {
+    /// Returns a condition of the trigger.
+    pub(crate) fn condition(&self, at: At) -> Option<Element<'m, 'd>> {
+        let group = self.trigger.children_named("ConditionGroup").nth(at.0)?;
+        group.children_named("Condition").nth(at.1)
+    }
+
+    /// Returns the owner of the trigger.
+    pub(crate) fn owner(&self) -> Option<Element<'m, 'd>> {
+        self.trigger.parent()
+    }
+}
+
+/// Returns the acts and events that never start because of their own trigger.
+pub(crate) fn never_started<'m, 'd>(
+    scenario: &'m Scenario<'d>,
+    timeline: &Timeline,
+) -> Vec<Never<'m, 'd>> {
+    let elements = scenario.storyboard().elements().iter().enumerate();
+    let never = elements.filter_map(|(place, one)| {
+        let causes = timeline.never_starts(place, Strictness::Standard);
+        if causes.is_empty() {
+            return None;
+        }
+        let element = one.element(scenario);
+        let tolerant = timeline.tolerant.get(place)?;
+        Some(Never {
+            trigger: element.child("StartTrigger")?,
+            so: format!("{} never starts", called(element)),
+            causes,
+            is_certain: tolerant.start.is_never(),
+        })
+    });
+    never.collect()
+}
+
+/// Returns the stop trigger of the storyboard if it is never true.
+pub(crate) fn never_ended<'m, 'd>(
+    scenario: &'m Scenario<'d>,
+    timeline: &Timeline,
+) -> Option<Never<'m, 'd>> {
+    let causes = timeline.never_ends(Strictness::Standard);
+    if causes.is_empty() {
+        return None;
+    }
+    Some(Never {
+        trigger: scenario.root().path(&["Storyboard", "StopTrigger"])?,
+        so: "the run never ends".to_owned(),
+        causes,
+        is_certain: timeline.tolerant.ends.is_never(),
+    })
+}
+
+/// Describes why the state of an element never comes: "`endTransition` of the event `Brake` never
+/// comes, because …". `condition` is the `StoryboardElementStateCondition`.
+pub(crate) fn state_never_comes(
+    scenario: &Scenario<'_>,
+    plan: &Plan,
+    condition: Element<'_, '_>,
+    of: usize,
+) -> String {
+    let word = condition.word("state").unwrap_or_default().into_owned();
+    let element = scenario.storyboard().elements().get(of);
+    let name = element.map_or_else(
+        || "the element".to_owned(),
+        |one| called(one.element(scenario)),
+    );
+    let why = match why(scenario, plan, &word, of) {
+        Some(why) => format!(", because {why}"),
+        None => String::new(),
+    };
+    format!("`{word}` of {name} never comes{why}")
+}
+
+fn why(scenario: &Scenario<'_>, plan: &Plan, word: &str, of: usize) -> Option<String> {
+    let part = plan.parts.get(of)?;
+    match word {
+        "skipTransition" => {
+            let is_event = part.kind == StoryKind::Event;
+            Some(match is_event {
+                true => "only events with the priority `skip` are skipped, while another event of \
+                         their maneuver runs"
+                    .to_owned(),
+                false => "only events are skipped".to_owned(),
+            })
+        }
+        "stopTransition" => Some("nothing stops it".to_owned()),
+        _ => {
+            let within = |at: &usize| {
+                let mut around = std::iter::successors(Some(*at), |at| plan.parts.get(*at)?.parent);
+                around.any(|it| it == of)
+            };
+            let mut places = (0..plan.parts.len()).filter(within);
+            places.find_map(|at| endless(scenario, plan, at))
+        }
+    }
+}
+
+/// Describes an element that does not end.
+fn endless(scenario: &Scenario<'_>, plan: &Plan, at: usize) -> Option<String> {
+    let part = plan.parts.get(at)?;
+    let name = called(scenario.storyboard().elements().get(at)?.element(scenario));
+    match (part.takes, part.executions) {
+        (Takes::Forever | Takes::ForeverInTheory, _) => {
+            Some(format!("{name} has `continuous=\"true\"` and does not end"))
+        }
+        (_, Some(count)) if count > 1 => Some(format!(
+            "{name} has `maximumExecutionCount=\"{count}\"`, but is triggered less often"
+        )),
+        _ => None,
+    }
+}
+
+/// Checks whether a state is one of an element that never starts, which another finding reports.
+pub(crate) fn follows(timeline: &Timeline, of: usize) -> bool {
+    let span = timeline.standard.get(of);
+    span.is_some_and(|span| span.start.is_never())
+}
+
+/// Returns " (some simulators …)" if they differ.
+pub(crate) fn differs(never: &Never<'_, '_>) -> &'static str {
+    match never.is_certain {
+        true => "",
+        false => "; some simulators differ from the standard here",
+    }
+}

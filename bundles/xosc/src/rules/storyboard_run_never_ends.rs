@@ -1,0 +1,58 @@
+use crate::families::timeline::{self, Never, differs};
+use crate::prelude::*;
+use qcbus_openscenario::{Cause, Timeline};
+
+pub const RULE: Rule<Scene> = Rule {
+    versions: "1.0.0..",
+    run,
+    ..Rule::after(READABLE)
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(timeline) = scenario.timeline() else {
+        return;
+    };
+    let Some(never) = timeline::never_ended(scenario, timeline) else {
+        return;
+    };
+    let level = match never.is_certain {
+        true => Level::Error,
+        false => Level::Warning,
+    };
+    for cause in &never.causes {
+        report(scenario, timeline, &never, *cause, level, found);
+    }
+}
+
+fn report(
+    scenario: &Scenario<'_>,
+    timeline: &Timeline,
+    never: &Never<'_, '_>,
+    cause: Cause,
+    level: Level,
+    found: &mut Sink<'_>,
+) {
+    let (at, why) = match cause {
+        Cause::StateNeverComes { at, of } => {
+            let state = never
+                .condition(at)
+                .and_then(|it| it.path(&["ByValueCondition", "StoryboardElementStateCondition"]));
+            let Some(state) = state else { return };
+            let text = timeline::state_never_comes(scenario, &timeline.plan, state, of);
+            let text = format!("{text}; {}{}", never.so, differs(never));
+            found.about(state, "state", text).level(level);
+            return;
+        }
+        Cause::Impossible { at } => (at, "this condition is never true"),
+        Cause::Over { at } => (at, "this condition is over when the run begins"),
+        Cause::Apart { other, .. } => (
+            other,
+            "the conditions of this group are never true together",
+        ),
+        Cause::AfterTheEnd | Cause::Skipped { .. } => return,
+    };
+    if let Some(condition) = never.condition(at) {
+        let text = format!("{why}; {}{}", never.so, differs(never));
+        found.about(condition, "", text).level(level);
+    }
+}

@@ -1,0 +1,31 @@
+use crate::families::timeline::{self, differs};
+use crate::prelude::*;
+use qcbus_openscenario::Cause;
+
+pub const RULE: Rule<Scene> = Rule {
+    level: Level::Warning,
+    versions: "1.0.0..",
+    run,
+    ..Rule::after(READABLE)
+};
+
+fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
+    let Some(timeline) = scenario.timeline() else {
+        return;
+    };
+    for never in timeline::never_started(scenario, timeline) {
+        for cause in &never.causes {
+            let Cause::Over { at } = *cause else { continue };
+            let Some(condition) = never.condition(at) else {
+                continue;
+            };
+            let edge = condition.word("conditionEdge").unwrap_or_default();
+            let what = match &*edge {
+                "none" | "" => "the condition is true only before it is first looked at".to_owned(),
+                edge => format!("the `{edge}` edge comes before the condition is first looked at"),
+            };
+            let text = format!("{what}; {}{}", never.so, differs(&never));
+            found.about(condition, "conditionEdge", text);
+        }
+    }
+}
