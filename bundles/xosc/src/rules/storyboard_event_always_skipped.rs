@@ -42,7 +42,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
 }
 
 /// Checks whether a condition is about the skip of an event.
-fn is_awaited(scenario: &Scenario<'_>, event: Element<'_, '_>) -> bool {
+fn is_awaited<'d>(scenario: &Scenario<'d>, event: Element<'_, 'd>) -> bool {
     let states = scenario.elements_everywhere("StoryboardElementStateCondition");
     let mut skips = states.filter(|it| it.word("state").as_deref() == Some("skipTransition"));
     skips.any(|state| {
