@@ -56,7 +56,10 @@ impl Known<'_> {
     /// Returns the times at which a condition may and must be true, if it is looked at from `since`
     /// on.
     pub(super) fn condition(&self, condition: &Condition, since: Moment) -> Truth {
-        let plain = self.logic(&condition.logic);
+        let plain = match condition.is_certain || self.strictness == Strictness::Standard {
+            true => self.logic(&condition.logic),
+            false => Truth::unknown(),
+        };
         let edged = self.edge(plain, condition.edge, since);
         let Some(delay) = condition.delay else {
             // Not before the expression itself is true.
@@ -272,6 +275,9 @@ impl Known<'_> {
     }
 
     fn times(&self, condition: &Condition) -> Option<u32> {
+        if !condition.is_certain && self.strictness == Strictness::Tolerant {
+            return None;
+        }
         let both = |once: u32| match condition.edge {
             Edge::RisingOrFalling | Edge::Unknown => once.saturating_mul(2),
             _ => once,

@@ -4,14 +4,17 @@
 //! of each element. What the scenario does not fix is unknown, and nothing follows from it.
 
 mod condition;
+mod impossible;
 mod moment;
 mod of_scenario;
 mod plan;
 mod play;
 mod rivals;
 mod takes;
+mod time_of_day;
 mod why;
 
+pub use impossible::{Impossible, Reason};
 pub use moment::Moment;
 pub use plan::{
     Comparison, Condition, Edge, Logic, Part, Plan, Priority, Start, State, Takes, Trigger,

@@ -7,6 +7,7 @@ use super::plan::{
 };
 use super::rivals;
 use super::takes::takes;
+use super::time_of_day::{TimeOfDay, comparison_in_seconds};
 use crate::queries::element::Element;
 use crate::queries::scenario::Scenario;
 use crate::types::storyboard::StoryKind;
@@ -91,15 +92,28 @@ impl Reader<'_, '_> {
             true => condition.number("delay").filter(|delay| *delay >= 0.0),
             false => Some(0.0),
         };
+        let (logic, is_certain) = match self.scenario.impossible(condition) {
+            Some(impossible) => (Logic::Never, impossible.reason.is_certain()),
+            None => self.logic(condition).unwrap_or((Logic::Unknown, true)),
+        };
         Condition {
-            logic: self.logic(condition).unwrap_or(Logic::Unknown),
+            logic,
             edge: edge(condition),
             delay,
+            is_certain,
         }
     }
 
-    fn logic(&self, condition: Element<'_, '_>) -> Option<Logic> {
+    fn logic(&self, condition: Element<'_, '_>) -> Option<(Logic, bool)> {
         let by_value = condition.child("ByValueCondition")?;
+        if let Some(day) = by_value.child("TimeOfDayCondition") {
+            // Some simulators have no time of day.
+            return Some((time_of_day(day)?, false));
+        }
+        Some((self.value(by_value)?, true))
+    }
+
+    fn value(&self, by_value: Element<'_, '_>) -> Option<Logic> {
         if let Some(time) = by_value.child("SimulationTimeCondition") {
             let value = time.number("value")?;
             return Some(Logic::Time(comparison(&time.word("rule")?)?, value));
@@ -115,6 +129,18 @@ impl Reader<'_, '_> {
         };
         let place = self.places.get(&(target.context, target.node.offset()))?;
         Some(Logic::State(*place, state(&element.word("state")?)?))
+    }
+}
+
+/// Returns a condition about the time of day as one about the simulation time.
+fn time_of_day(condition: Element<'_, '_>) -> Option<Logic> {
+    let (rule, seconds) = comparison_in_seconds(condition)?;
+    let passes = TimeOfDay::of(condition.scenario())?.passes;
+    let rule = comparison(&rule)?;
+    match passes {
+        true => Some(Logic::Time(rule, seconds)),
+        // It stands still, and the condition is not impossible.
+        false => Some(Logic::Time(Comparison::GreaterOrEqual, 0.0)),
     }
 }
 

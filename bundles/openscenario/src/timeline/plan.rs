@@ -62,6 +62,8 @@ pub struct Condition {
     pub edge: Edge,
     /// Delay in seconds; `None` if it is unknown.
     pub delay: Option<f64>,
+    /// Whether every known simulator evaluates the expression like this.
+    pub is_certain: bool,
 }
 
 /// A logical expression.

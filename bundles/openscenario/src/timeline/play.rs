@@ -216,8 +216,17 @@ impl Spans {
         else {
             return false;
         };
-        let Some(since) = self.spans.get(place).map(|span| span.start) else {
+        let Some(started) = self.spans.get(place).map(|span| span.start) else {
             return false;
+        };
+        // An act that still waits may be stopped, too.
+        let parent = tree
+            .plan
+            .parent(place)
+            .and_then(|parent| self.spans.get(parent));
+        let since = Moment {
+            earliest: parent.map_or(0.0, |parent| parent.start.earliest),
+            latest: started.latest,
         };
         let stops = self.known(tree, strictness).moment(trigger, since);
         match self.stops.get_mut(place) {

@@ -57,6 +57,16 @@ pub(crate) fn of<'m, 'd>(condition: Element<'m, 'd>) -> Option<(String, Demand<'
     Some((format!("{delay} {about} {same}"), claim))
 }
 
+/// Checks whether two conditions contradict each other.
+pub(crate) fn contradict<'m, 'd>(one: Element<'m, 'd>, other: Element<'m, 'd>) -> bool {
+    match (of(one), of(other)) {
+        (Some((quantity, one)), Some((same, other))) => {
+            quantity == same && one.against(&other).is_some()
+        }
+        _ => false,
+    }
+}
+
 /// Returns the element that states the comparison, and the entities that it is about.
 fn leaf<'m, 'd>(condition: Element<'m, 'd>) -> Option<(Element<'m, 'd>, String)> {
     if let Some(by_value) = condition.child("ByValueCondition") {

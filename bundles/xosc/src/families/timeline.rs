@@ -6,6 +6,8 @@ use qcbus_openscenario::{At, Cause, Plan, StoryKind, Strictness, Takes, Timeline
 
 /// A trigger that is never true.
 pub(crate) struct Never<'m, 'd> {
+    /// Index of the element; 0 for the run.
+    pub(crate) place: usize,
     /// `StartTrigger` of an element, or `StopTrigger` of the storyboard.
     trigger: Element<'m, 'd>,
     /// The consequence, for messages.
@@ -43,6 +45,7 @@ pub(crate) fn never_started<'m, 'd>(
         let element = one.element(scenario);
         let tolerant = timeline.tolerant.get(place)?;
         Some(Never {
+            place,
             trigger: element.child("StartTrigger")?,
             so: format!("{} never starts", called(element)),
             causes,
@@ -62,10 +65,30 @@ pub(crate) fn never_ended<'m, 'd>(
         return None;
     }
     Some(Never {
+        place: 0,
         trigger: scenario.root().path(&["Storyboard", "StopTrigger"])?,
         so: "the run never ends".to_owned(),
         causes,
         is_certain: timeline.tolerant.ends.is_never(),
+    })
+}
+
+/// Checks whether the run never ends because of a condition. Then only this is reported.
+pub(crate) fn keeps_running<'d>(scenario: &Scenario<'d>, condition: Element<'_, 'd>) -> bool {
+    // Most conditions belong to other triggers.
+    if condition.ancestor("Story").is_some() {
+        return false;
+    }
+    let never = scenario
+        .timeline()
+        .and_then(|timeline| never_ended(scenario, timeline));
+    never.is_some_and(|never| {
+        never.causes.iter().any(|cause| match cause {
+            Cause::Impossible { at } | Cause::Over { at } | Cause::Apart { other: at, .. } => {
+                never.condition(*at) == Some(condition)
+            }
+            _ => false,
+        })
     })
 }
 
@@ -109,15 +132,19 @@ fn why(scenario: &Scenario<'_>, plan: &Plan, word: &str, of: usize) -> Option<St
                 around.any(|it| it == of)
             };
             let mut places = (0..plan.parts.len()).filter(within);
-            places.find_map(|at| endless(scenario, plan, at))
+            places.find_map(|at| endless(scenario, plan, at, of))
         }
     }
 }
 
-/// Describes an element that does not end.
-fn endless(scenario: &Scenario<'_>, plan: &Plan, at: usize) -> Option<String> {
+/// Describes an element that does not end. It is `it` if it is the element of the sentence.
+fn endless(scenario: &Scenario<'_>, plan: &Plan, at: usize, it: usize) -> Option<String> {
     let part = plan.parts.get(at)?;
-    let name = called(scenario.storyboard().elements().get(at)?.element(scenario));
+    let element = scenario.storyboard().elements().get(at)?;
+    let name = match at == it {
+        true => "it".to_owned(),
+        false => called(element.element(scenario)),
+    };
     match (part.takes, part.executions) {
         (Takes::Forever | Takes::ForeverInTheory, _) => {
             Some(format!("{name} has `continuous=\"true\"` and does not end"))
@@ -129,10 +156,13 @@ fn endless(scenario: &Scenario<'_>, plan: &Plan, at: usize) -> Option<String> {
     }
 }
 
-/// Checks whether a state is one of an element that never starts, which another finding reports.
-pub(crate) fn follows(timeline: &Timeline, of: usize) -> bool {
+/// Checks whether another finding reports why a state never comes: its element never starts, or
+/// contains the element that waits.
+pub(crate) fn follows(timeline: &Timeline, of: usize, waits: usize) -> bool {
+    let parent = |at: &usize| timeline.plan.parts.get(*at)?.parent;
     let span = timeline.standard.get(of);
     span.is_some_and(|span| span.start.is_never())
+        || std::iter::successors(Some(waits), parent).any(|around| around == of)
 }
 
 /// Returns " (some simulators …)" if they differ.

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::hash::BuildHasher as _;
 
+use crate::families::actions::stated;
 use crate::prelude::*;
 use foldhash::HashMap;
 use qcbus_openscenario::Reading;
@@ -64,11 +65,19 @@ pub(crate) fn time<'m, 'd>(condition: Element<'m, 'd>) -> Option<Element<'m, 'd>
     condition.path(&["ByValueCondition", "SimulationTimeCondition"])
 }
 
+/// Returns the `SimulationTimeCondition` or the `TimeOfDayCondition` of a condition.
+pub(crate) fn time_or_day<'m, 'd>(condition: Element<'m, 'd>) -> Option<Element<'m, 'd>> {
+    time(condition).or_else(|| condition.path(&["ByValueCondition", "TimeOfDayCondition"]))
+}
+
 /// Returns the earliest time at which a condition about the simulation time is true, including its
 /// delay. Returns `None` if the condition is about something else, or the time is unknown.
 pub(crate) fn earliest(condition: Element<'_, '_>) -> Option<f64> {
-    let time = time(condition)?;
-    let value = time.number("value")?;
+    let time = time_or_day(condition)?;
+    let value = match time.is("TimeOfDayCondition") {
+        true => time.scenario().simulation_time_of(time)?,
+        false => time.number("value")?,
+    };
     let delay = condition.number("delay").unwrap_or(0.0).max(0.0);
     match &*time.word("rule")? {
         "greaterThan" | "greaterOrEqual" | "equalTo" => Some(value + delay),
@@ -98,6 +107,45 @@ pub(crate) fn holds_at_once(condition: Element<'_, '_>) -> bool {
         Some(holds && delay <= 0.0)
     };
     holds().unwrap_or(false)
+}
+
+/// Returns why the edge of a condition about the simulation time never occurs, and how certain that
+/// is. The time starts at 0 and only increases.
+pub(crate) fn edge_of_time(condition: Element<'_, '_>) -> Option<(Level, String)> {
+    let edge = condition.word("conditionEdge")?;
+    let time = time(condition)?;
+    let value = time.number("value")?;
+    let rule = time.word("rule")?;
+    let wanted = stated(time, "value", value);
+    match (&*edge, &*rule) {
+        ("falling", "greaterThan" | "greaterOrEqual") => Some((
+            Level::Warning,
+            format!(
+                "the time becomes greater than {wanted} s and stays so; a `falling` edge never occurs, only a \
+                 `rising` one does"
+            ),
+        )),
+        // The rule `trigger_never_true` reports smaller values.
+        ("rising", "lessThan" | "lessOrEqual")
+            if value > 0.0 || (value == 0.0 && &*rule == "lessOrEqual") =>
+        {
+            Some((
+                Level::Warning,
+                format!(
+                    "the time is less than {wanted} s from the beginning; a `rising` edge never occurs, only a \
+                     `falling` one does"
+                ),
+            ))
+        }
+        ("rising", "equalTo" | "greaterOrEqual") if value == 0.0 => Some((
+            Level::Information,
+            format!(
+                "at {wanted} s the condition is true in the very first step, and there is no earlier step to \
+                 rise from; strictly, the edge never occurs; use `conditionEdge=\"none\"`"
+            ),
+        )),
+        _ => None,
+    }
 }
 
 /// Returns an element with all its significant content as one text. Elements with the same text

@@ -1,4 +1,6 @@
+use crate::families::impossible::described;
 use crate::families::timeline::{self, Never, differs};
+use crate::families::triggers::edge_of_time;
 use crate::prelude::*;
 use qcbus_openscenario::{Cause, Timeline};
 
@@ -43,12 +45,29 @@ fn report(
             found.about(state, "state", text).level(level);
             return;
         }
-        Cause::Impossible { at } => (at, "this condition is never true"),
-        Cause::Over { at } => (at, "this condition is over when the run begins"),
-        Cause::Apart { other, .. } => (
-            other,
-            "the conditions of this group are never true together",
-        ),
+        Cause::Impossible { at } => {
+            let condition = never.condition(at);
+            let Some(impossible) = condition.and_then(|it| scenario.impossible(it)) else {
+                return;
+            };
+            let text = format!("{}; {}{}", described(&impossible), never.so, differs(never));
+            found
+                .about(impossible.element, impossible.attribute, text)
+                .level(level);
+            return;
+        }
+        Cause::Over { at } => {
+            let edge = never.condition(at).and_then(edge_of_time);
+            let why = edge.map(|(_, why)| why);
+            (
+                at,
+                why.unwrap_or_else(|| "this condition is over when the run begins".to_owned()),
+            )
+        }
+        Cause::Apart { other, .. } => {
+            let why = "the conditions of this group are never true together";
+            (other, why.to_owned())
+        }
         Cause::AfterTheEnd | Cause::Skipped { .. } => return,
     };
     if let Some(condition) = never.condition(at) {

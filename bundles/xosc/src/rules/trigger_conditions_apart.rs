@@ -1,3 +1,4 @@
+use crate::families::demands::contradict;
 use crate::families::timeline::{self, differs};
 use crate::prelude::*;
 use qcbus_openscenario::Cause;
@@ -21,6 +22,10 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             let (Some(one), Some(other)) = (never.condition(one), never.condition(other)) else {
                 continue;
             };
+            // Another rule reports it with the values.
+            if contradict(one, other) {
+                continue;
+            }
             let text = format!(
                 "the two conditions become true at different moments, but all conditions of a group \
                  must be true at once; {}{}",

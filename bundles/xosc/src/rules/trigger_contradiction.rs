@@ -1,4 +1,5 @@
 use crate::families::demands::{self, Demand};
+use crate::families::timeline;
 use crate::prelude::*;
 use foldhash::{HashMap, HashMapExt as _};
 
@@ -20,6 +21,10 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             let Some((quantity, claim)) = demands::of(condition) else {
                 continue;
             };
+            // A run that never ends is reported as such.
+            if timeline::keeps_running(scenario, condition) {
+                continue;
+            }
             match known.get_mut(&quantity) {
                 None => {
                     known.insert(quantity, claim);

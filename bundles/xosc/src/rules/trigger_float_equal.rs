@@ -11,6 +11,7 @@ pub const RULE: Rule<Scene> = Rule {
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for entity_condition in scenario.elements_everywhere("EntityCondition") {
         for condition in entity_condition.children() {
+            exact_position(condition, found);
             if condition.word("rule").as_deref() != Some("equalTo") {
                 continue;
             }
@@ -26,5 +27,15 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             );
             found.about(condition, "rule", text);
         }
+    }
+}
+
+/// Reports a position that must be reached exactly.
+fn exact_position(condition: Element<'_, '_>, found: &mut Sink<'_>) {
+    if condition.is("ReachPositionCondition") && condition.number("tolerance") == Some(0.0) {
+        let text = "`ReachPositionCondition` has a `tolerance` of 0; an entity may pass a position without \
+                    ever being exactly there, and then the condition is never true; use a tolerance of some \
+                    metres";
+        found.about(condition, "tolerance", text);
     }
 }

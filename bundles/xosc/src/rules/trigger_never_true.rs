@@ -1,5 +1,6 @@
-use crate::families::actions::stated;
+use crate::families::{impossible::described, timeline};
 use crate::prelude::*;
+use qcbus_openscenario::ImpossibleReason;
 
 pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
@@ -7,36 +8,26 @@ pub const RULE: Rule<Scene> = Rule {
     ..Rule::after(READABLE)
 };
 
-/// Conditions about quantities that are never below zero, and their names.
-const NEVER_NEGATIVE: &[(&str, &str)] = &[
-    ("SimulationTimeCondition", "the simulation time"),
-    ("TimeHeadwayCondition", "a time headway"),
-    ("TimeToCollisionCondition", "a time to collision"),
-    ("DistanceCondition", "a distance"),
-    ("RelativeDistanceCondition", "a distance"),
-];
-
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    for (name, what) in NEVER_NEGATIVE {
-        for condition in scenario.elements_everywhere(name) {
-            let (Some(value), Some(rule)) = (condition.number("value"), condition.word("rule"))
-            else {
-                continue;
-            };
-            let never = match &*rule {
-                "lessThan" => value <= 0.0,
-                "lessOrEqual" | "equalTo" => value < 0.0,
-                _ => false,
-            };
-            // For the other quantities, the range rules report numbers below zero.
-            if !never || (value < 0.0 && !condition.is("SimulationTimeCondition")) {
-                continue;
-            }
-            let text = format!(
-                "the condition requires `{rule}` {}, but {what} is never below 0; it is never true",
-                stated(condition, "value", value)
-            );
-            found.about(condition, "value", text);
+    for condition in scenario.elements_everywhere("Condition") {
+        let Some(impossible) = scenario.impossible(condition) else {
+            continue;
+        };
+        let element = impossible.element;
+        // For quantities other than the time, the range rules report numbers below zero.
+        let is_out_of_range = element
+            .number(impossible.attribute)
+            .is_some_and(|value| value < 0.0 && !element.is("SimulationTimeCondition"));
+        // A run that never ends is reported as such.
+        if is_out_of_range || timeline::keeps_running(scenario, condition) {
+            continue;
         }
+        let so = match impossible.reason {
+            // Some simulators have a time of day of their own.
+            ImpossibleReason::DayNotSet => "it may never be true",
+            _ => "it is never true",
+        };
+        let text = format!("{}; {so}", described(&impossible));
+        found.about(element, impossible.attribute, text);
     }
 }

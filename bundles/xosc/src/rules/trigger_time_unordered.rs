@@ -1,5 +1,5 @@
 use crate::families::actions::short;
-use crate::families::triggers::{self, called, earliest, groups, holds_at_once, time};
+use crate::families::triggers::{self, called, earliest, groups, holds_at_once, time, time_or_day};
 use crate::prelude::*;
 
 pub const RULE: Rule<Scene> = Rule {
@@ -77,15 +77,17 @@ fn too_late(
         short(start),
         short(end)
     );
-    // A time this far away means never.
-    let on_purpose = start >= FAR * end;
+    // A time this far away means never. Nobody writes a time of day for that.
+    let is_day = condition.is("TimeOfDayCondition");
+    let on_purpose = start >= FAR * end && !is_day;
+    let attribute = if is_day { "dateTime" } else { "value" };
     let level = if on_purpose {
         Level::Information
     } else {
         Level::Warning
     };
     found
-        .about(condition, "value", text)
+        .about(condition, attribute, text)
         .level(level)
         .at(by.node(), "the condition that ends it");
     true
@@ -115,7 +117,7 @@ fn start<'m, 'd>(element: Element<'m, 'd>) -> Option<Moment<'m, 'd>> {
     for group in groups(element.child("StartTrigger")?) {
         let moments = group
             .iter()
-            .filter_map(|condition| Some((earliest(*condition)?, time(*condition)?)));
+            .filter_map(|condition| Some((earliest(*condition)?, time_or_day(*condition)?)));
         let last = moments.max_by(|(one, _), (other, _)| one.total_cmp(other))?;
         if first.is_none_or(|(moment, _)| last.0 < moment) {
             first = Some(last);

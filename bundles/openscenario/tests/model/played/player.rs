@@ -70,6 +70,8 @@ struct Player<'p> {
     before: Vec<Phase>,
     lives: Vec<Life>,
     looks: HashMap<*const Condition, Look>,
+    /// Whether the stop trigger of an act counts before the act has started. Simulators differ.
+    stops_waiting_acts: bool,
 }
 
 /// Memory of a condition.
@@ -96,6 +98,7 @@ impl<'p> Player<'p> {
             before: vec![Phase::Idle; count],
             lives: vec![Life::default(); count],
             looks: HashMap::new(),
+            stops_waiting_acts: seed.is_multiple_of(2),
         };
         for place in 0..count {
             if plan.parts[place].parent.is_none() {
@@ -197,9 +200,9 @@ impl<'p> Player<'p> {
             if let Some(stop) = part
                 .stop
                 .as_ref()
-                .filter(|_| self.before[place] == Phase::Running)
+                .filter(|_| self.may_stop(self.before[place]))
                 && self.triggers(stop)
-                && self.phases[place] == Phase::Running
+                && self.may_stop(self.phases[place])
             {
                 self.stop(place);
             }
@@ -221,6 +224,11 @@ impl<'p> Player<'p> {
         }
         self.before.clone_from(&self.phases);
         self.seen = std::mem::take(&mut self.now);
+    }
+
+    /// Checks whether the stop trigger of an act in this phase is looked at.
+    fn may_stop(&self, phase: Phase) -> bool {
+        phase == Phase::Running || (self.stops_waiting_acts && phase == Phase::Standby)
     }
 
     /// Conditions are looked at only while their element waits.

@@ -100,6 +100,7 @@ fn condition() -> impl Strategy<Value = Condition> {
         logic,
         edge,
         delay: Some(delay),
+        is_certain: true,
     })
 }
 
