@@ -113,9 +113,11 @@ mod parameters_constraint_satisfied;
 mod parameters_constraint_type;
 mod parameters_enum_after_resolution;
 mod parameters_forward_or_cyclic;
+mod parameters_integer_id;
 mod parameters_parameter_declaration_parameter_scope;
 mod parameters_parameter_declaration_parameter_type_inference;
 mod parameters_partial_substitution;
+mod parameters_set_at_run_time;
 mod parameters_shadowing;
 mod parameters_type_literal_version;
 mod parameters_unused;
@@ -218,6 +220,7 @@ mod variables_name_syntax;
 mod variables_never_written_condition;
 mod variables_unused;
 mod xml_fileheader_is_present;
+mod xml_no_namespace;
 mod xml_root_tag_is_openscenario;
 mod xml_valid_schema;
 mod xml_valid_xml_document;
@@ -261,6 +264,9 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc dialect_ros_substitution "qcbus.dev:xosc:1.0.0:dialect.ros_substitution",
     qcbus_xosc parameters_type_literal_version "qcbus.dev:xosc:1.0.0:parameters.type_literal_version",
     qcbus_xosc parameters_shadowing "qcbus.dev:xosc:1.0.0:parameters.shadowing",
+    qcbus_xosc xml_no_namespace "qcbus.dev:xosc:1.0.0:xml.no_namespace",
+    qcbus_xosc parameters_integer_id "qcbus.dev:xosc:1.0.0:parameters.integer_id",
+    qcbus_xosc parameters_set_at_run_time "qcbus.dev:xosc:1.0.0:parameters.set_at_run_time",
     qcbus_xosc parameters_unused "qcbus.dev:xosc:1.0.0:parameters.unused",
     qcbus_xosc parameters_condition_constant "qcbus.dev:xosc:1.0.0:parameters.condition_constant",
     asam_xosc reference_control_resolvable_variable_reference "asam.net:xosc:1.2.0:reference_control.resolvable_variable_reference",
