@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 use std::fs::Metadata;
+use std::os::fd::AsRawFd;
 use std::os::unix::fs::MetadataExt;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -10,6 +12,7 @@ use crate::support::broker::Broker;
 use crate::support::content::Content;
 use crate::support::farm::{Farm, tail};
 use crate::support::inside::{is_inside, run_inside};
+use crate::support::judge::verdicts_in_journal;
 use crate::support::processes::{Process, all_with, signal_pid};
 use crate::support::programs::{copy_program, write_script};
 use crate::support::watchdog::until_or;
@@ -169,4 +172,38 @@ fn changed_link_to_the_program_is_reported() {
     std::os::unix::fs::symlink(&newer, &aside).unwrap();
     std::fs::rename(&aside, &link).unwrap();
     it_is_said(&farm, &link);
+}
+
+/// An upgrade may replace the program while it starts. The next broker must not check all files again.
+#[test]
+fn program_replaced_during_its_start_keeps_verdicts() {
+    let farm = Farm::new();
+    let program = farm.base().join("qcbus");
+    let install = || copy_program(Path::new(env!("CARGO_BIN_EXE_qcbus")), &program);
+    let serve = |executed: &Path| {
+        let mut command = Command::new(executed);
+        command.arg0(&program).args(farm.serve_command().get_args());
+        Broker::start(&mut command, &farm.log_path())
+    };
+    farm.write("a.xodr", &Content::Good(1).bytes());
+    install();
+    let opened = std::fs::File::open(&program).unwrap();
+    std::fs::remove_file(&program).unwrap();
+    let executed = format!("/proc/{}/fd/{}", std::process::id(), opened.as_raw_fd());
+    let mut broker = serve(Path::new(&executed));
+    farm.settle(1);
+    let running = std::fs::read_link(format!("/proc/{}/exe", broker.pid())).unwrap();
+    assert!(
+        running.to_string_lossy().ends_with(" (deleted)"),
+        "{running:?}"
+    );
+    broker.kill();
+    install();
+    let _broker = serve(&program);
+    // The broker examines old verdicts before it checks a new file.
+    farm.write("b.xodr", &Content::Good(2).bytes());
+    farm.verdict("b.xodr");
+    farm.settle(2);
+    let verdicts = verdicts_in_journal(&farm.journal());
+    assert_eq!(verdicts.values().sum::<u64>(), 2, "{verdicts:?}");
 }

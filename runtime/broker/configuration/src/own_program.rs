@@ -1,8 +1,9 @@
 //! The running program: its path, a replacement at this path, and the environment that it belongs to.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fs::Metadata;
 use std::io;
+use std::os::unix::ffi::OsStrExt as _;
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -44,7 +45,7 @@ impl OwnProgram {
     }
 
     fn look() -> OwnProgram {
-        let path = std::env::current_exe().unwrap_or_else(|_| RUNNING.into());
+        let path = std::env::current_exe().map_or_else(|_| RUNNING.into(), as_installed);
         let called = called().filter(|it| is_the_one_that_runs(it));
         let called = called.unwrap_or_else(|| path.clone());
         OwnProgram {
@@ -130,6 +131,16 @@ fn called() -> Option<PathBuf> {
     let mut places = std::env::split_paths(&path).map(|it| it.join(&word));
     let found = places.find(|it| it.is_file() && access(it, Access::EXEC_OK).is_ok())?;
     std::path::absolute(found).ok()
+}
+
+/// Returns the path at which the running program was installed. The kernel adds a word to it if the file was replaced
+/// or removed, for example by an upgrade while the program starts. With this word the commands of the children would
+/// differ from those of the next broker, which would check all files again.
+fn as_installed(running: PathBuf) -> PathBuf {
+    match running.as_os_str().as_bytes().strip_suffix(b" (deleted)") {
+        Some(installed) if !is_the_one_that_runs(&running) => OsStr::from_bytes(installed).into(),
+        _ => running,
+    }
 }
 
 fn is_the_one_that_runs(path: &Path) -> bool {
