@@ -96,7 +96,7 @@ pub(crate) fn keeps_running<'d>(scenario: &Scenario<'d>, condition: Element<'_, 
 /// comes, because …". `condition` is the `StoryboardElementStateCondition`.
 pub(crate) fn state_never_comes(
     scenario: &Scenario<'_>,
-    plan: &Plan,
+    timeline: &Timeline,
     condition: Element<'_, '_>,
     of: usize,
 ) -> String {
@@ -106,14 +106,15 @@ pub(crate) fn state_never_comes(
         || "the element".to_owned(),
         |one| called(one.element(scenario)),
     );
-    let why = match why(scenario, plan, &word, of) {
+    let why = match why(scenario, timeline, &word, of) {
         Some(why) => format!(", because {why}"),
         None => String::new(),
     };
     format!("`{word}` of {name} never comes{why}")
 }
 
-fn why(scenario: &Scenario<'_>, plan: &Plan, word: &str, of: usize) -> Option<String> {
+fn why(scenario: &Scenario<'_>, timeline: &Timeline, word: &str, of: usize) -> Option<String> {
+    let plan = &timeline.plan;
     let part = plan.parts.get(of)?;
     match word {
         "skipTransition" => {
@@ -132,7 +133,9 @@ fn why(scenario: &Scenario<'_>, plan: &Plan, word: &str, of: usize) -> Option<St
                 around.any(|it| it == of)
             };
             let mut places = (0..plan.parts.len()).filter(within);
-            places.find_map(|at| endless(scenario, plan, at, of))
+            places
+                .find_map(|at| endless(scenario, plan, at, of))
+                .or_else(|| idle(scenario, timeline, of))
         }
     }
 }
@@ -154,6 +157,22 @@ fn endless(scenario: &Scenario<'_>, plan: &Plan, at: usize, it: usize) -> Option
         )),
         _ => None,
     }
+}
+
+/// Describes an element that keeps another one from its end because it never starts.
+fn idle(scenario: &Scenario<'_>, timeline: &Timeline, of: usize) -> Option<String> {
+    let parent = |at: &usize| timeline.plan.parts.get(*at)?.parent;
+    let is_idle = |at: &usize| {
+        let span = timeline.standard.get(*at);
+        span.is_some_and(|span| span.start.is_never())
+            && std::iter::successors(Some(*at), parent).any(|around| around == of)
+    };
+    let at = (0..timeline.plan.parts.len()).find(is_idle)?;
+    let name = match at == of {
+        true => "it".to_owned(),
+        false => called(scenario.storyboard().elements().get(at)?.element(scenario)),
+    };
+    Some(format!("{name} never starts"))
 }
 
 /// Checks whether another finding reports why a state never comes: its element never starts, or

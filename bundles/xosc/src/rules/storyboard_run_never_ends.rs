@@ -40,7 +40,7 @@ fn report(
                 .condition(at)
                 .and_then(|it| it.path(&["ByValueCondition", "StoryboardElementStateCondition"]));
             let Some(state) = state else { return };
-            let text = timeline::state_never_comes(scenario, &timeline.plan, state, of);
+            let text = timeline::state_never_comes(scenario, timeline, state, of);
             let text = format!("{text}; {}{}", never.so, differs(never));
             found.about(state, "state", text).level(level);
             return;

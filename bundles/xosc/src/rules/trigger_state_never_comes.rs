@@ -26,7 +26,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             };
             let text = format!(
                 "{}; {}{}",
-                timeline::state_never_comes(scenario, &timeline.plan, state, of),
+                timeline::state_never_comes(scenario, timeline, state, of),
                 never.so,
                 differs(&never)
             );
