@@ -22,6 +22,8 @@ pub use plan::{
 pub use play::{Span, Spans, Strictness};
 pub use why::{At, Cause};
 
+use std::sync::OnceLock;
+
 use crate::queries::scenario::Scenario;
 
 /// When the elements of a storyboard start and end.
@@ -32,7 +34,7 @@ pub struct Timeline {
     /// Bounds by the standard.
     pub standard: Spans,
     /// Bounds that hold in every known simulator.
-    pub tolerant: Spans,
+    tolerant: OnceLock<Spans>,
 }
 
 impl Timeline {
@@ -40,16 +42,22 @@ impl Timeline {
         let plan = of_scenario::plan(scenario)?;
         Some(Timeline {
             standard: Spans::of(&plan, Strictness::Standard),
-            tolerant: Spans::of(&plan, Strictness::Tolerant),
+            tolerant: OnceLock::new(),
             plan,
         })
+    }
+
+    /// Returns bounds that hold in every known simulator.
+    pub fn tolerant(&self) -> &Spans {
+        self.tolerant
+            .get_or_init(|| Spans::of(&self.plan, Strictness::Tolerant))
     }
 
     /// Returns the bounds of one reading.
     pub fn spans(&self, strictness: Strictness) -> &Spans {
         match strictness {
             Strictness::Standard => &self.standard,
-            Strictness::Tolerant => &self.tolerant,
+            Strictness::Tolerant => self.tolerant(),
         }
     }
 

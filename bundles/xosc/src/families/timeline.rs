@@ -43,7 +43,7 @@ pub(crate) fn never_started<'m, 'd>(
             return None;
         }
         let element = one.element(scenario);
-        let tolerant = timeline.tolerant.get(place)?;
+        let tolerant = timeline.tolerant().get(place)?;
         Some(Never {
             place,
             trigger: element.child("StartTrigger")?,
@@ -69,7 +69,7 @@ pub(crate) fn never_ended<'m, 'd>(
         trigger: scenario.root().path(&["Storyboard", "StopTrigger"])?,
         so: "the run never ends".to_owned(),
         causes,
-        is_certain: timeline.tolerant.ends.is_never(),
+        is_certain: timeline.tolerant().ends.is_never(),
     })
 }
 
