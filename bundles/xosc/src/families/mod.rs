@@ -10,6 +10,7 @@ pub(crate) mod demands;
 pub(crate) mod deprecation;
 pub(crate) mod distributions;
 pub(crate) mod finite;
+pub(crate) mod init;
 pub(crate) mod minsubset;
 pub(crate) mod names;
 pub(crate) mod origins;

@@ -188,6 +188,7 @@ mod storyboard_empty;
 mod storyboard_ends_at_once;
 mod storyboard_event_always_skipped;
 mod storyboard_event_never_starts;
+mod storyboard_init_conflict;
 mod storyboard_init_private_unknown;
 mod storyboard_maximum_execution_count;
 mod storyboard_priority_conflict;
@@ -334,6 +335,7 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc storyboard_select_triggering_entities "qcbus.dev:xosc:1.0.0:storyboard.select_triggering_entities",
     qcbus_xosc storyboard_priority_conflict "qcbus.dev:xosc:1.0.0:storyboard.priority_conflict",
     qcbus_xosc storyboard_action_conflict "qcbus.dev:xosc:1.0.0:storyboard.action_conflict",
+    qcbus_xosc storyboard_init_conflict "qcbus.dev:xosc:1.0.0:storyboard.init_conflict",
     qcbus_xosc storyboard_private_action_global_actor "qcbus.dev:xosc:1.0.0:storyboard.private_action_global_actor",
     qcbus_xosc storyboard_init_private_unknown "qcbus.dev:xosc:1.0.0:storyboard.init_private_unknown",
     asam_xosc general_animation_constraint_pedestrian "asam.net:xosc:1.2.0:general.animation_constraint_pedestrian",
