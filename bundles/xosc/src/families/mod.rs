@@ -12,6 +12,7 @@ pub(crate) mod distributions;
 pub(crate) mod finite;
 pub(crate) mod init;
 pub(crate) mod minsubset;
+pub(crate) mod motion;
 pub(crate) mod names;
 pub(crate) mod origins;
 pub(crate) mod placement;

@@ -155,6 +155,7 @@ mod reference_control_unique_element_names_on_same_level;
 mod reference_control_uniquely_resolvable_entity_references;
 mod reference_control_valid_actor_reference_in_private_actions;
 mod references_init_order;
+mod references_init_speed_order;
 mod references_self_reference;
 mod references_traffic_name;
 mod road_lane_id_zero;
@@ -400,6 +401,7 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc references_self_reference "qcbus.dev:xosc:1.0.0:references.self_reference",
     qcbus_xosc references_traffic_name "qcbus.dev:xosc:1.0.0:references.traffic_name",
     qcbus_xosc references_init_order "qcbus.dev:xosc:1.0.0:references.init_order",
+    qcbus_xosc references_init_speed_order "qcbus.dev:xosc:1.0.0:references.init_speed_order",
     asam_xosc scenario_logic_controller_activation "asam.net:xosc:1.2.0:scenario_logic.controller_activation",
     asam_xosc reference_control_road_network_reference "asam.net:xosc:1.0.0:reference_control.road_network_reference",
     asam_xosc reference_control_road_network_availability "asam.net:xosc:1.0.0:reference_control.road_network_availability",
