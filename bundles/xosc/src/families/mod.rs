@@ -26,6 +26,7 @@ pub(crate) mod routes;
 pub(crate) mod signals;
 pub(crate) mod spawn;
 pub(crate) mod states;
+pub(crate) mod stays;
 pub(crate) mod timeline;
 pub(crate) mod trajectories;
 pub(crate) mod triggers;

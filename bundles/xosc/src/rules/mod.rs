@@ -158,6 +158,7 @@ mod references_init_order;
 mod references_init_speed_order;
 mod references_self_reference;
 mod references_traffic_name;
+mod road_lane_change_possible;
 mod road_lane_id_zero;
 mod road_lane_type_drivable;
 mod road_signal_condition;
@@ -424,6 +425,7 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     asam_xosc positioning_road_lane_offset_in_bounds,
     asam_xosc positioning_geodetic_datum_defined "asam.net:xosc:1.1.0:positioning.geodetic_datum_defined",
     qcbus_xosc road_lane_type_drivable "qcbus.dev:xosc:1.0.0:road.lane_type_drivable",
+    qcbus_xosc road_lane_change_possible "qcbus.dev:xosc:1.0.0:road.lane_change_possible",
     qcbus_xosc road_lane_id_zero "qcbus.dev:xosc:1.0.0:road.lane_id_zero",
     qcbus_xosc road_world_position_on_road "qcbus.dev:xosc:1.0.0:road.world_position_on_road",
     qcbus_xosc position_orientation_range "qcbus.dev:xosc:1.0.0:position.orientation_range",
