@@ -9,6 +9,7 @@ mod action_add_delete_order;
 mod action_controller_override_range;
 mod action_custom_command_portable;
 mod action_distance_exclusive;
+mod action_limit_zero;
 mod action_negative_lane_change;
 mod action_relative_speed_continuous;
 mod action_speed_not_negative;
@@ -347,6 +348,7 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc action_relative_speed_continuous "qcbus.dev:xosc:1.0.0:action.relative_speed_continuous",
     qcbus_xosc action_step_dynamics_zero "qcbus.dev:xosc:1.0.0:action.step_dynamics_zero",
     qcbus_xosc action_transition_not_zero "qcbus.dev:xosc:1.0.0:action.transition_not_zero",
+    qcbus_xosc action_limit_zero "qcbus.dev:xosc:1.0.0:action.limit_zero",
     qcbus_xosc action_synchronize "qcbus.dev:xosc:1.0.0:action.synchronize",
     qcbus_xosc action_add_delete_order "qcbus.dev:xosc:1.0.0:action.add_delete_order",
     qcbus_xosc action_speed_not_negative "qcbus.dev:xosc:1.0.0:action.speed_not_negative",
