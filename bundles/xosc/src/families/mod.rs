@@ -2,6 +2,7 @@
 
 pub(crate) mod actions;
 pub(crate) mod allowed_values;
+pub(crate) mod behind;
 pub(crate) mod casts;
 pub(crate) mod catalogs;
 pub(crate) mod constraints;
