@@ -7,6 +7,7 @@ pub(crate) mod casts;
 pub(crate) mod catalogs;
 pub(crate) mod constraints;
 pub(crate) mod declared;
+pub(crate) mod deletions;
 pub(crate) mod demands;
 pub(crate) mod deprecation;
 pub(crate) mod distributions;

@@ -52,6 +52,7 @@ mod entities_selection_members;
 mod entities_selection_not_allowed;
 mod entities_trailer_reference;
 mod entities_unused;
+mod entities_used_after_deletion;
 mod environment_friction_zero;
 mod environment_ranges;
 mod expressions_arguments_of_operators;
@@ -392,6 +393,7 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc entities_none "qcbus.dev:xosc:1.0.0:entities.none",
     qcbus_xosc entities_not_positioned "qcbus.dev:xosc:1.0.0:entities.not_positioned",
     qcbus_xosc entities_unused "qcbus.dev:xosc:1.0.0:entities.unused",
+    qcbus_xosc entities_used_after_deletion "qcbus.dev:xosc:1.0.0:entities.used_after_deletion",
     qcbus_xosc entities_selection_members "qcbus.dev:xosc:1.0.0:entities.selection_members",
     qcbus_xosc entities_selection_not_allowed "qcbus.dev:xosc:1.0.0:entities.selection_not_allowed",
     qcbus_xosc entities_bounding_box_positive "qcbus.dev:xosc:1.0.0:entities.bounding_box_positive",
