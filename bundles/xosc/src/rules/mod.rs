@@ -208,6 +208,7 @@ mod trajectory_knots_non_decreasing;
 mod trajectory_speed_plausible;
 mod trajectory_times_ignored;
 mod trajectory_times_increasing;
+mod trajectory_times_past;
 mod trajectory_timing_scale;
 mod trigger_conditions_apart;
 mod trigger_contradiction;
@@ -452,6 +453,7 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc trajectory_clothoid_time_order "qcbus.dev:xosc:1.0.0:trajectory.clothoid_time_order",
     qcbus_xosc trajectory_knots_non_decreasing "qcbus.dev:xosc:1.0.0:trajectory.knots_non_decreasing",
     qcbus_xosc trajectory_times_ignored "qcbus.dev:xosc:1.0.0:trajectory.times_ignored",
+    qcbus_xosc trajectory_times_past "qcbus.dev:xosc:1.0.0:trajectory.times_past",
     qcbus_xosc storyboard_event_always_skipped "qcbus.dev:xosc:1.0.0:storyboard.event_always_skipped",
     qcbus_xosc storyboard_run_never_ends "qcbus.dev:xosc:1.0.0:storyboard.run_never_ends",
     qcbus_xosc trigger_conditions_apart "qcbus.dev:xosc:1.0.0:trigger.conditions_apart",
