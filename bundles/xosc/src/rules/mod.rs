@@ -53,6 +53,7 @@ mod entities_selection_not_allowed;
 mod entities_trailer_reference;
 mod entities_unused;
 mod entities_used_after_deletion;
+mod environment_dry_precipitation;
 mod environment_friction_zero;
 mod environment_ranges;
 mod expressions_arguments_of_operators;
@@ -304,6 +305,7 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc header_license_present "qcbus.dev:xosc:1.0.0:header.license_present",
     qcbus_xosc modular_not_plain_scenario "qcbus.dev:xosc:1.0.0:modular.not_plain_scenario",
     qcbus_xosc environment_friction_zero "qcbus.dev:xosc:1.0.0:environment.friction_zero",
+    qcbus_xosc environment_dry_precipitation "qcbus.dev:xosc:1.0.0:environment.dry_precipitation",
     qcbus_xosc deprecated_old_and_new_together "qcbus.dev:xosc:1.0.0:deprecated.old_and_new_together",
     qcbus_xosc deprecated_element_used "qcbus.dev:xosc:1.0.0:deprecated.element_used",
     asam_xosc minsubset_additional_axles_not_allowed "asam.net:xosc:1.3.0:minsubset.additional_axles_not_allowed",
