@@ -36,6 +36,7 @@ mod deprecated_element_used;
 mod deprecated_old_and_new_together;
 mod dialect_ros_substitution;
 mod distribution_parameter_known;
+mod distribution_range_reached;
 mod distribution_range_valid;
 mod distribution_scenario_file;
 mod distribution_values_at_use;
@@ -391,6 +392,7 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc distribution_scenario_file "qcbus.dev:xosc:1.0.0:distribution.scenario_file",
     qcbus_xosc distribution_parameter_known "qcbus.dev:xosc:1.0.0:distribution.parameter_known",
     qcbus_xosc distribution_range_valid "qcbus.dev:xosc:1.0.0:distribution.range_valid",
+    qcbus_xosc distribution_range_reached "qcbus.dev:xosc:1.0.0:distribution.range_reached",
     qcbus_xosc distribution_values_at_use "qcbus.dev:xosc:1.0.0:distribution.values_at_use",
     qcbus_xosc distribution_weights "qcbus.dev:xosc:1.0.0:distribution.weights",
     qcbus_xosc distribution_values_satisfy_constraints "qcbus.dev:xosc:1.0.0:distribution.values_satisfy_constraints",
