@@ -202,6 +202,7 @@ mod storyboard_private_action_global_actor;
 mod storyboard_reference_to_self_or_parent_end;
 mod storyboard_run_never_ends;
 mod storyboard_select_triggering_entities;
+mod storyboard_starts_at_the_end;
 mod storyboard_stop_trigger;
 mod storyboard_unreachable_by_reference;
 mod trajectory_clothoid_time_order;
@@ -345,6 +346,7 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc storyboard_priority_conflict "qcbus.dev:xosc:1.0.0:storyboard.priority_conflict",
     qcbus_xosc storyboard_action_conflict "qcbus.dev:xosc:1.0.0:storyboard.action_conflict",
     qcbus_xosc storyboard_init_conflict "qcbus.dev:xosc:1.0.0:storyboard.init_conflict",
+    qcbus_xosc storyboard_starts_at_the_end "qcbus.dev:xosc:1.0.0:storyboard.starts_at_the_end",
     qcbus_xosc storyboard_private_action_global_actor "qcbus.dev:xosc:1.0.0:storyboard.private_action_global_actor",
     qcbus_xosc storyboard_init_private_unknown "qcbus.dev:xosc:1.0.0:storyboard.init_private_unknown",
     asam_xosc general_animation_constraint_pedestrian "asam.net:xosc:1.2.0:general.animation_constraint_pedestrian",
