@@ -162,6 +162,7 @@ mod references_init_order;
 mod references_init_speed_order;
 mod references_self_reference;
 mod references_traffic_name;
+mod road_ends_before_run;
 mod road_lane_change_possible;
 mod road_lane_id_zero;
 mod road_lane_type_drivable;
@@ -438,6 +439,7 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     asam_xosc positioning_geodetic_datum_defined "asam.net:xosc:1.1.0:positioning.geodetic_datum_defined",
     qcbus_xosc road_lane_type_drivable "qcbus.dev:xosc:1.0.0:road.lane_type_drivable",
     qcbus_xosc road_lane_change_possible "qcbus.dev:xosc:1.0.0:road.lane_change_possible",
+    qcbus_xosc road_ends_before_run "qcbus.dev:xosc:1.0.0:road.ends_before_run",
     qcbus_xosc road_lane_id_zero "qcbus.dev:xosc:1.0.0:road.lane_id_zero",
     qcbus_xosc road_world_position_on_road "qcbus.dev:xosc:1.0.0:road.world_position_on_road",
     qcbus_xosc position_orientation_range "qcbus.dev:xosc:1.0.0:position.orientation_range",
