@@ -38,6 +38,16 @@ pub(crate) fn deletions<'m, 'd>(
         }
     }
     let mut found: Vec<Deletion<'m, 'd>> = Vec::new();
+    for (action, entity) in in_init(scenario) {
+        if !added.contains(&entity) {
+            found.push(Deletion {
+                entity,
+                action,
+                latest: 0.0,
+                after: all(&timeline.tolerant, timeline.plan.parts.len()),
+            });
+        }
+    }
     for (place, one) in scenario.storyboard().elements().iter().enumerate() {
         let action = one.element(scenario);
         let Some(deleted) = deleted_by(action) else {
@@ -66,6 +76,28 @@ pub(crate) fn deletions<'m, 'd>(
         }
     }
     found
+}
+
+/// Returns the actions of `Init` that delete entities, and the names of these.
+fn in_init<'m, 'd>(scenario: &'m Scenario<'d>) -> Vec<(Element<'m, 'd>, String)> {
+    let init = scenario.root().path(&["Storyboard", "Init", "Actions"]);
+    let actions = init
+        .into_iter()
+        .flat_map(|init| init.children_named("GlobalAction"))
+        .filter_map(|global| global.child("EntityAction"))
+        .filter(|action| action.child("DeleteEntityAction").is_some());
+    actions
+        .flat_map(|action| {
+            let names = names(action).unwrap_or_default();
+            names.into_iter().map(move |name| (action, name))
+        })
+        .collect()
+}
+
+/// Returns for each element that it starts after `Init`, unless it never starts.
+fn all(spans: &Spans, count: usize) -> Vec<bool> {
+    let starts = |place| spans.get(place).is_some_and(|span| !span.start.is_never());
+    (0..count).map(starts).collect()
 }
 
 /// Returns the names of the entities that an `Action` deletes. Returns `None` for other actions.

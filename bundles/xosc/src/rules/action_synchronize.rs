@@ -80,19 +80,23 @@ fn targets(scenario: &Scenario<'_>, map: &RoadMap<'_>, speeds: &Speeds, found: &
     }
 }
 
-/// Reports a master that never moves and is not at its target.
+/// Reports a master that never arrives, because it stands or is too slow.
 fn standing(action: Element<'_, '_>, master: &str, speeds: &Speeds, found: &mut Sink<'_>) {
     let scenario = action.scenario();
     let Some(entity) = scenario.entities().object(master) else {
         return;
     };
     let speed = speeds.fastest(master);
-    if speed.is_some_and(|speed| speed > 0.0) || may_drive_itself(scenario, entity) {
+    if may_drive_itself(scenario, entity) {
         return;
     }
     let Some(away) = distance(action, master) else {
         return;
     };
+    if let Some(speed) = speed.filter(|speed| *speed > 0.0) {
+        late(action, master, away / speed, found);
+        return;
+    }
     let (why, level) = match speed {
         Some(_) => ("its speed is 0 from the start", Level::Warning),
         None => (
@@ -107,6 +111,26 @@ fn standing(action: Element<'_, '_>, master: &str, speeds: &Speeds, found: &mut 
         short(away)
     );
     found.about(action, "masterEntityRef", text).level(level);
+}
+
+/// Reports a master that needs more seconds to its target than the run lasts.
+fn late(action: Element<'_, '_>, master: &str, seconds: f64, found: &mut Sink<'_>) {
+    let Some(timeline) = action.scenario().timeline() else {
+        return;
+    };
+    let end = timeline.tolerant.ends.latest;
+    if end.is_finite() && seconds > end {
+        let text = format!(
+            "the master {} arrives at `TargetPositionMaster` after {} s at the earliest, by its greatest speed, but the \
+             run ends at {} s; the actors never arrive together with it",
+            quoted(action, "masterEntityRef", master),
+            short(seconds),
+            short(timeline.standard.ends.earliest)
+        );
+        found
+            .about(action, "masterEntityRef", text)
+            .level(Level::Information);
+    }
 }
 
 /// Returns the distance between the place of the master in `Init` and its target, if it is greater
