@@ -28,15 +28,9 @@ pub(crate) fn deletions<'m, 'd>(
     scenario: &'m Scenario<'d>,
     timeline: &Timeline,
 ) -> Vec<Deletion<'m, 'd>> {
-    let mut added: Vec<String> = Vec::new();
-    for action in scenario.elements_everywhere("EntityAction") {
-        if action.child("DeleteEntityAction").is_none() {
-            match names(action) {
-                Some(names) => added.extend(names),
-                None => return Vec::new(),
-            }
-        }
-    }
+    let Some(added) = added(scenario) else {
+        return Vec::new();
+    };
     let mut found: Vec<Deletion<'m, 'd>> = Vec::new();
     for (action, entity) in in_init(scenario) {
         if !added.contains(&entity) {
@@ -76,6 +70,17 @@ pub(crate) fn deletions<'m, 'd>(
         }
     }
     found
+}
+
+/// Returns the names of the entities that actions add. Returns `None` if one is unknown.
+fn added(scenario: &Scenario<'_>) -> Option<Vec<String>> {
+    let mut added = Vec::new();
+    for action in scenario.elements_everywhere("EntityAction") {
+        if action.child("DeleteEntityAction").is_none() {
+            added.extend(names(action)?);
+        }
+    }
+    Some(added)
 }
 
 /// Returns the actions of `Init` that delete entities, and the names of these.
