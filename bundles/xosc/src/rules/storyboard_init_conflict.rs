@@ -74,7 +74,7 @@ fn report(
         (true, true) => init::adds_to(later, entity),
         (false, _) => false,
     };
-    if is_sound || init::are_same(before, later) {
+    if is_sound || (is_same_kind && init::are_same(before, later)) {
         return false;
     }
     let what = match set {
