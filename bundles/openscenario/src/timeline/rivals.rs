@@ -1,6 +1,6 @@
 //! Actions that stop each other because they control the same thing.
 
-use foldhash::{HashMap, HashMapExt as _};
+use std::collections::BTreeMap;
 
 use super::plan::Part;
 use crate::queries::actors::Actors;
@@ -13,7 +13,7 @@ const MOST: usize = 200;
 
 /// Lists the rivals of each action. An action with unknown actors is a rival of every other one.
 pub(super) fn fill(scenario: &Scenario<'_>, parts: &mut [Part]) {
-    let mut by_entity: HashMap<(String, Domain), Vec<usize>> = HashMap::new();
+    let mut by_entity: BTreeMap<(String, Domain), Vec<usize>> = BTreeMap::new();
     let mut of_anybody: Vec<usize> = Vec::new();
     let elements = scenario.storyboard().elements();
     let actions = elements.iter().enumerate();
@@ -64,7 +64,7 @@ fn add<'r>(parts: &mut [Part], place: usize, rivals: impl Iterator<Item = &'r us
 }
 
 /// Part of an entity's motion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Domain {
     Longitudinal,
     Lateral,

@@ -2,16 +2,20 @@
 
 pub(crate) mod actions;
 pub(crate) mod allowed_values;
+pub(crate) mod behind;
 pub(crate) mod casts;
 pub(crate) mod catalogs;
 pub(crate) mod constraints;
 pub(crate) mod declared;
+pub(crate) mod deletions;
 pub(crate) mod demands;
 pub(crate) mod deprecation;
 pub(crate) mod distributions;
 pub(crate) mod finite;
 pub(crate) mod impossible;
+pub(crate) mod init;
 pub(crate) mod minsubset;
+pub(crate) mod motion;
 pub(crate) mod names;
 pub(crate) mod origins;
 pub(crate) mod placement;
@@ -25,6 +29,7 @@ pub(crate) mod routes;
 pub(crate) mod signals;
 pub(crate) mod spawn;
 pub(crate) mod states;
+pub(crate) mod stays;
 pub(crate) mod timeline;
 pub(crate) mod trajectories;
 pub(crate) mod triggers;

@@ -21,8 +21,12 @@ pub(crate) struct OnRoad<'w, 'r> {
 /// Returns the lanes that a `RelativeLanePosition` may mean. Tools disagree on whether the center
 /// lane counts. Against the road they also disagree on which side is left.
 pub(crate) fn lanes(position: Element<'_, '_>, on: OnRoad<'_, '_>) -> Option<Vec<i64>> {
+    lanes_by(position.integer("dLane")?, on)
+}
+
+/// Like [`lanes`], for a change by a number of lanes.
+pub(crate) fn lanes_by(by: i64, on: OnRoad<'_, '_>) -> Option<Vec<i64>> {
     let from = on.lane.filter(|lane| *lane != 0)?;
-    let by = position.integer("dLane")?;
     let mut lanes = Vec::new();
     let signs: &[i64] = if on.along || by == 0 { &[1] } else { &[1, -1] };
     for sign in signs {

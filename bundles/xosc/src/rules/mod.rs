@@ -9,6 +9,7 @@ mod action_add_delete_order;
 mod action_controller_override_range;
 mod action_custom_command_portable;
 mod action_distance_exclusive;
+mod action_limit_zero;
 mod action_negative_lane_change;
 mod action_relative_speed_continuous;
 mod action_speed_not_negative;
@@ -35,6 +36,7 @@ mod deprecated_element_used;
 mod deprecated_old_and_new_together;
 mod dialect_ros_substitution;
 mod distribution_parameter_known;
+mod distribution_range_reached;
 mod distribution_range_valid;
 mod distribution_scenario_file;
 mod distribution_values_at_use;
@@ -51,6 +53,8 @@ mod entities_selection_members;
 mod entities_selection_not_allowed;
 mod entities_trailer_reference;
 mod entities_unused;
+mod entities_used_after_deletion;
+mod environment_dry_precipitation;
 mod environment_friction_zero;
 mod environment_ranges;
 mod expressions_arguments_of_operators;
@@ -157,8 +161,11 @@ mod reference_control_unique_element_names_on_same_level;
 mod reference_control_uniquely_resolvable_entity_references;
 mod reference_control_valid_actor_reference_in_private_actions;
 mod references_init_order;
+mod references_init_speed_order;
 mod references_self_reference;
 mod references_traffic_name;
+mod road_ends_before_run;
+mod road_lane_change_possible;
 mod road_lane_id_zero;
 mod road_lane_type_drivable;
 mod road_signal_condition;
@@ -190,6 +197,7 @@ mod storyboard_empty;
 mod storyboard_ends_at_once;
 mod storyboard_event_always_skipped;
 mod storyboard_event_never_starts;
+mod storyboard_init_conflict;
 mod storyboard_init_private_unknown;
 mod storyboard_maximum_execution_count;
 mod storyboard_priority_conflict;
@@ -197,13 +205,16 @@ mod storyboard_private_action_global_actor;
 mod storyboard_reference_to_self_or_parent_end;
 mod storyboard_run_never_ends;
 mod storyboard_select_triggering_entities;
+mod storyboard_starts_at_the_end;
 mod storyboard_stop_trigger;
 mod storyboard_unreachable_by_reference;
 mod trajectory_clothoid_time_order;
 mod trajectory_duplicate_vertices;
 mod trajectory_knots_non_decreasing;
 mod trajectory_speed_plausible;
+mod trajectory_times_ignored;
 mod trajectory_times_increasing;
+mod trajectory_times_past;
 mod trajectory_timing_scale;
 mod trigger_conditions_apart;
 mod trigger_contradiction;
@@ -303,6 +314,7 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc header_license_present "qcbus.dev:xosc:1.0.0:header.license_present",
     qcbus_xosc modular_not_plain_scenario "qcbus.dev:xosc:1.0.0:modular.not_plain_scenario",
     qcbus_xosc environment_friction_zero "qcbus.dev:xosc:1.0.0:environment.friction_zero",
+    qcbus_xosc environment_dry_precipitation "qcbus.dev:xosc:1.0.0:environment.dry_precipitation",
     qcbus_xosc deprecated_old_and_new_together "qcbus.dev:xosc:1.0.0:deprecated.old_and_new_together",
     qcbus_xosc deprecated_element_used "qcbus.dev:xosc:1.0.0:deprecated.element_used",
     asam_xosc minsubset_additional_axles_not_allowed "asam.net:xosc:1.3.0:minsubset.additional_axles_not_allowed",
@@ -340,6 +352,8 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc storyboard_select_triggering_entities "qcbus.dev:xosc:1.0.0:storyboard.select_triggering_entities",
     qcbus_xosc storyboard_priority_conflict "qcbus.dev:xosc:1.0.0:storyboard.priority_conflict",
     qcbus_xosc storyboard_action_conflict "qcbus.dev:xosc:1.0.0:storyboard.action_conflict",
+    qcbus_xosc storyboard_init_conflict "qcbus.dev:xosc:1.0.0:storyboard.init_conflict",
+    qcbus_xosc storyboard_starts_at_the_end "qcbus.dev:xosc:1.0.0:storyboard.starts_at_the_end",
     qcbus_xosc storyboard_private_action_global_actor "qcbus.dev:xosc:1.0.0:storyboard.private_action_global_actor",
     qcbus_xosc storyboard_init_private_unknown "qcbus.dev:xosc:1.0.0:storyboard.init_private_unknown",
     asam_xosc general_animation_constraint_pedestrian "asam.net:xosc:1.2.0:general.animation_constraint_pedestrian",
@@ -349,6 +363,7 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc action_relative_speed_continuous "qcbus.dev:xosc:1.0.0:action.relative_speed_continuous",
     qcbus_xosc action_step_dynamics_zero "qcbus.dev:xosc:1.0.0:action.step_dynamics_zero",
     qcbus_xosc action_transition_not_zero "qcbus.dev:xosc:1.0.0:action.transition_not_zero",
+    qcbus_xosc action_limit_zero "qcbus.dev:xosc:1.0.0:action.limit_zero",
     qcbus_xosc action_synchronize "qcbus.dev:xosc:1.0.0:action.synchronize",
     qcbus_xosc action_add_delete_order "qcbus.dev:xosc:1.0.0:action.add_delete_order",
     qcbus_xosc action_speed_not_negative "qcbus.dev:xosc:1.0.0:action.speed_not_negative",
@@ -386,12 +401,14 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc distribution_scenario_file "qcbus.dev:xosc:1.0.0:distribution.scenario_file",
     qcbus_xosc distribution_parameter_known "qcbus.dev:xosc:1.0.0:distribution.parameter_known",
     qcbus_xosc distribution_range_valid "qcbus.dev:xosc:1.0.0:distribution.range_valid",
+    qcbus_xosc distribution_range_reached "qcbus.dev:xosc:1.0.0:distribution.range_reached",
     qcbus_xosc distribution_values_at_use "qcbus.dev:xosc:1.0.0:distribution.values_at_use",
     qcbus_xosc distribution_weights "qcbus.dev:xosc:1.0.0:distribution.weights",
     qcbus_xosc distribution_values_satisfy_constraints "qcbus.dev:xosc:1.0.0:distribution.values_satisfy_constraints",
     qcbus_xosc entities_none "qcbus.dev:xosc:1.0.0:entities.none",
     qcbus_xosc entities_not_positioned "qcbus.dev:xosc:1.0.0:entities.not_positioned",
     qcbus_xosc entities_unused "qcbus.dev:xosc:1.0.0:entities.unused",
+    qcbus_xosc entities_used_after_deletion "qcbus.dev:xosc:1.0.0:entities.used_after_deletion",
     qcbus_xosc entities_selection_members "qcbus.dev:xosc:1.0.0:entities.selection_members",
     qcbus_xosc entities_selection_not_allowed "qcbus.dev:xosc:1.0.0:entities.selection_not_allowed",
     qcbus_xosc entities_bounding_box_positive "qcbus.dev:xosc:1.0.0:entities.bounding_box_positive",
@@ -404,6 +421,7 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc references_self_reference "qcbus.dev:xosc:1.0.0:references.self_reference",
     qcbus_xosc references_traffic_name "qcbus.dev:xosc:1.0.0:references.traffic_name",
     qcbus_xosc references_init_order "qcbus.dev:xosc:1.0.0:references.init_order",
+    qcbus_xosc references_init_speed_order "qcbus.dev:xosc:1.0.0:references.init_speed_order",
     asam_xosc scenario_logic_controller_activation "asam.net:xosc:1.2.0:scenario_logic.controller_activation",
     asam_xosc reference_control_road_network_reference "asam.net:xosc:1.0.0:reference_control.road_network_reference",
     asam_xosc reference_control_road_network_availability "asam.net:xosc:1.0.0:reference_control.road_network_availability",
@@ -426,6 +444,8 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     asam_xosc positioning_road_lane_offset_in_bounds,
     asam_xosc positioning_geodetic_datum_defined "asam.net:xosc:1.1.0:positioning.geodetic_datum_defined",
     qcbus_xosc road_lane_type_drivable "qcbus.dev:xosc:1.0.0:road.lane_type_drivable",
+    qcbus_xosc road_lane_change_possible "qcbus.dev:xosc:1.0.0:road.lane_change_possible",
+    qcbus_xosc road_ends_before_run "qcbus.dev:xosc:1.0.0:road.ends_before_run",
     qcbus_xosc road_lane_id_zero "qcbus.dev:xosc:1.0.0:road.lane_id_zero",
     qcbus_xosc road_world_position_on_road "qcbus.dev:xosc:1.0.0:road.world_position_on_road",
     qcbus_xosc position_orientation_range "qcbus.dev:xosc:1.0.0:position.orientation_range",
@@ -446,6 +466,8 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xosc trajectory_speed_plausible "qcbus.dev:xosc:1.0.0:trajectory.speed_plausible",
     qcbus_xosc trajectory_clothoid_time_order "qcbus.dev:xosc:1.0.0:trajectory.clothoid_time_order",
     qcbus_xosc trajectory_knots_non_decreasing "qcbus.dev:xosc:1.0.0:trajectory.knots_non_decreasing",
+    qcbus_xosc trajectory_times_ignored "qcbus.dev:xosc:1.0.0:trajectory.times_ignored",
+    qcbus_xosc trajectory_times_past "qcbus.dev:xosc:1.0.0:trajectory.times_past",
     qcbus_xosc storyboard_event_always_skipped "qcbus.dev:xosc:1.0.0:storyboard.event_always_skipped",
     qcbus_xosc storyboard_run_never_ends "qcbus.dev:xosc:1.0.0:storyboard.run_never_ends",
     qcbus_xosc trigger_conditions_apart "qcbus.dev:xosc:1.0.0:trigger.conditions_apart",
