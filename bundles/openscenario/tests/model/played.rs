@@ -1,5 +1,10 @@
 //! The bounds of the timeline hold in random runs of random storyboards.
 
+#![allow(
+    clippy::unwrap_used,
+    reason = "this is all test code, including functions without `#[test]`"
+)]
+
 mod player;
 mod storyboards;
 

@@ -175,13 +175,21 @@ fn idle(scenario: &Scenario<'_>, timeline: &Timeline, of: usize) -> Option<Strin
     Some(format!("{name} never starts"))
 }
 
-/// Checks whether another finding reports why a state never comes: its element never starts, or
-/// contains the element that waits.
-pub(crate) fn follows(timeline: &Timeline, of: usize, waits: usize) -> bool {
+/// Checks whether another finding reports why a state never comes: its element never starts, or it
+/// is the end of an element around the one that waits.
+pub(crate) fn follows(
+    timeline: &Timeline,
+    state: Element<'_, '_>,
+    of: usize,
+    waits: usize,
+) -> bool {
     let parent = |at: &usize| timeline.plan.parts.get(*at)?.parent;
     let span = timeline.standard.get(of);
+    let is_end = state
+        .word("state")
+        .is_some_and(|word| !matches!(&*word, "standbyState" | "skipTransition"));
     span.is_some_and(|span| span.start.is_never())
-        || std::iter::successors(Some(waits), parent).any(|around| around == of)
+        || (is_end && std::iter::successors(Some(waits), parent).any(|around| around == of))
 }
 
 /// Returns " (some simulators …)" if they differ.

@@ -21,7 +21,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             let condition = never.condition(at);
             let state = condition
                 .and_then(|it| it.path(&["ByValueCondition", "StoryboardElementStateCondition"]));
-            let Some(state) = state.filter(|_| !follows(timeline, of, never.place)) else {
+            let Some(state) = state.filter(|it| !follows(timeline, *it, of, never.place)) else {
                 continue;
             };
             let text = format!(

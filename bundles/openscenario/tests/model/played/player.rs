@@ -354,7 +354,7 @@ impl<'p> Player<'p> {
                 transition => self.seen.contains(&(*place, *transition)),
             },
             Logic::Never => false,
-            Logic::Unknown => self.draw() % 8 == 0,
+            Logic::Unknown => self.draw().is_multiple_of(8),
         }
     }
 
