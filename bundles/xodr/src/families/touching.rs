@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use super::driving::is_drivable;
 use super::gap_levels::Misfit;
 use super::on_road::{OnRoad as _, lane_name};
+use super::routes::is_route;
 use crate::prelude::*;
 use qcbus_opendrive::BorderPoint;
 use qcbus_opendrive::TouchingLanes;
@@ -238,6 +239,14 @@ pub(crate) fn report_step(pair: &Pair<'_, '_>, found: &mut Sink<'_>) -> bool {
         edge.side, edge.amount
     );
     let misfit = Misfit::step(edge.amount, found);
+    // No route leads over a border or a hard shoulder.
+    let has_routes = is_route(pair.from) && is_route(pair.to);
+    let most = if has_routes {
+        Misfit::Broken
+    } else {
+        Misfit::Plain
+    };
+    let misfit = misfit.min(most);
     misfit.put(pair.report(&text, edge.point, found));
     true
 }
