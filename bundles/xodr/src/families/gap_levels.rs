@@ -37,7 +37,7 @@ pub(crate) const STEP_BROKEN_FROM: Param = Param::number(
 );
 
 /// Limits for changes of direction, in plan view and crossfall. The second one applies to reference
-/// lines.
+/// lines and to the ends of roads.
 pub(crate) const KINK_ERROR_FROM: Param = Param::number(
     "kink_error_from",
     0.2,
