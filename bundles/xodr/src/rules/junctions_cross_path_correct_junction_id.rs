@@ -20,6 +20,10 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let mut told = HashSet::new();
     let identified = |junction: &&Junction<'_>| !junction.id().is_empty();
     for junction in map.junctions().iter().filter(identified) {
+        if junction.id() == "-1" {
+            named_none(junction, found);
+            continue;
+        }
         let paths = junction.cross_paths();
         let paths = paths.map(|path| (path.crossing_road(), path.node(), "crossing"));
         // Direct junctions and crossings have no own roads.
@@ -63,6 +67,16 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             }
         }
     }
+}
+
+/// Reports a junction whose id means that a road belongs to no junction.
+fn named_none(junction: &Junction<'_>, found: &mut Sink<'_>) {
+    let text = "the junction has the id `-1`, which says of a road that it belongs to no junction; it must have another \
+                id, and so must `junction` of its roads";
+    found
+        .issue(Place::attribute_or_node(junction.node(), "id"), text)
+        .in_every_version(Level::Error)
+        .uid(CONNECTING);
 }
 
 /// Reports a connecting road that belongs to no junction. No version allows this: readers take it
