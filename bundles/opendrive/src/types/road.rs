@@ -131,10 +131,11 @@ impl<'a> Road<'a> {
     }
 
     /// Returns the id of the junction of the road. Returns `None` if it belongs to no junction
-    /// (`-1` or no attribute).
+    /// (`-1`, empty or no attribute).
     #[inline]
     pub fn junction(&self) -> Option<&'a str> {
-        self.junction.filter(|id| *id != "-1")
+        self.junction
+            .filter(|id| *id != "-1" && !id.trim().is_empty())
     }
 
     /// Returns `@rule`, or `None` if the standard does not define the word.

@@ -3,8 +3,8 @@
 //! Every rule about a gap, a step or a kink reports above its own tolerance. Values below
 //! `…_error_from` are warnings, because simulators tolerate them. From there on they are errors
 //! where the standard requires that things meet. In files of older versions the level is one lower.
-//! A lane that continues metres beside its end cannot be driven on. This is an error in every
-//! version.
+//! A lane that continues metres beside its end, or half a metre above it, cannot be driven on. This
+//! is an error in every version.
 
 use crate::prelude::*;
 
@@ -31,17 +31,24 @@ pub(crate) const STEP_ERROR_FROM: Param = Param::number(
 );
 pub(crate) const STEP_BROKEN_FROM: Param = Param::number(
     "step_broken_from",
-    3.0,
+    0.3,
     "m",
-    "minimum height of steps that are errors in every version",
+    "minimum height of steps that are errors in every version, the radius of a wheel of a car",
 );
 
-/// Limit for changes of direction, in plan view and crossfall.
+/// Limits for changes of direction, in plan view and crossfall. The second one applies to reference
+/// lines and to the ends of roads.
 pub(crate) const KINK_ERROR_FROM: Param = Param::number(
     "kink_error_from",
     0.2,
     "rad",
     "minimum angle of kinks that are errors where the standard allows none",
+);
+pub(crate) const KINK_BROKEN_FROM: Param = Param::number(
+    "kink_broken_from",
+    0.785,
+    "rad",
+    "minimum angle of kinks that are errors in every version, the largest steering angle of a car",
 );
 
 /// Severity of a misfit.
@@ -69,7 +76,8 @@ impl Misfit {
         Misfit::of(height, height, from)
     }
 
-    /// Classifies a kink. Every kink can be driven, so older versions allow any angle.
+    /// Classifies a kink between two lanes. Older versions allow any angle, because the lanes have a
+    /// gap as well if the roads do not continue each other.
     pub fn kink(angle: f64, found: &Sink<'_>) -> Misfit {
         let from = [found.number(&KINK_ERROR_FROM), f64::INFINITY];
         Misfit::of(angle, angle, from)

@@ -1,8 +1,9 @@
-//! Lane numbers as references: links of lanes to lanes, lane links of junctions.
+//! Lane numbers as references: links of lanes to lanes, lane links and boundaries of junctions.
 
 use crate::prelude::*;
 use qcbus_opendrive::JunctionLaneLink;
 use qcbus_opendrive::LaneLink;
+use qcbus_opendrive::SegmentStation;
 
 /// Reports numbers in lane links that refer to no lane. It reports nothing if the target is unknown
 /// because a road does not exist or is not linked. Other rules report that.
@@ -35,6 +36,52 @@ pub(crate) fn of_junctions(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             demand_lane(link.node(), "from", &from, found);
         }
     }
+}
+
+/// Reports the same for the boundaries of junctions. A segment along a lane must have the lane
+/// somewhere between its ends, a segment across a road must have it at the end of the road.
+pub(crate) fn of_boundaries(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let boundaries = map.junctions().iter().filter_map(Junction::boundary);
+    for segment in boundaries.flat_map(|boundary| boundary.segments()) {
+        let Some(road) = segment.road_id().and_then(|id| map.road(id)) else {
+            continue;
+        };
+        let lanes = [
+            ("boundaryLane", segment.boundary_lane(), "lane"),
+            ("jointLaneStart", segment.joint_lane_start(), "joint"),
+            ("jointLaneEnd", segment.joint_lane_end(), "joint"),
+        ];
+        for (name, id, kind) in lanes {
+            // The center lane is the line from which the others are counted.
+            let id = id.filter(|id| *id != 0 && segment.kind() == Some(kind));
+            if let Some(id) = id {
+                demand_lane(segment.node(), name, &crossed(road, segment, id), found);
+            }
+        }
+    }
+}
+
+/// Returns the lane sections of a segment of a boundary.
+fn crossed<'m, 'a>(
+    road: &'m Road<'a>,
+    segment: BoundarySegment<'a>,
+    id: i64,
+) -> Vec<SectionRef<'m, 'a>> {
+    let at_end = |end| end_section(road, Some(id), LayerKind::Permanent, end);
+    if segment.kind() == Some("joint") {
+        let section = segment.contact_point().and_then(at_end);
+        return section.into_iter().collect();
+    }
+    let station = |station: SegmentStation| match station {
+        SegmentStation::S(s) => Some(s),
+        SegmentStation::End(end) => road.end_s(end),
+    };
+    let ends = segment.s_start().and_then(station);
+    let ends = ends.zip(segment.s_end().and_then(station));
+    ends.map_or_else(Vec::new, |(from, to)| {
+        let range = [from.min(to), from.max(to)];
+        sections_between(road, LayerKind::Permanent, Side::of_lane_id(id), range)
+    })
 }
 
 /// Returns a function that checks whether a link is one of those that lead to a lane.
@@ -162,8 +209,13 @@ fn demand_lane(
         return;
     }
     let text = format!(
-        "`{attribute}=\"{id}\"` of `{}` refers to a lane that is not defined in the linked lane section",
-        link.name()
+        "`{attribute}=\"{id}\"` of `{}` refers to a lane that is not defined in the {} lane section",
+        link.name(),
+        if link.is("segment") {
+            "road's"
+        } else {
+            "linked"
+        }
     );
     found
         .issue(Place::attribute_or_node(link, attribute), text)

@@ -66,6 +66,7 @@ pub(crate) fn flaws(text: &str) -> Vec<Flaw> {
     }
     if projection == Some("utm") {
         warn_of_zone(value("zone"), value("lon_0"), &mut warn);
+        warn_of_fixed(&words, value("zone"), &mut warn);
     }
     let latitude = |key| value(key).and_then(degrees).unwrap_or(0.0);
     if let Some(cone) = projection.filter(|name| CONES.contains(name))
@@ -231,6 +232,44 @@ fn warn_of_zone(zone: Option<&str>, longitude: Option<&str>, warn: &mut impl FnM
             warn("`+proj=utm` has no `+zone`; it must have a zone from 1 to 60".to_owned());
         }
         None => {}
+    }
+}
+
+/// Warns of parameters that UTM itself fixes and that have other values. PROJ ignores them.
+fn warn_of_fixed(words: &[Word<'_>], zone: Option<&str>, warn: &mut impl FnMut(String)) {
+    let is_south = words.iter().any(|word| word.key == "south");
+    let zone = zone.and_then(|zone| zone.parse::<u8>().ok());
+    let meridian = zone.map(|zone| f64::from(zone) * 6.0 - 183.0);
+    let false_northing = if is_south { 10_000_000.0 } else { 0.0 };
+    let mut ignored = Vec::new();
+    let mut is_southern = false;
+    for word in words {
+        let angle = || word.value.and_then(degrees);
+        let length = || word.value.and_then(number);
+        let (given, fixed) = match word.key {
+            "lat_0" => (angle(), Some(0.0)),
+            "lon_0" => (angle(), meridian),
+            "x_0" => (length(), Some(500_000.0)),
+            "y_0" => (length(), Some(false_northing)),
+            "k" | "k_0" => (length(), Some(0.9996)),
+            _ => continue,
+        };
+        if let Some((given, fixed)) = given.zip(fixed).filter(|(one, other)| one != other) {
+            is_southern |= word.key == "lat_0" && given < 0.0 && !is_south;
+            ignored.push(format!("`+{}={given}` (fixed: {fixed})", word.key));
+        }
+    }
+    if !ignored.is_empty() {
+        let south = if is_southern {
+            "; for a place in the south, add `+south`"
+        } else {
+            ""
+        };
+        warn(format!(
+            "`+proj=utm` has its own origin and scale, so PROJ ignores {} and the map may lie elsewhere; remove what is \
+             ignored, use `offset` in the header, or use `+proj=tmerc`{south}",
+            ignored.join(", ")
+        ));
     }
 }
 

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use super::driving::is_drivable;
 use super::gap_levels::Misfit;
 use super::on_road::{OnRoad as _, lane_name};
+use super::routes::is_route;
 use crate::prelude::*;
 use qcbus_opendrive::BorderPoint;
 use qcbus_opendrive::TouchingLanes;
@@ -136,6 +137,17 @@ impl Pair<'_, '_> {
         })
     }
 
+    /// Returns the angle between the reference lines of two roads whose ends touch, in radians.
+    pub fn corner(&self) -> Option<f64> {
+        let joint = &self.touching.joint;
+        let (from, to) = (self.from.at.road, self.to.at.road);
+        let turn = if joint.is_reversed() { PI } else { 0.0 };
+        let one = from.end_pose(joint.from.end)?;
+        let other = to.end_pose(joint.to.end)?;
+        let angle = heading_difference(one.hdg, other.hdg + turn)?;
+        (from.index() != to.index()).then_some(angle)
+    }
+
     /// Returns the edge with the highest step among those that meet, in metres. The height
     /// difference caused by a slope over a gap in the plan view is subtracted.
     pub fn step(&self) -> Option<EdgeFault> {
@@ -208,8 +220,9 @@ fn distance(here: BorderPoint, there: BorderPoint) -> f64 {
     here.point.plan().distance(there.point.plan())
 }
 
-/// Reports edges with a kink where linked lanes touch.
-pub(crate) fn report_kink(pair: &Pair<'_, '_>, found: &mut Sink<'_>) {
+/// Reports edges with a kink where linked lanes touch. A corner between the roads themselves of
+/// `broken_from` radians and more is an error in every version.
+pub(crate) fn report_kink(pair: &Pair<'_, '_>, broken_from: f64, found: &mut Sink<'_>) {
     let limit = found.number(&KINK);
     if let Some(edge) = pair
         .kink(found.number(&GAP))
@@ -222,7 +235,12 @@ pub(crate) fn report_kink(pair: &Pair<'_, '_>, found: &mut Sink<'_>) {
             edge.amount,
             edge.amount.to_degrees()
         );
-        let misfit = Misfit::kink(edge.amount, found);
+        let is_broken = pair.corner().is_some_and(|corner| corner >= broken_from);
+        let misfit = if is_broken && is_route(pair.from) && is_route(pair.to) {
+            Misfit::Broken
+        } else {
+            Misfit::kink(edge.amount, found)
+        };
         misfit.put(pair.report(&text, edge.point, found));
     }
 }
@@ -238,6 +256,14 @@ pub(crate) fn report_step(pair: &Pair<'_, '_>, found: &mut Sink<'_>) -> bool {
         edge.side, edge.amount
     );
     let misfit = Misfit::step(edge.amount, found);
+    // No route leads over a border or a hard shoulder.
+    let has_routes = is_route(pair.from) && is_route(pair.to);
+    let most = if has_routes {
+        Misfit::Broken
+    } else {
+        Misfit::Plain
+    };
+    let misfit = misfit.min(most);
     misfit.put(pair.report(&text, edge.point, found));
     true
 }
@@ -250,7 +276,7 @@ pub(crate) fn report_misfits(
     found: &mut Sink<'_>,
 ) {
     for pair in pairs_of(map, map.touching_lanes()).filter(|pair| mine(pair.at)) {
-        report_kink(&pair, found);
+        report_kink(&pair, f64::INFINITY, found);
         let has_grid = pair.at
             == Where::Connection {
                 elevation_grid: true,

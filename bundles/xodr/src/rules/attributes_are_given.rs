@@ -1,7 +1,10 @@
+use std::cell::LazyCell;
+
 use crate::families::ids::{KINDS, Scope};
 use crate::families::object_parts::{listed, named};
 use crate::families::own_schema::OwnSchema;
 use crate::prelude::*;
+use foldhash::HashSet;
 
 pub const RULE: Rule<Document> = Rule {
     run,
@@ -55,6 +58,7 @@ const NEEDS: &[Needs] = &[
 fn run(document: &Document<'_>, found: &mut Sink<'_>) {
     let schema = OwnSchema::new(*document);
     ids(document, &schema, found);
+    junctions(document, found);
     for needs in NEEDS {
         for node in document.elements(needs.element) {
             check(needs, node, &schema, found);
@@ -78,6 +82,35 @@ fn ids(document: &Document<'_>, schema: &OwnSchema<'_>, found: &mut Sink<'_>) {
             );
             found.issue(place, text);
         }
+    }
+}
+
+/// Reports roads whose `junction` is empty. `junctions.cross_path.correct_junction_id` reports
+/// connecting roads.
+fn junctions(document: &Document<'_>, found: &mut Sink<'_>) {
+    // Only few maps need this set.
+    let connecting = LazyCell::new(|| {
+        let connections = document.elements("connection");
+        connections
+            .filter_map(|one| one.attr("connectingRoad"))
+            .collect::<HashSet<&str>>()
+    });
+    for road in document.elements("road") {
+        let empty = road
+            .attribute("junction")
+            .filter(|junction| junction.value().trim().is_empty());
+        let Some(junction) = empty.filter(|_| !is_user_data(road)) else {
+            continue;
+        };
+        if road.attr("id").is_some_and(|id| connecting.contains(id)) {
+            continue;
+        }
+        let text = format!(
+            "`junction` of {} is empty; it must be `-1` for a road outside of junctions, because some readers take an \
+             empty one for a junction",
+            named(road)
+        );
+        found.issue(junction, text).level(Level::Warning);
     }
 }
 

@@ -152,6 +152,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         }
     }
     lane_references::of_junctions(map, found);
+    lane_references::of_boundaries(map, found);
 }
 
 fn check(reference: &Reference, node: Node<'_>, defined: &Defined<'_>, found: &mut Sink<'_>) {

@@ -22,6 +22,20 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             continue;
         };
         for end in ContactPoint::BOTH {
+            if let Some(link) = leads_inside(road, junction, end, found.number(&NARROW)) {
+                let text = format!(
+                    "the {} of the connecting road `{}` is junction `{}`, to which the road itself belongs; it must \
+                     be the road that follows at its {end}, otherwise routes end inside the junction",
+                    end.link_name(),
+                    road.id(),
+                    junction.id()
+                );
+                found
+                    .issue(link.node(), text)
+                    .at_end(road, end)
+                    .at(connection.node(), "the connection that uses the road");
+                continue;
+            }
             let enters = connection.contact_point() == Some(end);
             if is_open(road, end, found.number(&NARROW)) && (enters || !has_lane_links(road, end)) {
                 let text = format!(
@@ -47,6 +61,18 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             }
         }
     }
+}
+
+/// Returns the link at an end with traffic if it leads to the junction of the road itself.
+fn leads_inside<'a>(
+    road: &Road<'a>,
+    junction: &Junction<'a>,
+    end: ContactPoint,
+    narrow: f64,
+) -> Option<RoadLink<'a>> {
+    let link = road.link(end)?;
+    let is_inside = link.junction_id() == Some(junction.id());
+    (is_inside && routes_at(road, end, narrow).next().is_some()).then_some(link)
 }
 
 /// Checks whether traffic reaches an end of a road that has no link.

@@ -57,6 +57,7 @@ mod junctions_direct_split_or_merge;
 mod junctions_elevation_grid_entry_exit_smoothness;
 mod junctions_elevation_grid_only_one_elev_grid;
 mod junctions_elevation_grid_placed;
+mod junctions_elevation_grid_readable;
 mod junctions_elevation_grid_valid_for_entire_boundry;
 mod junctions_geometry_correct_junction_boundry;
 mod junctions_geometry_only_one_line_element;
@@ -220,10 +221,12 @@ mod road_object_object_marking_keep_id_ordered;
 mod road_object_object_marking_outline_corner_reference_count;
 mod road_object_orientation;
 mod road_object_outline_exactly_one_outer;
+mod road_object_outline_has_area;
 mod road_object_outline_inner_outline_touches_outer;
 mod road_object_outline_not_crossed;
 mod road_object_outline_outline_followed_by_corner;
 mod road_object_outline_points_inside_box;
+mod road_object_parking_apart;
 mod road_object_positive_size;
 mod road_object_reference_from_lower_equal_to;
 mod road_object_repeating_attributes_with_outline_skeleton;
@@ -257,6 +260,7 @@ mod road_railroad_rail_lane_width_validity;
 mod road_railroad_rail_refline_centered;
 mod road_railroad_switch_check_switch_conn;
 mod road_railroad_switch_single_switch_no_partner;
+mod road_railroad_tracks_meet;
 mod road_ranges_not_reversed;
 mod road_records_within_extent;
 mod road_roadside_angles_in_radians;
@@ -271,12 +275,14 @@ mod road_signal_boards_multi_board_use_correct_type;
 mod road_signal_boards_multi_board_use_dynamic_true;
 mod road_signal_boards_static_board_use_correct_type;
 mod road_signal_boards_static_boards_no_single_signal;
+mod road_signal_catalog_entry;
 mod road_signal_controller_dynamic_only;
 mod road_signal_controller_in_junction;
 mod road_signal_controller_one_per_light;
 mod road_signal_controller_valid_for_signals;
 mod road_signal_gantry_all_variable_boards_same_gantry;
 mod road_signal_gantry_vmsgroup_at_least_one_reference;
+mod road_signal_light_is_dynamic;
 mod road_signal_no_self_reference;
 mod road_signal_reference_from_lower_equal_to;
 mod road_signal_reference_left_hand_traffic_lane_ids;
@@ -296,6 +302,7 @@ mod road_type_only_alpha_2_country_codes;
 mod road_validity_lanes_exist;
 mod words_are_known;
 mod xml_fileheader_is_present;
+mod xml_no_prefixes;
 mod xml_root_tag_is_opendrive;
 mod xml_valid_schema;
 mod xml_valid_xml_document;
@@ -500,7 +507,7 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     asam_xodr junctions_virtual_only_one_start_end "asam.net:xodr:1.9.0:junctions.virtual.only_one_start_end",
     asam_xodr junctions_virtual_main_road_only "asam.net:xodr:1.9.0:junctions.virtual.main_road_only",
     asam_xodr junctions_boundary_segments_for_each_conn_road "asam.net:xodr:1.8.0:junctions.boundary.segments_for_each_conn_road",
-    asam_xodr junctions_cross_path_correct_junction_id "asam.net:xodr:1.8.0:junctions.cross_path.correct_junction_id",
+    asam_xodr junctions_cross_path_correct_junction_id,
     asam_xodr junctions_cross_path_only_connect_correct_type "asam.net:xodr:1.8.0:junctions.cross_path.only_connect_correct_type",
     asam_xodr road_linkage_junc_link_attribute_usage "asam.net:xodr:1.7.0:road.linkage.junc_link_attribute_usage",
     asam_xodr road_linkage_road_link_attribute_usage "asam.net:xodr:1.4.0:road.linkage.road_link_attribute_usage",
@@ -601,4 +608,11 @@ pub static RULES: &[&dyn AnyRule] = qcbus_sdk::rules! {
     qcbus_xodr road_signal_no_self_reference "qcbus.dev:xodr:1.2.0:road.signal.no_self_reference",
     qcbus_xodr words_are_known "qcbus.dev:xodr:1.0.0:words.are_known",
     qcbus_xodr road_lane_offset_plausible "qcbus.dev:xodr:1.4.0:road.lane.offset_plausible",
+    qcbus_xodr junctions_elevation_grid_readable "qcbus.dev:xodr:1.8.0:junctions.elevation_grid.readable",
+    qcbus_xodr road_object_outline_has_area "qcbus.dev:xodr:1.4.0:road.object.outline_has_area",
+    qcbus_xodr road_object_parking_apart "qcbus.dev:xodr:1.4.0:road.object.parking_apart",
+    qcbus_xodr road_railroad_tracks_meet "qcbus.dev:xodr:1.4.0:road.railroad.tracks_meet",
+    qcbus_xodr road_signal_catalog_entry "qcbus.dev:xodr:1.4.0:road.signal.catalog_entry",
+    qcbus_xodr road_signal_light_is_dynamic "qcbus.dev:xodr:1.4.0:road.signal.light_is_dynamic",
+    qcbus_xodr xml_no_prefixes "qcbus.dev:xodr:1.0.0:xml.no_prefixes",
 };

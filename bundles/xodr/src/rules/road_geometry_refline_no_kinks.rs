@@ -1,4 +1,4 @@
-use crate::families::gap_levels::KINK_ERROR_FROM;
+use crate::families::gap_levels::{KINK_BROKEN_FROM, KINK_ERROR_FROM};
 use crate::families::on_road::OnRoad;
 use crate::families::refline::{joints, shape_name, standstill};
 use crate::prelude::*;
@@ -17,7 +17,7 @@ pub const RULE: Rule<Roads> = Rule {
     ],
     level: Level::Warning,
     versions: "1.1.0..",
-    params: &[KINK, KINK_ERROR_FROM],
+    params: &[KINK, KINK_ERROR_FROM, KINK_BROKEN_FROM],
     each: Some(each),
     ..Rule::after(READABLE)
 };
@@ -64,7 +64,8 @@ fn check(road: &Road<'_>, one: &Geometry<'_>, next: &Geometry<'_>, found: &mut S
     );
     // Section 9.2 says "should", annex D.1.3 says "shall".
     let demanded = found.version() >= Some(ANNEX_D);
-    let is_error = demanded && kink >= found.number(&KINK_ERROR_FROM);
+    let is_broken = kink >= found.number(&KINK_BROKEN_FROM);
+    let is_error = is_broken || (demanded && kink >= found.number(&KINK_ERROR_FROM));
     let level = if is_error {
         Level::Error
     } else {

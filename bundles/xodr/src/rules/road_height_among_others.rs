@@ -8,12 +8,28 @@ const APART: Param = Param::number(
     "largest distance above or below all other roads that is accepted for a road without links",
 );
 
+const HIGHEST: Param = Param::number(
+    "highest",
+    9000.0,
+    "m",
+    "largest plausible height of a road, as of the highest mountains",
+);
+const DEEPEST: Param = Param::number(
+    "deepest",
+    1000.0,
+    "m",
+    "largest plausible depth of a road below zero",
+);
+
+/// Size in metres beyond which values exceed the Earth itself.
+const EARTH: f64 = 1e8;
+
 /// Minimum ratio of the two groups. Only a small group is odd; of two halves it is unclear which.
 const FEW: usize = 10;
 
 pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    params: &[APART],
+    params: &[APART, HIGHEST, DEEPEST],
     run,
     ..Rule::after(READABLE)
 };
@@ -28,6 +44,7 @@ struct Span<'m, 'd> {
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let apart = found.number(&APART);
     let mut spans: Vec<Span<'_, '_>> = map.roads().iter().filter_map(Span::of).collect();
+    off_the_earth(&spans, found);
     spans.sort_by(|one, other| one.low.total_cmp(&other.low));
     let mut below = f64::NEG_INFINITY;
     for (at, span) in spans.iter().enumerate() {
@@ -47,6 +64,35 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         }
         below = below.max(span.high);
     }
+}
+
+/// Reports the first road whose height no road on Earth has.
+fn off_the_earth(spans: &[Span<'_, '_>], found: &mut Sink<'_>) {
+    let (highest, deepest) = (found.number(&HIGHEST), found.number(&DEEPEST));
+    // `numbers.computable` reports larger values.
+    let is_known = |height: f64| height.abs() <= EARTH;
+    let is_off = |span: &&Span<'_, '_>| {
+        (span.high > highest || span.low < -deepest) && is_known(span.low) && is_known(span.high)
+    };
+    let mut off = spans.iter().filter(is_off);
+    let Some(first) = off.next() else { return };
+    let others = match off.count() {
+        0 => String::new(),
+        count => format!(", as do {count} other roads"),
+    };
+    let height = if first.high > highest {
+        first.high
+    } else {
+        first.low
+    };
+    let text = format!(
+        "road `{}` lies at a height of {} m{others}; heights are in metres, and roads lie between {} m and {highest} m",
+        first.road.id(),
+        number(height.round()),
+        -deepest
+    );
+    let node = first.road.elevation_node();
+    found.issue(Place::from(node.unwrap_or(first.road.node())), text);
 }
 
 impl<'m, 'd> Span<'m, 'd> {

@@ -1,5 +1,6 @@
 use std::collections::BTreeSet;
 
+use crate::families::object_parts::is_before;
 use crate::families::on_road::OnRoad;
 use crate::families::zero_stretches::zero_stretches;
 use crate::prelude::*;
@@ -20,6 +21,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         .connections()
         .filter_map(|(_, connection)| connection.connecting_road())
         .collect();
+    let demanded = is_before(found, (1, 8));
     for road in map.roads() {
         // Roads that only complete the boundary of a junction need no lanes (12.10).
         let within = road.junction().is_some() && !connecting.contains(road.id());
@@ -36,9 +38,14 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                      it is not drivable",
                     road.id()
                 );
-                found
-                    .issue(section.node(), text)
-                    .on(road, section.s().unwrap_or(0.0), 0.0);
+                let finding =
+                    found
+                        .issue(section.node(), text)
+                        .on(road, section.s().unwrap_or(0.0), 0.0);
+                // Before 1.8, too, a road needed a lane beside the center lane.
+                if demanded && section.lanes().all(|lane| lane.side().is_none()) {
+                    finding.in_every_version(Level::Warning);
+                }
             }
         }
     }

@@ -16,9 +16,16 @@ const LANE_HEIGHT: Param = Param::number(
     "largest plausible height of a lane above or below the road",
 );
 
+const FRICTION: Param = Param::number(
+    "friction",
+    2.0,
+    "",
+    "largest plausible coefficient of friction",
+);
+
 pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    params: &[MARK_WIDTH, MARK_HEIGHT, LANE_HEIGHT],
+    params: &[MARK_WIDTH, MARK_HEIGHT, LANE_HEIGHT, FRICTION],
     each: Some(each),
     ..Rule::after(READABLE)
 };
@@ -47,12 +54,32 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 );
             }
         }
+        for material in lane.elements("material") {
+            friction(lane, material, found);
+        }
         for mark in lane.elements("roadMark") {
             // A mark without paint has no size, and a strip of grass may have any size.
             if !matches!(mark.attr("type"), Some("none" | "grass")) {
                 look_at_mark(lane, mark, found);
             }
         }
+    }
+}
+
+/// Reports a friction that no surface has. Usually it is written in percent.
+fn friction(lane: LaneRef<'_, '_>, material: Node<'_>, found: &mut Sink<'_>) {
+    let most = found.number(&FRICTION);
+    let Some(value) = too_large(material, "friction", most) else {
+        return;
+    };
+    let text = format!(
+        "the friction of this material is {value}, on {}; a coefficient of friction is about 0.8 on a dry road, and \
+         more than {most} is implausible",
+        lane_name(lane)
+    );
+    let finding = found.issue(Place::attribute_or_node(material, "friction"), text);
+    if let Ok(ds) = material.f64("sOffset") {
+        finding.in_lane(lane, ds);
     }
 }
 

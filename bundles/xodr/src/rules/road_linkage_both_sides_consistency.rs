@@ -1,6 +1,7 @@
 use std::collections::BTreeSet;
 
 use crate::families::link_sides::{Known, agrees, in_virtual_junction};
+use crate::families::routes::{is_route, lanes_at};
 use crate::families::unlinked_arms::UnlinkedArms;
 use crate::prelude::*;
 
@@ -164,8 +165,15 @@ fn to_junction<'a>(
         road.id()
     );
     let place = map.junction(id).map(Junction::node);
-    let finding = found.issue(link.node(), text);
+    let mut finding = found.issue(link.node(), text);
     if let Some(place) = place {
-        finding.at(place, "the junction");
+        finding = finding.at(place, "the junction");
+    }
+    // A connecting road leads to a road. A route that comes to another junction here has no way on.
+    let connects = map
+        .junction_of(road)
+        .is_some_and(|own| own.kind() == Some(JunctionType::Common));
+    if connects && lanes_at(road, end).any(is_route) {
+        finding.in_every_version(Level::Error);
     }
 }

@@ -2,7 +2,7 @@ use std::collections::BTreeSet;
 
 use crate::families::overlap::{Limits, Overlap, Slice, overlaps, slices};
 use crate::prelude::*;
-use foldhash::HashSet;
+use foldhash::{HashMap, HashSet};
 
 const AREA: Param = Param::number(
     "area",
@@ -54,6 +54,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     let friends = friends(map);
     let mouths = mouths(map);
     let slices = slices(map, &limits);
+    let owners = owners(map);
     let wanted = |one: &Slice, other: &Slice| {
         if one.road == other.road {
             return is_far(map, one, other);
@@ -61,7 +62,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let (Some(a), Some(b)) = (map.road_at(one.road), map.road_at(other.road)) else {
             return false;
         };
-        let same_junction = a.junction().is_some() && a.junction() == b.junction();
+        let of = [a, b].map(|road| owners.get(&road.index()).copied().or(road.junction()));
+        let same_junction = of[0].is_some() && of[0] == of[1];
         !same_junction
             && !friends.contains(&(one.road.min(other.road), one.road.max(other.road)))
             && !meet(map, &mouths, one, other)
@@ -69,6 +71,19 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
     overlaps(&slices, &limits, wanted, |overlap| {
         report(map, &overlap, found);
     });
+}
+
+/// Returns the junctions of connecting roads that name no junction themselves, by place of the road.
+/// `junctions.cross_path.correct_junction_id` reports these roads, and they may overlap there.
+fn owners<'a>(map: &RoadMap<'a>) -> HashMap<usize, &'a str> {
+    let mut owners = HashMap::default();
+    for (junction, connection) in map.connections() {
+        let road = connection.connecting_road().and_then(|id| map.road(id));
+        if let Some(road) = road.filter(|road| road.junction().is_none()) {
+            owners.entry(road.index()).or_insert(junction.id());
+        }
+    }
+    owners
 }
 
 /// Returns the pairs of roads that may overlap because of their common junction: direct junctions,

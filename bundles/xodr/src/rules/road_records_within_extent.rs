@@ -1,5 +1,6 @@
 use crate::families::ascending;
 use crate::families::object_parts::{is_by_schema, named, number};
+use crate::families::places_on_roads;
 use crate::families::shown;
 use crate::prelude::*;
 
@@ -7,6 +8,7 @@ pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
     params: &[TOLERANCE, ROADSIDE, CLEAR],
     each: Some(each),
+    run,
     ..Rule::after(READABLE)
 };
 
@@ -30,6 +32,12 @@ const CLEAR: Param = Param::number(
     "m",
     "distance beyond the end above which signals, references, tunnels and bridges are errors",
 );
+
+/// Those of them whose last record may give a value at the end of the section.
+const CURVES: [&str; 3] = ["width", "border", "height"];
+
+/// Distance from the end of a lane section below which a start counts as its end, in metres.
+const ROUNDING: f64 = 1e-9;
 
 /// The records of a lane that start at `sOffset`.
 const LANE_RECORDS: [&str; 8] = [
@@ -93,12 +101,24 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 road: road.id(),
             };
             for &name in &lane_records {
+                let limit = if CURVES.contains(&name) {
+                    section.limit
+                } else {
+                    // A record at the very end never applies either. Some readers never end there.
+                    length - ROUNDING
+                };
+                let section = Extent { limit, ..section };
                 if !all_start_by(lane, name, section.limit) {
                     section.check(lane.elements(name), name, found);
                 }
             }
         }
     }
+}
+
+fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    let (near, far) = (found.number(&ROADSIDE), found.number(&CLEAR));
+    places_on_roads::check(map, [near, far], found);
 }
 
 /// Checks whether the records of a lane are known to start at `limit` or earlier.
@@ -114,6 +134,7 @@ fn all_start_by(lane: LaneRef<'_, '_>, name: &str, limit: f64) -> bool {
 }
 
 /// The extent in which records lie.
+#[derive(Clone, Copy)]
 struct Extent<'m> {
     /// Name of the attribute that gives the start of a record.
     start: &'static str,

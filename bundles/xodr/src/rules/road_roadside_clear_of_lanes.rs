@@ -143,10 +143,26 @@ const FLAT: f64 = 0.3;
 /// Returns the lane that is blocked at this position.
 fn blocked<'m, 'a>(road: &'m Road<'a>, s: f64, t: f64, depth: f64) -> Option<Spot<'m, 'a>> {
     let spot = lane_at(road, s, t).filter(|spot| spot.depth > depth)?;
-    spot.lane
-        .kind()
-        .is_some_and(|kind| DIRECTED.contains(&kind))
-        .then_some(spot)
+    is_directed(spot.lane).then_some(spot)
+}
+
+fn is_directed(lane: LaneRef<'_, '_>) -> bool {
+    lane.kind().is_some_and(|kind| DIRECTED.contains(&kind))
+}
+
+/// Returns the driving lane next to a position that lies on the line between two of them, at least
+/// `depth` metres inside both.
+fn between<'m, 'a>(road: &'m Road<'a>, s: f64, t: f64, depth: f64) -> Option<Spot<'m, 'a>> {
+    // The position itself is less than `depth` metres away from a border.
+    let beside = [t - 2.0 * depth, t + 2.0 * depth].map(|t| lane_at(road, s, t));
+    let [Some(right), Some(left)] = beside else {
+        return None;
+    };
+    let is_two = right.lane.key() != left.lane.key();
+    (is_two && is_directed(right.lane) && is_directed(left.lane)).then_some(Spot {
+        lane: right.lane,
+        depth: 0.0,
+    })
 }
 
 fn object(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
@@ -203,6 +219,7 @@ fn report(road: &Road<'_>, node: Node<'_>, should: &str, found: &mut Sink<'_>) {
     let places = std::iter::once(origin).chain(corners);
     let mut hits = places.filter_map(|(s, t)| Some((s, t, blocked(road, s, t, depth)?)));
     let Some((s, t, spot)) = hits.next() else {
+        on_the_line(road, node, origin, should, found);
         return;
     };
     let part = if (s, t) == origin {
@@ -216,6 +233,32 @@ fn report(road: &Road<'_>, node: Node<'_>, should: &str, found: &mut Sink<'_>) {
         node.attr("type").unwrap_or_default(),
         lane_name(spot.lane),
         spot.depth
+    );
+    found
+        .issue(Place::attribute_or_node(node, "t"), text)
+        .on(road, s, t)
+        .at(spot.lane.node(), "the lane");
+}
+
+/// Reports a fixed object on the line between two driving lanes.
+fn on_the_line(
+    road: &Road<'_>,
+    node: Node<'_>,
+    (s, t): (f64, f64),
+    should: &str,
+    found: &mut Sink<'_>,
+) {
+    let kind = node.attr("type").unwrap_or_default();
+    if !(node.is("object") && FIXED.contains(&kind)) {
+        return;
+    }
+    let Some(spot) = between(road, s, t, found.number(&DEPTH)) else {
+        return;
+    };
+    let text = format!(
+        "{} of type `{kind}` stands on the border of {}, between two driving lanes; it {should}",
+        named(node),
+        lane_name(spot.lane)
     );
     found
         .issue(Place::attribute_or_node(node, "t"), text)

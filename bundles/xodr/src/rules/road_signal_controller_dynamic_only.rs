@@ -1,4 +1,5 @@
 use crate::families::object_parts::named;
+use crate::families::signal_catalog::is_light;
 use crate::prelude::*;
 use foldhash::{HashMap, HashSet};
 use qcbus_opendrive::SignalKey;
@@ -34,6 +35,10 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 continue;
             };
             let signal = key.signal;
+            // `road.signal.light_is_dynamic` reports lights.
+            if is_light(signal.node()) {
+                continue;
+            }
             let text = format!(
                 "{} switches {} of type `{}`, whose `dynamic` is `no`; only signals that change should be switched",
                 named(controller.node()),

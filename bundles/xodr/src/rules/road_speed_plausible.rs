@@ -16,11 +16,18 @@ const RURAL: Param = Param::number(
     "m/s",
     "highest plausible limit on a rural road",
 );
+const MOTORWAY: Param = Param::number(
+    "motorway",
+    11.1,
+    "m/s",
+    "lowest plausible limit on a motorway",
+);
+const LEAST: Param = Param::number("least", 1.3, "m/s", "lowest plausible limit anywhere");
 const MOST: Param = Param::number("most", 90.0, "m/s", "highest plausible limit anywhere");
 
 pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    params: &[SLOW, TOWN, RURAL, MOST],
+    params: &[SLOW, TOWN, RURAL, MOTORWAY, LEAST, MOST],
     each: Some(each),
     ..Rule::after(READABLE)
 };
@@ -106,6 +113,9 @@ fn judge(speed: Node<'_>, kind: Option<&str>, found: &Sink<'_>) -> Option<String
                 .to_owned(),
         );
     }
+    if let Some(text) = too_low(max, (unit, factor), kind, found) {
+        return Some(text);
+    }
     let (most, place) = match kind {
         Some("lowSpeed" | "pedestrian" | "bicycle" | "townPlayStreet") => {
             (found.number(&SLOW), kind)
@@ -134,4 +144,45 @@ fn judge(speed: Node<'_>, kind: Option<&str>, found: &Sink<'_>) -> Option<String
         "the speed limit is {max} {unit}{in_km}{doubt}; more than {:.0} km/h is implausible{place}",
         3.6 * most
     ))
+}
+
+/// Returns the fault of a limit that is too low. Usually a value in m/s was written with another
+/// unit.
+fn too_low(
+    max: f64,
+    (unit, factor): (&str, f64),
+    kind: Option<&str>,
+    found: &Sink<'_>,
+) -> Option<String> {
+    let least = match kind {
+        Some("motorway") => found.number(&MOTORWAY),
+        _ => found.number(&LEAST),
+    };
+    let place = kind.map_or_else(String::new, |kind| format!(" on a road of type `{kind}`"));
+    let in_metres = in_metres_per_second(max, factor, unit);
+    if max * factor >= least && in_metres.is_none() {
+        return None;
+    }
+    let meant = in_metres.map_or_else(
+        || format!("less than {:.0} km/h is implausible there", 3.6 * least),
+        |meant| {
+            format!(
+                "{max} m/s are {meant:.0} {unit}, so the value is probably in m/s; write `max=\"{meant:.0}\"`, or \
+                 `unit=\"m/s\"`"
+            )
+        },
+    );
+    Some(format!("the speed limit is {max} {unit}{place}; {meant}"))
+}
+
+/// Returns the round limit in the given unit that equals a fractional value in m/s, such as 50 km/h
+/// for 13.89.
+fn in_metres_per_second(max: f64, factor: f64, unit: &str) -> Option<f64> {
+    let meant = max / factor;
+    let step = if unit == "mph" { 5.0 } else { 10.0 };
+    let round = (meant / step).round() * step;
+    // The text of the value has at least two decimals.
+    let has_decimals = (max * 10.0 - (max * 10.0).round()).abs() > 0.05;
+    let is_round = (meant - round).abs() <= 0.02 && round >= 10.0;
+    (unit != "m/s" && has_decimals && is_round).then_some(round)
 }

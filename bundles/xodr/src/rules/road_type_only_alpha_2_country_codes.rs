@@ -1,3 +1,4 @@
+use crate::families::countries;
 use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
@@ -79,6 +80,11 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             };
             let code = country.value();
             let is_alpha = code.bytes().all(|byte| byte.is_ascii_alphabetic());
+            if countries::is_unassigned(code) {
+                let text = countries::unassigned_text(code);
+                found.issue(country, text).in_every_version(Level::Warning);
+                continue;
+            }
             let kind = match code.len() {
                 2 if code.bytes().all(|byte| byte.is_ascii_uppercase()) => continue,
                 2 if is_alpha => "is not written in capital letters",

@@ -6,6 +6,7 @@
 
 mod beyond;
 mod build;
+mod closed;
 mod header;
 mod junctions;
 mod lane_links;

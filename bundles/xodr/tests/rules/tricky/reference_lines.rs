@@ -192,9 +192,19 @@ fn equivalent_spellings_of_file_give_same_findings() {
         ),
     ];
     for (what, spell) in spellings {
-        let nothing = super::findings(&plan, &spell(&good));
+        // A prefix is a finding of its own, and nothing else changes.
+        let own = match what {
+            "prefix" => Some("warning xml_no_prefixes"),
+            _ => None,
+        };
+        let judge = |file: &[u8]| {
+            let mut found = super::findings(&plan, file);
+            assert!(own.is_none_or(|own| found.remove(own)), "{what}: {found:?}");
+            found
+        };
+        let nothing = judge(&spell(&good));
         assert!(nothing.is_empty(), "{what}: {nothing:?}");
-        let found = super::findings(&plan, &spell(&bad));
+        let found = judge(&spell(&bad));
         assert!(found.iter().eq(fault.iter()), "{what}: {found:?}");
     }
 }

@@ -123,7 +123,7 @@ fn object_and_signal_positions_give_expected_findings() {
         (
             "on the line between two lanes",
             pole(r#"s="50" t="-3.5" zOffset="0" hdg="0""#),
-            &[],
+            &["warning road_roadside_clear_of_lanes"],
         ),
         (
             "in the middle of a lane",
