@@ -19,8 +19,9 @@ pub use queries::element::Element;
 pub use queries::network::Network;
 pub use queries::scenario::Scenario;
 pub use timeline::{
-    At, Cause, Comparison, Condition, Edge, Impossible, Logic, Moment, Part, Plan, Priority,
-    Reason as ImpossibleReason, Span, Spans, Start, State, Strictness, Takes, Timeline, Trigger,
+    At, Cause, Comparison, Condition, Edge, Impossible, Logic, Moment, Plan, Priority,
+    Reason as ImpossibleReason, Span, Spans, Start, State, StoryPart, Strictness, Takes, Timeline,
+    Trigger,
 };
 pub use types::catalogs::{CatalogKind, Entry, Resolution};
 pub use types::data_type::{DataType, Value, parse_double};

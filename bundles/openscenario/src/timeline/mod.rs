@@ -17,7 +17,7 @@ mod why;
 pub use impossible::{Impossible, Reason};
 pub use moment::Moment;
 pub use plan::{
-    Comparison, Condition, Edge, Logic, Part, Plan, Priority, Start, State, Takes, Trigger,
+    Comparison, Condition, Edge, Logic, Plan, Priority, Start, State, StoryPart, Takes, Trigger,
 };
 pub use play::{Span, Spans, Strictness};
 pub use why::{At, Cause};

@@ -3,7 +3,7 @@
 use foldhash::{HashMap, HashMapExt as _};
 
 use super::plan::{
-    Comparison, Condition, Edge, Logic, Part, Plan, Priority, Start, State, Takes, Trigger,
+    Comparison, Condition, Edge, Logic, Plan, Priority, Start, State, StoryPart, Takes, Trigger,
 };
 use super::rivals;
 use super::takes::takes;
@@ -26,7 +26,7 @@ pub(super) fn plan(scenario: &Scenario<'_>) -> Option<Plan> {
         places.insert((one.context, one.node.offset()), place);
     }
     let reader = Reader { scenario, places };
-    let mut parts: Vec<Part> = elements
+    let mut parts: Vec<StoryPart> = elements
         .iter()
         .map(|one| reader.part(one.kind(), one.parent(), one.element(scenario)))
         .collect();
@@ -42,7 +42,7 @@ struct Reader<'m, 'd> {
 }
 
 impl Reader<'_, '_> {
-    fn part(&self, kind: StoryKind, parent: Option<usize>, element: Element<'_, '_>) -> Part {
+    fn part(&self, kind: StoryKind, parent: Option<usize>, element: Element<'_, '_>) -> StoryPart {
         let start = match element.child("StartTrigger") {
             Some(trigger) if matches!(kind, StoryKind::Act | StoryKind::Event) => {
                 let trigger = self.trigger(trigger);
@@ -57,7 +57,7 @@ impl Reader<'_, '_> {
         let stop = element
             .child("StopTrigger")
             .filter(|_| kind == StoryKind::Act);
-        Part {
+        StoryPart {
             kind,
             parent,
             start,

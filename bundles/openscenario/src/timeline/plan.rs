@@ -7,14 +7,14 @@ use crate::types::storyboard::StoryKind;
 #[derive(Debug, Clone, Default)]
 pub struct Plan {
     /// Elements; each comes after its parent.
-    pub parts: Vec<Part>,
+    pub parts: Vec<StoryPart>,
     /// Trigger that ends the run.
     pub stop: Option<Trigger>,
 }
 
 /// An element of the storyboard.
 #[derive(Debug, Clone)]
-pub struct Part {
+pub struct StoryPart {
     /// Its kind.
     pub kind: StoryKind,
     /// Index of its parent; `None` for a story.

@@ -6,7 +6,7 @@
 
 use super::condition::Known;
 use super::moment::{Moment, Times};
-use super::plan::{Part, Plan, Priority, Start, Takes, Tree};
+use super::plan::{Plan, Priority, Start, StoryPart, Takes, Tree};
 use crate::types::storyboard::StoryKind;
 
 /// How the standard is read where simulators differ.
@@ -286,7 +286,7 @@ impl Spans {
 
     /// Returns when something stops an element: the end of its act, an event that overrides, or an
     /// action that controls the same thing.
-    fn stopped(&self, tree: &Tree<'_>, place: usize, part: &Part) -> Moment {
+    fn stopped(&self, tree: &Tree<'_>, place: usize, part: &StoryPart) -> Moment {
         let started = self.spans.get(place).map_or(0.0, |it| it.start.earliest);
         let may_start = |other: usize| {
             let span = self.spans.get(other)?;
@@ -338,7 +338,7 @@ impl Spans {
         tree: &Tree<'_>,
         strictness: Strictness,
         place: usize,
-        part: &Part,
+        part: &StoryPart,
         by_itself: Moment,
     ) -> Moment {
         let known = self.known(tree, strictness);
@@ -390,12 +390,12 @@ impl Known<'_> {
         })
     }
 
-    fn may_be_skipped(&self, place: usize, part: &Part) -> bool {
+    fn may_be_skipped(&self, place: usize, part: &StoryPart) -> bool {
         matches!(part.priority, Priority::Skip | Priority::Unknown)
             && self.tree.siblings(place).next().is_some()
     }
 
-    fn skipped_at(&self, place: usize, part: &Part) -> f64 {
+    fn skipped_at(&self, place: usize, part: &StoryPart) -> f64 {
         if !self.may_be_skipped(place, part) {
             return f64::INFINITY;
         }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::plan::Part;
+use super::plan::StoryPart;
 use crate::queries::actors::Actors;
 use crate::queries::element::Element;
 use crate::queries::scenario::Scenario;
@@ -12,7 +12,7 @@ use crate::types::storyboard::StoryKind;
 const MOST: usize = 200;
 
 /// Lists the rivals of each action. An action with unknown actors is a rival of every other one.
-pub(super) fn fill(scenario: &Scenario<'_>, parts: &mut [Part]) {
+pub(super) fn fill(scenario: &Scenario<'_>, parts: &mut [StoryPart]) {
     let mut by_entity: BTreeMap<(String, Domain), Vec<usize>> = BTreeMap::new();
     let mut of_anybody: Vec<usize> = Vec::new();
     let elements = scenario.storyboard().elements();
@@ -46,7 +46,7 @@ pub(super) fn fill(scenario: &Scenario<'_>, parts: &mut [Part]) {
     }
 }
 
-fn add<'r>(parts: &mut [Part], place: usize, rivals: impl Iterator<Item = &'r usize>) {
+fn add<'r>(parts: &mut [StoryPart], place: usize, rivals: impl Iterator<Item = &'r usize>) {
     let parent = parts.get(place).and_then(|part| part.parent);
     let mut found: Vec<usize> = rivals
         .copied()

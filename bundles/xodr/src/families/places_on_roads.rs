@@ -5,7 +5,7 @@ use super::shown;
 use crate::prelude::*;
 
 /// An element with a place on a road, by name and parent.
-struct Places {
+struct NamedPlaces {
     name: &'static str,
     parent: &'static str,
     /// Attribute with the id of the road. Without it, the road is the one around the element.
@@ -19,8 +19,8 @@ const fn on(
     name: &'static str,
     road: Option<&'static str>,
     places: &'static [&'static str],
-) -> Places {
-    Places {
+) -> NamedPlaces {
+    NamedPlaces {
         name,
         parent,
         road,
@@ -30,7 +30,7 @@ const fn on(
 
 const RANGE: &[&str] = &["sStart", "sEnd"];
 
-const PLACES: [Places; 7] = [
+const PLACES: [NamedPlaces; 7] = [
     on("switch", "mainTrack", Some("id"), &["s"]),
     on("switch", "sideTrack", Some("id"), &["s"]),
     on("signal", "positionRoad", Some("roadId"), &["s"]),

@@ -41,8 +41,8 @@ impl Speeds {
         self.by_name.get(entity).map(|(_, fastest)| *fastest)
     }
 
-    /// Returns the lowest speed in m/s, negative for driving backwards, that actions give to an entity. Returns `None` if one of its
-    /// speeds is unknown, or if no action gives it a speed.
+    /// Returns the lowest speed in m/s that actions give to an entity, negative for driving
+    /// backwards. Returns `None` if one of its speeds is unknown, or if no action gives it a speed.
     pub(crate) fn slowest(&self, entity: &str) -> Option<f64> {
         let (slowest, fastest) = self.by_name.get(entity)?;
         fastest.is_finite().then_some(*slowest)

@@ -3,7 +3,7 @@
 use proptest::collection::vec;
 use proptest::prelude::*;
 use qcbus_openscenario::{
-    Comparison, Condition, Edge, Logic, Part, Plan, Priority, Start, State, StoryKind, Takes,
+    Comparison, Condition, Edge, Logic, Plan, Priority, Start, State, StoryKind, StoryPart, Takes,
     Trigger,
 };
 
@@ -171,12 +171,12 @@ pub fn random() -> impl Strategy<Value = Random> {
 }
 
 struct Builder {
-    parts: Vec<Part>,
+    parts: Vec<StoryPart>,
 }
 
 impl Builder {
     fn add(&mut self, kind: StoryKind, parent: Option<usize>, start: Option<Trigger>) -> usize {
-        self.parts.push(Part {
+        self.parts.push(StoryPart {
             kind,
             parent,
             start: start.map_or(Start::WithParent, Start::By),
@@ -220,7 +220,7 @@ fn build(acts: Vec<Act>, stop: Option<Trigger>) -> Plan {
 }
 
 /// Replaces draws by indices.
-fn finish(mut parts: Vec<Part>, mut stop: Option<Trigger>, rivals: &[(usize, Draw)]) -> Plan {
+fn finish(mut parts: Vec<StoryPart>, mut stop: Option<Trigger>, rivals: &[(usize, Draw)]) -> Plan {
     let actions: Vec<usize> = (0..parts.len())
         .filter(|at| parts[*at].kind == StoryKind::Action)
         .collect();
