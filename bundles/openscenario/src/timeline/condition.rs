@@ -60,7 +60,12 @@ impl Known<'_> {
             true => self.logic(&condition.logic),
             false => Truth::unknown(),
         };
-        let edged = self.edge(plain, condition.edge, since);
+        // A delayed condition may look at what was before it was first looked at.
+        let earlier = Moment {
+            earliest: (since.earliest - condition.delay.unwrap_or(since.earliest)).max(0.0),
+            latest: since.latest,
+        };
+        let edged = self.edge(plain, condition.edge, earlier);
         let Some(delay) = condition.delay else {
             // Not before the expression itself is true.
             let first = edged.may.first();

@@ -147,7 +147,12 @@ fn beyond<'m, 'd>(element: Element<'m, 'd>, reason: Reason<'m>) -> Impossible<'m
 type Limits = for<'d> fn(&Entity<'d>, Element<'_, 'd>) -> Option<f64>;
 
 fn top_speed<'d>(entity: &Entity<'d>, condition: Element<'_, 'd>) -> Option<f64> {
-    performance(entity, condition, "maxSpeed")
+    let limit = performance(entity, condition, "maxSpeed")?;
+    // A scenario that asks for more may count on a simulator that ignores the limit.
+    let targets = condition.scenario();
+    let mut targets = targets.elements_everywhere("AbsoluteTargetSpeed");
+    let asks_for_more = targets.any(|it| it.number("value").is_none_or(|value| value > limit));
+    (!asks_for_more).then_some(limit)
 }
 
 fn strongest<'d>(entity: &Entity<'d>, condition: Element<'_, 'd>) -> Option<f64> {

@@ -15,11 +15,18 @@ const MOST: usize = 200;
 pub(super) fn fill(scenario: &Scenario<'_>, parts: &mut [StoryPart]) {
     let mut by_entity: BTreeMap<(String, Domain), Vec<usize>> = BTreeMap::new();
     let mut of_anybody: Vec<usize> = Vec::new();
+    let mut deletions: Vec<(String, usize)> = Vec::new();
+    let mut references: Vec<(String, usize)> = Vec::new();
     let elements = scenario.storyboard().elements();
     let actions = elements.iter().enumerate();
     let actions = actions.filter(|(_, one)| one.kind() == StoryKind::Action);
     for (place, one) in actions {
-        match entities(scenario, one.element(scenario)) {
+        let action = one.element(scenario);
+        match deleted(action) {
+            Some(name) => deletions.push((name, place)),
+            None => references.extend(referenced(action).map(|name| (name, place))),
+        }
+        match entities(scenario, action) {
             Controls::Nothing => {}
             Controls::Entities(names, domains) => {
                 for name in names {
@@ -40,10 +47,34 @@ pub(super) fn fill(scenario: &Scenario<'_>, parts: &mut [StoryPart]) {
             add(parts, *place, rivals);
         }
     }
+    // An action relative to an entity may end with this entity.
+    for (name, place) in &references {
+        let of_name = deletions.iter().filter(|(deleted, _)| deleted == name);
+        let places: Vec<usize> = of_name.map(|(_, deletion)| *deletion).collect();
+        add(parts, *place, places.iter());
+    }
     let everybody: Vec<usize> = by_entity.into_values().flatten().collect();
     for place in &of_anybody {
         add(parts, *place, everybody.iter().chain(&of_anybody));
     }
+}
+
+/// Returns the name of the entity that an action deletes.
+fn deleted(action: Element<'_, '_>) -> Option<String> {
+    let entity = action.path(&["GlobalAction", "EntityAction"])?;
+    entity.child("DeleteEntityAction")?;
+    Some(entity.text("entityRef")?.into_owned())
+}
+
+/// Returns the names of the entities that an action refers to.
+fn referenced(action: Element<'_, '_>) -> impl Iterator<Item = String> {
+    const NAMES: [&str; 2] = ["entityRef", "masterEntityRef"];
+    let within = action.descendants();
+    within.flat_map(|one| {
+        NAMES
+            .into_iter()
+            .filter_map(move |name| Some(one.text(name)?.into_owned()))
+    })
 }
 
 fn add<'r>(parts: &mut [StoryPart], place: usize, rivals: impl Iterator<Item = &'r usize>) {

@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 
 use crate::families::actions::acting;
+use crate::families::deletions::added;
 use crate::families::init;
 use crate::families::motion::{Speeds, may_drive_itself};
 use crate::families::origins::Origins;
@@ -38,6 +39,7 @@ impl<'m, 'd, 'w, 'r> Behind<'m, 'd, 'w, 'r> {
                 jumping.extend(acting(action)?.iter().map(|one| one.name().to_owned()));
             }
         }
+        jumping.extend(added(scenario)?);
         Some(Behind {
             scenario,
             map,
@@ -71,11 +73,13 @@ impl<'m, 'd, 'w, 'r> Behind<'m, 'd, 'w, 'r> {
         let s = station(position, road)?;
         // An entity that stands passes nothing.
         self.speeds.fastest(entity).filter(|speed| *speed > 0.0)?;
-        let slowest = self.speeds.slowest(entity);
-        if slowest.is_some_and(|speed| speed < 0.0) {
+        if self.speeds.reverses(entity) {
             return None;
         }
-        let slowest = slowest.filter(|_| self.driving.contains(entity));
+        let slowest = self
+            .speeds
+            .slowest(entity)
+            .filter(|_| self.driving.contains(entity));
         let by = on.s + slowest.unwrap_or(0.0) * time - s;
         // Without an end, the way may lead back.
         self.reach.borrow_mut().from(on.road, on.s, true)?;

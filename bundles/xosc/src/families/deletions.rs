@@ -73,7 +73,7 @@ pub(crate) fn deletions<'m, 'd>(
 }
 
 /// Returns the names of the entities that actions add. Returns `None` if one is unknown.
-fn added(scenario: &Scenario<'_>) -> Option<Vec<String>> {
+pub(crate) fn added(scenario: &Scenario<'_>) -> Option<Vec<String>> {
     let mut added = Vec::new();
     for action in scenario.elements_everywhere("EntityAction") {
         if action.child("DeleteEntityAction").is_none() {

@@ -41,6 +41,12 @@ impl Speeds {
         self.by_name.get(entity).map(|(_, fastest)| *fastest)
     }
 
+    /// Checks whether an action lets an entity drive backwards.
+    pub(crate) fn reverses(&self, entity: &str) -> bool {
+        let speeds = self.by_name.get(entity);
+        speeds.is_some_and(|(slowest, _)| *slowest < 0.0)
+    }
+
     /// Returns the lowest speed in m/s that actions give to an entity, negative for driving
     /// backwards. Returns `None` if one of its speeds is unknown, or if no action gives it a speed.
     pub(crate) fn slowest(&self, entity: &str) -> Option<f64> {
@@ -82,5 +88,21 @@ pub(crate) fn may_drive_itself<'d>(scenario: &Scenario<'d>, entity: &Entity<'d>)
     );
     let element = entity.element(scenario);
     let mut controllers = element.children_named("ObjectController");
-    !is_known || controllers.any(|controller| controller.children().next().is_some())
+    !is_known
+        || controllers.any(|controller| controller.children().next().is_some())
+        || is_controlled(scenario, entity)
+}
+
+/// Checks whether an action gives an entity a controller.
+fn is_controlled<'d>(scenario: &Scenario<'d>, entity: &Entity<'d>) -> bool {
+    const ACTIONS: [&str; 3] = [
+        "ControllerAction",
+        "AssignControllerAction",
+        "ActivateControllerAction",
+    ];
+    let actions = ACTIONS
+        .iter()
+        .flat_map(|name| scenario.elements_everywhere(name));
+    let mut acting = actions.map(acting);
+    acting.any(|all| all.is_none_or(|all| all.iter().any(|one| one.name() == entity.name())))
 }

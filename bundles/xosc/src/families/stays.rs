@@ -1,6 +1,7 @@
 //! Entities that certainly are still in the lane in which `Init` places them.
 
 use crate::families::actions::acting;
+use crate::families::deletions::added;
 use crate::families::init;
 use crate::families::motion::{Speeds, may_drive_itself};
 use crate::families::origins::Origins;
@@ -26,6 +27,8 @@ pub(crate) struct Stays<'m, 'd, 'w, 'r> {
     /// Actions that may change the lane or the road: the entity, the element of the storyboard
     /// (`None` in `Init`) and the earliest time.
     movers: Vec<(String, Option<usize>, f64)>,
+    /// Names of the entities that `Init` or an `AddEntityAction` places, once for each time.
+    placed: Vec<String>,
 }
 
 impl<'m, 'd, 'w, 'r> Stays<'m, 'd, 'w, 'r> {
@@ -36,8 +39,13 @@ impl<'m, 'd, 'w, 'r> Stays<'m, 'd, 'w, 'r> {
     ) -> Option<Stays<'m, 'd, 'w, 'r>> {
         let timeline = scenario.timeline()?;
         let speeds = Speeds::of(scenario)?;
+        // An entity that is added is placed again.
+        let mut placed = added(scenario)?;
         let mut movers = Vec::new();
         for one in init::actions(scenario) {
+            if one.action.is("TeleportAction") {
+                placed.extend(one.entities.iter().cloned());
+            }
             if !keeps_lane(one.action.name()) {
                 movers.extend(one.entities.into_iter().map(|entity| (entity, None, 0.0)));
             }
@@ -49,7 +57,7 @@ impl<'m, 'd, 'w, 'r> Stays<'m, 'd, 'w, 'r> {
             let Some(kind) = kind.filter(|_| one.kind() == StoryKind::Action) else {
                 continue;
             };
-            if !keeps_lane(kind.name()) {
+            if !keeps_lane(kind.name()) || kind.is("TeleportAction") {
                 let start = timeline.tolerant().get(place)?.start;
                 for entity in acting(element)? {
                     movers.push((entity.name().to_owned(), Some(place), start.earliest));
@@ -61,6 +69,7 @@ impl<'m, 'd, 'w, 'r> Stays<'m, 'd, 'w, 'r> {
             origins: Origins::of(scenario, Some(map)),
             speeds,
             movers,
+            placed,
         })
     }
 
@@ -69,6 +78,10 @@ impl<'m, 'd, 'w, 'r> Stays<'m, 'd, 'w, 'r> {
     pub(crate) fn place_of(&self, entity: &str, when: When) -> Option<OnRoad<'w, 'r>> {
         let object = self.scenario.entities().object(entity)?;
         if may_drive_itself(self.scenario, object) {
+            return None;
+        }
+        // An entity may be placed by itself and by a selection.
+        if self.placed.iter().filter(|name| *name == entity).count() != 1 {
             return None;
         }
         let starts = self.origins.starts.iter().enumerate();

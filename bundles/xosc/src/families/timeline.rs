@@ -149,10 +149,10 @@ fn endless(scenario: &Scenario<'_>, plan: &Plan, at: usize, it: usize) -> Option
         false => called(element.element(scenario)),
     };
     match (part.takes, part.executions) {
-        (Takes::Forever | Takes::ForeverInTheory, _) => {
-            Some(format!("{name} has `continuous=\"true\"` and does not end"))
-        }
-        (_, Some(count)) if count > 1 => Some(format!(
+        (Takes::Forever | Takes::ForeverInTheory, _) => Some(format!(
+            "{name} has `continuous=\"true\"` and does not end by itself"
+        )),
+        (_, Some(count)) if count > 1 && part.kind == StoryKind::Event => Some(format!(
             "{name} has `maximumExecutionCount=\"{count}\"`, but is triggered less often"
         )),
         _ => None,

@@ -128,7 +128,11 @@ fn uses(
             let all = it.word("triggeringEntitiesRule").as_deref() == Some("all");
             !all && it.children_named("EntityRef").nth(1).is_some()
         });
-        for name in NAMES.into_iter().filter(|_| !is_one_of_many) {
+        // A delayed condition may look at what was before the deletion.
+        let condition = element.ancestor("Condition");
+        let is_delayed = condition
+            .is_some_and(|it| it.number("delay").is_none_or(|by| by > 0.0) && it.has("delay"));
+        for name in NAMES.into_iter().filter(|_| !is_one_of_many && !is_delayed) {
             let is_it = element.text(name).is_some_and(|it| it == deletion.entity);
             if is_it {
                 let of = format!("used by {}, which starts", called(owner));

@@ -5,16 +5,20 @@ pub const RULE: Rule<Scene> = Rule {
     ..Rule::after(READABLE)
 };
 
-/// Attributes with the id of a lane or a road.
-const IDS: &[(&str, &str)] = &[
+/// Attributes that must be integers: ids of lanes and roads, and numbers of lanes and executions.
+const INTEGERS: &[(&str, &str)] = &[
     ("LanePosition", "laneId"),
     ("LanePosition", "roadId"),
     ("RoadPosition", "roadId"),
     ("AbsoluteTargetLane", "value"),
+    ("RelativeTargetLane", "value"),
+    ("RelativeLanePosition", "dLane"),
+    ("Event", "maximumExecutionCount"),
+    ("ManeuverGroup", "maximumExecutionCount"),
 ];
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    for (name, attribute) in IDS {
+    for (name, attribute) in INTEGERS {
         for element in scenario.elements_everywhere(name) {
             let Some(parameter) = element
                 .written(attribute)
@@ -22,13 +26,12 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             else {
                 continue;
             };
-            let Some((declaration, written)) = with_fraction(element, parameter) else {
+            let Some((declaration, written, value)) = written_as_double(element, parameter) else {
                 continue;
             };
-            let (id, _) = written.split_once('.').unwrap_or((written, ""));
             let text = format!(
-                "`${parameter}` is replaced by `{written}`, but ids of lanes and roads are compared as texts, and \
-                 none is written like this; declare `{parameter}` as `int` with the value `{id}`"
+                "`${parameter}` is replaced by `{written}`, which readers do not take for the integer `{value}`; \
+                 declare `{parameter}` as `int` with the value `{value}`"
             );
             found
                 .about(element, attribute, text)
@@ -37,15 +40,27 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Returns the declaration and the written value of a `double` that is written with a fraction of 0.
-fn with_fraction<'d>(element: Element<'_, 'd>, parameter: &str) -> Option<(Node<'d>, &'d str)> {
+/// Returns the declaration of a `double`, its text and the integer that this means. Returns `None`
+/// if the text itself is an integer.
+fn written_as_double<'d>(
+    element: Element<'_, 'd>,
+    parameter: &str,
+) -> Option<(Node<'d>, &'d str, i64)> {
     let declaration = element.parameter(parameter)?;
     let node = declaration.node;
     if declaration.data_type != Some(DataType::Double) || node.name() != "ParameterDeclaration" {
         return None;
     }
     let written = node.attr("value")?.trim();
-    let (whole, fraction) = written.split_once('.')?;
-    let is_whole = whole.parse::<i64>().is_ok() && fraction.bytes().all(|digit| digit == b'0');
-    is_whole.then_some((node, written))
+    let Declared::Value(value) = &declaration.declared else {
+        return None;
+    };
+    let value = value
+        .number()
+        .filter(|value| value.fract() == 0.0 && value.abs() < 1e9)?;
+    (written.parse::<i64>().is_err() && !written.contains('$')).then_some((
+        node,
+        written,
+        value as i64,
+    ))
 }
