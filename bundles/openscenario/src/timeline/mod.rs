@@ -25,6 +25,7 @@ pub use why::{At, Cause};
 use std::sync::OnceLock;
 
 use crate::queries::scenario::Scenario;
+use plan::Tree;
 
 /// When the elements of a storyboard start and end.
 #[derive(Debug)]
@@ -65,6 +66,11 @@ impl Timeline {
     /// empty if it may start, or if only its parent never starts.
     pub fn never_starts(&self, place: usize, strictness: Strictness) -> Vec<Cause> {
         why::never_starts(&self.plan, self.spans(strictness), strictness, place)
+    }
+
+    /// Returns the moment at which the run or the act around an element ends, by the standard.
+    pub fn end_around(&self, place: usize) -> Moment {
+        self.standard.stop_of(&Tree::of(&self.plan), place)
     }
 
     /// Returns the causes, one for each condition group, why the run never ends. The list is empty

@@ -6,7 +6,9 @@
 
 use super::condition::Known;
 use super::moment::{Moment, Times};
-use super::plan::{Plan, Priority, Start, StoryPart, Takes, Tree};
+use super::plan::{
+    Condition, Edge, Logic, Plan, Priority, Start, State, StoryPart, Takes, Tree, Trigger,
+};
 use crate::types::storyboard::StoryKind;
 
 /// How the standard is read where simulators differ.
@@ -180,7 +182,11 @@ impl Spans {
             },
             Start::By(trigger) => {
                 let known = self.known(tree, strictness);
-                let (may, by) = known.trigger(trigger, parent);
+                let (may, by) =
+                    match strictness == Strictness::Standard && part.priority == Priority::Skip {
+                        true => known.trigger(&known.untied(place, trigger), parent),
+                        false => known.trigger(trigger, parent),
+                    };
                 let stop = self.stop_of(tree, place);
                 let until = Times::between(0.0, stop.latest);
                 let mut may = may.intersect(&until);
@@ -371,7 +377,7 @@ impl Spans {
 
 impl Known<'_> {
     /// Returns when a trigger is first true, if it is looked at from `since` on.
-    fn moment(&self, trigger: &super::plan::Trigger, since: Moment) -> Moment {
+    fn moment(&self, trigger: &Trigger, since: Moment) -> Moment {
         let (may, by) = self.trigger(trigger, since);
         Moment {
             earliest: may.first(),
@@ -387,6 +393,34 @@ impl Known<'_> {
             };
             let until = span.end.earliest.min(span.complete.earliest);
             may.without(&Times::between(span.start.latest, until), true, true)
+        })
+    }
+
+    /// Returns the trigger of an event without the groups that are true only while another event
+    /// of the maneuver runs.
+    fn untied(&self, place: usize, trigger: &Trigger) -> Trigger {
+        let groups = trigger.groups.iter();
+        let free = groups.filter(|group| self.tied_to(place, group).is_none());
+        Trigger {
+            groups: free.cloned().collect(),
+        }
+    }
+
+    /// Returns the other event of the maneuver that runs whenever a group is true.
+    pub(super) fn tied_to(&self, place: usize, group: &[Condition]) -> Option<usize> {
+        group.iter().find_map(|condition| match condition {
+            Condition {
+                logic: Logic::State(of, State::Running),
+                edge: Edge::None | Edge::Rising,
+                delay: Some(0.0),
+                is_certain: true,
+            } => {
+                let is_beside = self.tree.siblings(place).any(|other| other == *of);
+                // An event that is stopped may end in this very step.
+                let runs_on = self.spans.get(*of)?.stopped.is_never();
+                (is_beside && runs_on).then_some(*of)
+            }
+            _ => None,
         })
     }
 

@@ -9,7 +9,7 @@ use super::play::{Spans, Strictness};
 pub type At = (usize, usize);
 
 /// Why a condition group is never true.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cause {
     /// The state of an element never comes.
     StateNeverComes {
@@ -36,7 +36,10 @@ pub enum Cause {
         other: At,
     },
     /// The group is first true after the act or the run has ended.
-    AfterTheEnd,
+    AfterTheEnd {
+        /// First time at which it may be true, in seconds.
+        first: f64,
+    },
     /// Another event of the maneuver runs whenever the event is triggered.
     Skipped {
         /// Index of the other event.
@@ -149,8 +152,12 @@ impl Known<'_> {
     ) -> Cause {
         let (may, _) = self.group(group, since);
         let in_time = may.intersect(&Times::between(0.0, until));
+        let late = Cause::AfterTheEnd { first: may.first() };
         if in_time.is_empty() || priority != Priority::Skip {
-            return Cause::AfterTheEnd;
+            return late;
+        }
+        if let Some(by) = self.tied_to(place, group) {
+            return Cause::Skipped { by };
         }
         let first = in_time.first();
         let runs = |other: &usize| {
@@ -159,7 +166,7 @@ impl Known<'_> {
         };
         match self.tree.siblings(place).find(runs) {
             Some(by) => Cause::Skipped { by },
-            None => Cause::AfterTheEnd,
+            None => late,
         }
     }
 }

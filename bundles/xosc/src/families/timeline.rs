@@ -2,7 +2,7 @@
 
 use crate::families::triggers::called;
 use crate::prelude::*;
-use qcbus_openscenario::{At, Cause, Plan, StoryKind, Strictness, Takes, Timeline};
+use qcbus_openscenario::{At, Cause, Logic, Plan, Start, StoryKind, Strictness, Takes, Timeline};
 
 /// A trigger that is never true.
 pub(crate) struct Never<'m, 'd> {
@@ -173,6 +173,22 @@ fn idle(scenario: &Scenario<'_>, timeline: &Timeline, of: usize) -> Option<Strin
         false => called(scenario.storyboard().elements().get(at)?.element(scenario)),
     };
     Some(format!("{name} never starts"))
+}
+
+/// Checks whether an element waits for itself or for an element around it, which other findings
+/// report.
+pub(crate) fn waits_for_itself(timeline: &Timeline, place: usize) -> bool {
+    let parts = &timeline.plan.parts;
+    let Some(Start::By(trigger)) = parts.get(place).map(|part| &part.start) else {
+        return false;
+    };
+    let parent = |at: &usize| parts.get(*at)?.parent;
+    let around: Vec<usize> = std::iter::successors(Some(place), parent).collect();
+    let mut conditions = trigger.groups.iter().flatten();
+    conditions.any(|condition| match &condition.logic {
+        Logic::State(of, _) => around.contains(of),
+        _ => false,
+    })
 }
 
 /// Checks whether another finding reports why a state never comes: its element never starts, or it

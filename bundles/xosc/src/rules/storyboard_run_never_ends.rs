@@ -68,7 +68,7 @@ fn report(
             let why = "the conditions of this group are never true together";
             (other, why.to_owned())
         }
-        Cause::AfterTheEnd | Cause::Skipped { .. } => return,
+        Cause::AfterTheEnd { .. } | Cause::Skipped { .. } => return,
     };
     if let Some(condition) = never.condition(at) {
         let text = format!("{why}; {}{}", never.so, differs(never));

@@ -1,6 +1,8 @@
 use crate::families::actions::short;
+use crate::families::timeline::{self, differs};
 use crate::families::triggers::{self, called, earliest, groups, holds_at_once, time, time_or_day};
 use crate::prelude::*;
+use qcbus_openscenario::Cause;
 
 pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
@@ -23,6 +25,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     let run_ends = end(storyboard)
         .filter(|_| !ends_at_once(storyboard))
         .map(|moment| (moment, "the run"));
+    let mut said: Vec<Node<'_>> = Vec::new();
     for story in storyboard.children_named("Story") {
         for act in story.children_named("Act") {
             let act_ends = end(act).map(|moment| (moment, "its act"));
@@ -33,12 +36,56 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             };
             // Elements in an act that never starts need no report of their own.
             if too_late(act, at, what, by, found) {
+                said.push(act.node());
                 continue;
             }
             for event in triggers::events(act) {
-                too_late(event, at, what, by, found);
+                if too_late(event, at, what, by, found) {
+                    said.push(event.node());
+                }
             }
         }
+    }
+    if !ends_at_once(storyboard) {
+        others(scenario, &said, found);
+    }
+}
+
+/// Reports elements that are too late for other reasons, such as the duration of an action before.
+fn others(scenario: &Scenario<'_>, said: &[Node<'_>], found: &mut Sink<'_>) {
+    let Some(timeline) = scenario.timeline() else {
+        return;
+    };
+    for never in timeline::never_started(scenario, timeline) {
+        let late = never.causes.iter().map(|cause| match cause {
+            Cause::AfterTheEnd { first } => Some(*first),
+            _ => None,
+        });
+        let late: Option<Vec<f64>> = late.collect();
+        let first = late.into_iter().flatten().reduce(f64::min);
+        let (Some(first), Some(owner)) = (first, never.owner()) else {
+            continue;
+        };
+        let end = timeline.end_around(never.place);
+        let is_said =
+            said.contains(&owner.node()) || timeline::waits_for_itself(timeline, never.place);
+        if is_said || first <= end.latest {
+            continue;
+        }
+        let what = match end.earliest < timeline.standard.ends.earliest {
+            true => "its act",
+            false => "the run",
+        };
+        let text = format!(
+            "{} starts at {} s at the earliest, but {what} ends at {} s; it never \
+             starts{}",
+            called(owner),
+            short((first * 10.0).round() / 10.0),
+            short((end.earliest * 10.0).round() / 10.0),
+            differs(&never)
+        );
+        let condition = never.condition((0, 0)).unwrap_or(owner);
+        found.about(condition, "", text);
     }
 }
 
