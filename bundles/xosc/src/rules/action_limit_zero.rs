@@ -11,7 +11,13 @@ pub const RULE: Rule<Scene> = Rule {
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
     for dynamics in scenario.elements_everywhere("LaneOffsetActionDynamics") {
         let shape = dynamics.word("dynamicsShape");
-        if is_zero(dynamics, "maxLateralAcc") && shape.is_some_and(|shape| shape != "step") {
+        // An entity without offset need not move.
+        let target = dynamics
+            .parent()
+            .and_then(|action| action.path(&["LaneOffsetTarget", "AbsoluteTargetLaneOffset"]));
+        let is_there = target.is_some_and(|target| target.number("value") == Some(0.0));
+        let is_gradual = shape.is_some_and(|shape| shape != "step");
+        if is_zero(dynamics, "maxLateralAcc") && is_gradual && !is_there {
             let so = "the entity never moves sideways, and the offset is never reached";
             report(dynamics, "maxLateralAcc", so, found);
         }
@@ -34,10 +40,14 @@ fn constraints(limits: Element<'_, '_>, found: &mut Sink<'_>) {
     };
     let zero = |names: &[&'static str]| names.iter().copied().find(|name| is_zero(limits, name));
     let (up, down) = (zero(&UP), zero(&DOWN));
+    let steady = steady_speed(action);
     if is_zero(limits, "maxSpeed") {
-        let so = "the entity must stand still, and the action never reaches its goal";
-        report(limits, "maxSpeed", so, found);
-    } else if let (Some(up), Some(_)) = (up, down) {
+        // An entity that stands already may stay so.
+        if steady != Some(0.0) {
+            let so = "the entity must stand still, and the action never reaches its goal";
+            report(limits, "maxSpeed", so, found);
+        }
+    } else if let (Some(up), Some(_), None) = (up, down, steady) {
         let so = "the limit for braking is 0, too; the speed never changes, and the action never reaches its goal";
         report(limits, up, so, found);
     } else if let Some(name) = up.or(down) {
@@ -63,6 +73,14 @@ fn constraints(limits: Element<'_, '_>, found: &mut Sink<'_>) {
             _ => {}
         }
     }
+}
+
+/// Returns the speed of a profile that has only one. The entity may have it already.
+fn steady_speed(action: Element<'_, '_>) -> Option<f64> {
+    let mut entries = action.children_named("SpeedProfileEntry");
+    let speed = entries.next()?.number("speed")?;
+    let mut others = entries.map(|entry| entry.number("speed"));
+    others.all(|other| other == Some(speed)).then_some(speed)
 }
 
 /// Reports a transition of the speed of a vehicle that can neither accelerate nor brake.
