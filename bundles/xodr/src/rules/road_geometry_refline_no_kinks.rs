@@ -1,6 +1,7 @@
 use crate::families::gap_levels::{KINK_BROKEN_FROM, KINK_ERROR_FROM};
 use crate::families::on_road::OnRoad;
 use crate::families::refline::{joints, shape_name, standstill};
+use crate::families::routes::is_route;
 use crate::prelude::*;
 
 const KINK: Param = Param::number(
@@ -64,7 +65,9 @@ fn check(road: &Road<'_>, one: &Geometry<'_>, next: &Geometry<'_>, found: &mut S
     );
     // Section 9.2 says "should", annex D.1.3 says "shall".
     let demanded = found.version() >= Some(ANNEX_D);
-    let is_broken = kink >= found.number(&KINK_BROKEN_FROM);
+    // People on foot turn at a corner.
+    let for_vehicles = || road.sections().any(|section| section.lanes().any(is_route));
+    let is_broken = kink >= found.number(&KINK_BROKEN_FROM) && for_vehicles();
     let is_error = is_broken || (demanded && kink >= found.number(&KINK_ERROR_FROM));
     let level = if is_error {
         Level::Error

@@ -174,14 +174,12 @@ impl<'m, 'a> Aside<'m, 'a> {
         None
     }
 
-    /// Checks whether vehicles can pass beside the lane. The lanes of a connecting road are ways of
-    /// their own.
+    /// Checks whether vehicles can pass beside the lane, or on a lane for both directions.
     fn has_way_around(&self, lane: LaneRef<'m, 'a>) -> bool {
-        let road = lane.at.road;
-        let inside = self.map.junction_of(road);
-        let connects = inside.is_some_and(|it| it.kind() == Some(JunctionType::Common));
-        let side = lane.side();
-        !connects && side.is_none_or(|side| lane.at.side(side).any(is_route))
+        let mut both = [Side::Left, Side::Right].into_iter();
+        let beside = |side| lane.at.side(side).any(is_route);
+        let is_shared = |lane: LaneRef<'_, '_>| lane.kind() == Some("bidirectional");
+        lane.side().is_none_or(beside) || both.any(|side| lane.at.side(side).any(is_shared))
     }
 }
 

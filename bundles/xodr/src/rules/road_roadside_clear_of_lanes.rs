@@ -158,8 +158,13 @@ fn between<'m, 'a>(road: &'m Road<'a>, s: f64, t: f64, depth: f64) -> Option<Spo
     let [Some(right), Some(left)] = beside else {
         return None;
     };
-    let is_two = right.lane.key() != left.lane.key();
-    (is_two && is_directed(right.lane) && is_directed(left.lane)).then_some(Spot {
+    // A narrow lane between them, such as a median, has an id of its own.
+    let touch = match right.lane.id().zip(left.lane.id()) {
+        Some((-1, 1)) => true,
+        Some((right, left)) => left - right == 1 && right != 0 && left != 0,
+        None => false,
+    };
+    (touch && is_directed(right.lane) && is_directed(left.lane)).then_some(Spot {
         lane: right.lane,
         depth: 0.0,
     })
@@ -173,11 +178,32 @@ fn object(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
         || is_flat
         || has_outline(node)
         || node.child("skeleton").is_some()
+        || is_on_island(road, node)
     {
         return;
     }
     report(road, node, "should stand beside the lane", found);
 }
+
+/// Checks whether an object stands on a traffic island.
+fn is_on_island(road: &Road<'_>, node: Node<'_>) -> bool {
+    let Some((s, t)) = place(node, road) else {
+        return false;
+    };
+    road.objects().any(|object| {
+        let island = object.node();
+        let is_island = island.attr("type") == Some("trafficIsland");
+        let Some((at, beside)) = place(island, road).filter(|_| is_island) else {
+            return false;
+        };
+        // The size of an outline is not needed: islands are small.
+        let half = |name: &str| number(island, name).unwrap_or(LARGEST_ISLAND) / 2.0;
+        (s - at).abs() <= half("length") && (t - beside).abs() <= half("width")
+    })
+}
+
+/// Size in metres of an island that does not state its own.
+const LARGEST_ISLAND: f64 = 10.0;
 
 fn parking(road: &Road<'_>, node: Node<'_>, found: &mut Sink<'_>) {
     if !has_outline(node) {

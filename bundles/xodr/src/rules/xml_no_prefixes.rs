@@ -6,27 +6,18 @@ pub const RULE: Rule<Document> = Rule {
     ..Rule::after(READABLE)
 };
 
-/// Elements at the top of a map and in its roads.
-const ELEMENTS: [&str; 11] = [
-    "header",
-    "road",
-    "junction",
-    "controller",
-    "junctionGroup",
-    "station",
-    "link",
-    "planView",
-    "lanes",
-    "connection",
-    "laneSection",
-];
+/// Further elements of which the first one is looked at.
+const ELEMENTS: [&str; 3] = ["laneSection", "geometry", "laneLink"];
 
 fn run(document: &Document<'_>, found: &mut Sink<'_>) {
     let Some(root) = document.root() else { return };
-    let parts = ELEMENTS
+    let tops = root.children().filter(|node| !is_user_data(*node));
+    let tops = tops.flat_map(|top| std::iter::once(top).chain(top.children()));
+    let further = ELEMENTS
         .iter()
         .filter_map(|name| document.elements(name).next());
-    let mut all = std::iter::once(root).chain(parts.filter(|node| !is_user_data(*node)));
+    let all = std::iter::once(root).chain(tops).chain(further);
+    let mut all = all.filter(|node| !is_user_data(*node));
     let Some(node) = all.find(|node| !node.prefix().is_empty()) else {
         return;
     };

@@ -46,6 +46,15 @@ fn lanes_between_driving_lanes_give_expected_findings() {
             &[],
         ),
         (
+            "a lane for both directions on the other side",
+            middle(&["restricted"], "").replace(
+                "<center>",
+                "<left><lane id=\"1\" type=\"bidirectional\" level=\"false\"><width sOffset=\"0\" a=\"3.5\" b=\"0\" c=\"0\" d=\"0\"/></lane></left><center>",
+            ),
+            // The lanes on the left have no links.
+            &["warning road_lane_link_lanes_across_lane_sections"],
+        ),
+        (
             "another type of lane for vehicles",
             middle(&["bidirectional"], ""),
             &[],
@@ -121,6 +130,14 @@ fn steps_and_corners_of_old_maps_give_expected_findings() {
             corner("-1.5"),
             &["error road_geometry_refline_no_kinks"],
         ),
+        (
+            "a corner of a footway",
+            corner("-1.5").replace("type=\"driving\"", "type=\"sidewalk\""),
+            &[
+                "warning road_geometry_refline_no_kinks",
+                "warning road_network_drivable",
+            ],
+        ),
     ];
     super::run_files(&rows);
 }
@@ -140,6 +157,8 @@ fn object(id: &str, kind: &str, s: &str, t: &str, rest: &str) -> String {
         r#"<object id="{id}" type="{kind}" s="{s}" t="{t}" zOffset="0" orientation="none" hdg="0" pitch="0" roll="0" {rest}"#
     )
 }
+
+const MEDIAN: &str = r#"<lane id="-1" type="median" level="false"><width sOffset="0" a="0.8" b="0" c="0" d="0"/></lane>"#;
 
 fn objects(list: &[String]) -> String {
     with(&format!("<objects>{}</objects>", list.concat()))
@@ -174,6 +193,25 @@ fn objects_in_the_way_give_expected_findings() {
     let rows: Vec<Row> = vec![
         ("a pole on the line in the middle", pole("0.2"), blocked),
         ("a pole at the edge of the road", pole("3.4"), &[]),
+        (
+            "a pole on a narrow median",
+            pole("-0.4").replace("<lane id=\"-1\"", &format!("{MEDIAN}<lane id=\"-2\"")),
+            &[],
+        ),
+        (
+            "a pole on a traffic island",
+            objects(&[
+                object("1", "pole", "50", "0.2", r#"radius="0.1" height="4"/>"#),
+                object(
+                    "2",
+                    "trafficIsland",
+                    "50",
+                    "0",
+                    r#"length="4" width="1.5" height="0.15"/>"#,
+                ),
+            ]),
+            &[],
+        ),
         ("a house over the whole road", house("0"), blocked),
         ("a house beside the road", house("8"), &[]),
         ("bays that touch", bays("52.5", "0"), &[]),
