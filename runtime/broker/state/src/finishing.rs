@@ -134,9 +134,10 @@ impl State {
                 self.is_judged(file, Arc::new(*judged), actions);
                 self.end_job(id, actions);
             }
-            StoreOutcome::Stale => {
+            StoreOutcome::Stale { half_written } => {
                 if let Some(entry) = self.files.get_mut(file) {
                     entry.stale = true;
+                    entry.half_written |= half_written;
                 }
                 self.unpublish_unstored(file, actions);
                 self.end_job(id, actions);

@@ -305,8 +305,11 @@ pub struct FinishedJob {
 pub enum StoreOutcome {
     /// The result is written and recorded in the journal.
     Stored(Box<Judged>),
-    /// The file has changed since it was read. No result was written.
-    Stale,
+    /// The file has changed since it was read.
+    Stale {
+        /// Whether a result of the earlier bytes may be in its place, because writing it failed midway.
+        half_written: bool,
+    },
     /// The required bundles have changed. No result was written.
     Outdated,
     /// The result could not be written. Storing is retried.

@@ -86,7 +86,11 @@ impl Store {
         step("storing", &job.path);
         match self.refresh(job) {
             Ok(true) => {}
-            Ok(false) => return StoreOutcome::Stale,
+            Ok(false) => {
+                return StoreOutcome::Stale {
+                    half_written: false,
+                };
+            }
             Err(error) => return StoreOutcome::Failed(unlooked(&job.path, &error)),
         }
         let outcomes: Vec<BundleOutcome> = job.bundles.iter().map(TaskOutcome::said).collect();
@@ -106,7 +110,9 @@ impl Store {
         // The file may have been removed between the check and the rename. In that case no result may stay.
         if self.has_gone(&job.path) {
             let _ = self.withdraw_files(&job.path);
-            return StoreOutcome::Stale;
+            return StoreOutcome::Stale {
+                half_written: false,
+            };
         }
         StoreOutcome::Stored(Box::new(judged))
     }
@@ -120,7 +126,7 @@ impl Store {
         failed: Unwritten,
     ) -> StoreOutcome {
         if matches!(self.refresh(job), Ok(false)) {
-            return StoreOutcome::Stale;
+            return StoreOutcome::Stale { half_written: true };
         }
         if self.retries && !failed.for_good {
             return StoreOutcome::Failed(failed.what + failed.further);

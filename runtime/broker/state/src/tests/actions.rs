@@ -90,7 +90,9 @@ impl World {
         let file = file_of(&job.path);
         let prepared = job.prepared.as_ref().unwrap();
         let outcome = if prepared.inputs != self.inputs(file) {
-            StoreOutcome::Stale
+            StoreOutcome::Stale {
+                half_written: false,
+            }
         } else if job.epoch != self.state.epoch() {
             StoreOutcome::Outdated
         } else if !room {

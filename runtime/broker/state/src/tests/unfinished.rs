@@ -1,6 +1,7 @@
 //! Files that are still being written.
 
 use qcbus_messages::control::Response;
+use qcbus_types::StoreOutcome;
 
 use super::words::{answers, comes_of, waits};
 use super::*;
@@ -98,4 +99,27 @@ fn verdict_stands_when_unfinished_file_is_restored() {
     assert_eq!(world.stored.len(), stored, "no file is judged again");
     let asked = asked_for_1(&mut world);
     assert!(matches!(answers(&asked)[..], [Response::Verdict(_)]));
+}
+
+/// The earlier bytes may return after a result of the later ones was written, but not recorded.
+#[test]
+fn half_written_result_is_replaced_when_earlier_bytes_return() {
+    for (half_written, again) in [(false, 0), (true, 1)] {
+        let mut world = two_judged();
+        let before = world.contents[&world.there[&path_of(0)]];
+        world.write(0);
+        while world.storing.is_empty() {
+            world.pass(Duration::from_millis(50));
+            world.prepare(0, true);
+            (0..4).for_each(|peer| world.answer(peer));
+        }
+        let job = world.storing.remove(0).job;
+        world.put(0, before);
+        let outcome = StoreOutcome::Stale { half_written };
+        world.event(Event::Stored { job, outcome });
+        let stored = world.stored.iter().filter(|file| **file == 0).count();
+        world.settle();
+        let now = world.stored.iter().filter(|file| **file == 0).count();
+        assert_eq!(now - stored, again, "half written: {half_written}");
+    }
 }

@@ -261,7 +261,9 @@ fn temporary_read_error_is_retried_and_then_reported() {
     assert_eq!(finished.unreadable.as_deref(), Some("too many open files"));
     // The next successful reading clears the failure.
     let job = world.storing.remove(0).job;
-    let outcome = StoreOutcome::Stale;
+    let outcome = StoreOutcome::Stale {
+        half_written: false,
+    };
     world.event(Event::Stored { job, outcome });
     world.prepare(0, true);
     world.answer(0);
