@@ -55,6 +55,21 @@ pub(crate) fn never_started<'m, 'd>(
     never.collect()
 }
 
+/// Visits each cause why an act or event never starts.
+pub(crate) fn each_cause<'m, 'd>(
+    scenario: &'m Scenario<'d>,
+    mut visit: impl FnMut(&Timeline, &Never<'m, 'd>, Cause),
+) {
+    let Some(timeline) = scenario.timeline() else {
+        return;
+    };
+    for never in never_started(scenario, timeline) {
+        for cause in &never.causes {
+            visit(timeline, &never, *cause);
+        }
+    }
+}
+
 /// Returns the stop trigger of the storyboard if it is never true.
 pub(crate) fn never_ended<'m, 'd>(
     scenario: &'m Scenario<'d>,

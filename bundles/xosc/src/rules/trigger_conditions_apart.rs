@@ -11,30 +11,25 @@ pub const RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let Some(timeline) = scenario.timeline() else {
-        return;
-    };
-    for never in timeline::never_started(scenario, timeline) {
-        for cause in &never.causes {
-            let Cause::Apart { one, other } = *cause else {
-                continue;
-            };
-            let (Some(one), Some(other)) = (never.condition(one), never.condition(other)) else {
-                continue;
-            };
-            // Another rule reports it with the values.
-            if contradict(one, other) {
-                continue;
-            }
-            let text = format!(
-                "the two conditions become true at different moments, but all conditions of a group \
-                 must be true at once; {}{}",
-                never.so,
-                differs(&never)
-            );
-            found
-                .about(one, "", text)
-                .at(other.node(), "the other condition");
+    timeline::each_cause(scenario, |_, never, cause| {
+        let Cause::Apart { one, other } = cause else {
+            return;
+        };
+        let (Some(one), Some(other)) = (never.condition(one), never.condition(other)) else {
+            return;
+        };
+        // Another rule reports it with the values.
+        if contradict(one, other) {
+            return;
         }
-    }
+        let text = format!(
+            "the two conditions become true at different moments, but all conditions of a group \
+                 must be true at once; {}{}",
+            never.so,
+            differs(never)
+        );
+        found
+            .about(one, "", text)
+            .at(other.node(), "the other condition");
+    });
 }

@@ -11,26 +11,21 @@ pub const RULE: Rule<Scene> = Rule {
 };
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    let Some(timeline) = scenario.timeline() else {
-        return;
-    };
-    for never in timeline::never_started(scenario, timeline) {
-        for cause in &never.causes {
-            let Cause::Over { at } = *cause else { continue };
-            let Some(condition) = never.condition(at) else {
-                continue;
-            };
-            // Another rule reports an edge that never occurs.
-            if edge_of_time(condition).is_some() {
-                continue;
-            }
-            let edge = condition.word("conditionEdge").unwrap_or_default();
-            let what = match &*edge {
-                "none" | "" => "the condition is true only before it is first looked at".to_owned(),
-                edge => format!("the `{edge}` edge comes before the condition is first looked at"),
-            };
-            let text = format!("{what}; {}{}", never.so, differs(&never));
-            found.about(condition, "conditionEdge", text);
+    timeline::each_cause(scenario, |_, never, cause| {
+        let Cause::Over { at } = cause else { return };
+        let Some(condition) = never.condition(at) else {
+            return;
+        };
+        // Another rule reports an edge that never occurs.
+        if edge_of_time(condition).is_some() {
+            return;
         }
-    }
+        let edge = condition.word("conditionEdge").unwrap_or_default();
+        let what = match &*edge {
+            "none" | "" => "the condition is true only before it is first looked at".to_owned(),
+            edge => format!("the `{edge}` edge comes before the condition is first looked at"),
+        };
+        let text = format!("{what}; {}{}", never.so, differs(never));
+        found.about(condition, "conditionEdge", text);
+    });
 }

@@ -124,7 +124,7 @@ fn too_late(
         short(start),
         short(end)
     );
-    // A time this far away means never. Nobody writes a time of day for that.
+    // A time this far away is meant as never. A time of day is not.
     let is_day = condition.is("TimeOfDayCondition");
     let on_purpose = start >= FAR * end && !is_day;
     let attribute = if is_day { "dateTime" } else { "value" };
