@@ -1,9 +1,9 @@
+use crate::families::shown;
 use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
-    level: Level::Warning,
     versions: "1.9.0..",
-    backport: Backport::Lower { since: "1.1.0" },
+    backport: Backport::Alike { since: "" },
     params: &[LEAST],
     each: Some(each),
     ..Rule::after(READABLE)
@@ -25,11 +25,21 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 let Some(curvature) = curvature.filter(|curvature| curvature.abs() <= least) else {
                     continue;
                 };
+                let shown = shown::number(curvature);
+                // Readers divide by 0 only. A tiny curvature is merely a line written as an arc.
+                let (level, fault) = match curvature == 0.0 {
+                    true => (
+                        Level::Error,
+                        "but must not be zero, because readers divide by it",
+                    ),
+                    false => (Level::Warning, "which is practically zero"),
+                };
                 let text = format!(
-                    "the curvature of the arc is {curvature}; it should not be zero; a straight geometry should \
-                     be a `line`"
+                    "the curvature of the arc is {shown}, {fault}; a straight geometry is a `line`"
                 );
-                let finding = found.issue(Place::attribute_or_node(arc, "curvature"), text);
+                let finding = found
+                    .issue(Place::attribute_or_node(arc, "curvature"), text)
+                    .level(level);
                 if let Some(s) = geometry.s() {
                     finding.road(road.id(), s, 0.0);
                 }

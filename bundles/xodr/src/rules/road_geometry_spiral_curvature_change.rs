@@ -2,9 +2,8 @@ use crate::families::shown;
 use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
-    level: Level::Warning,
     versions: "1.9.0..",
-    backport: Backport::Lower { since: "1.1.0" },
+    backport: Backport::Alike { since: "" },
     params: &[LEAST],
     each: Some(each),
     ..Rule::after(READABLE)
@@ -34,13 +33,21 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 } else {
                     "an `arc`"
                 };
+                // Readers divide by a difference of 0 only.
+                let (level, fault) = match change == 0.0 {
+                    true => (
+                        Level::Error,
+                        "but they must differ, because readers divide by the difference",
+                    ),
+                    false => (Level::Warning, "which is practically the same"),
+                };
                 let text = format!(
-                    "the spiral starts with curvature {} and ends with {}; they should differ; a geometry of \
-                     constant curvature should be {instead}",
+                    "the spiral starts with curvature {} and ends with {}, {fault}; a geometry of constant \
+                     curvature is {instead}",
                     shown::number(start),
                     shown::number(end)
                 );
-                let finding = found.issue(spiral, text);
+                let finding = found.issue(spiral, text).level(level);
                 if let Some(s) = geometry.s() {
                     finding.road(road.id(), s, 0.0);
                 }
