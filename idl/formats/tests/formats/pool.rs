@@ -428,3 +428,27 @@ fn bundle_never_seen_leaves_its_checkers_open() {
     let open: Vec<String> = configured.open().map(ToString::to_string).collect();
     assert_eq!(open, ["mine / a: mine cannot be started: no such file"]);
 }
+
+#[test]
+fn rule_uid_with_hyphens_is_written_with_underscores() {
+    let uid = "asam.net:xodr:1.9.0:road.geometry.s-value_sum";
+    let written = "asam.net:xodr:1.9.0:road.geometry.s_value_sum";
+    let mut bundles = two_bundles();
+    let checker = &mut bundles[0].checkers[0];
+    checker.rule_uids = [uid, written].into_iter().collect();
+    checker.issues.truncate(1);
+    checker.issues[0].rule_uid = uid.to_owned();
+    let text = checker.issues[0].description.clone();
+    let pooled = pooled(input(bundles));
+    let checker = &pooled.results.bundles[0].checkers[0];
+    assert_eq!(
+        checker
+            .addressed_rules
+            .iter()
+            .map(|uid| &**uid)
+            .collect::<Vec<_>>(),
+        [written]
+    );
+    assert_eq!(checker.issues[0].rule_uid, written);
+    assert_eq!(checker.issues[0].description, text);
+}

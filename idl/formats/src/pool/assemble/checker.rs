@@ -85,12 +85,22 @@ fn rules(outcome: &mut CheckerOutcome) -> Arc<[Text]> {
     let mut rules = Cow::Borrowed(&given[..]);
     if !given.can_be_written() {
         let (good, bad): (Vec<&Text>, _) = given.iter().partition(|uid| is_rule_uid(uid));
-        outcome.metadata.extend(bad.into_iter().map(unreadable));
         let mut seen = HashSet::new();
-        let once = good.into_iter().filter(|uid| seen.insert(&***uid));
-        rules = once.cloned().collect();
+        let once = good.into_iter().filter(|uid| seen.insert((*uid).clone()));
+        let mut kept: Vec<Text> = once.cloned().collect();
+        for uid in bad {
+            match with_underscores(uid) {
+                Some(spelt) if seen.insert(spelt.as_str().into()) => kept.push(spelt.into()),
+                Some(_) => {}
+                None => outcome.metadata.push(unreadable(uid)),
+            }
+        }
+        rules = Cow::Owned(kept);
     }
     for issue in &mut outcome.issues {
+        if let Some(spelt) = with_underscores(&issue.rule_uid) {
+            issue.rule_uid = spelt;
+        }
         if !is_rule_uid(&issue.rule_uid) {
             let given = std::mem::replace(&mut issue.rule_uid, UNNAMED.to_owned());
             if !given.is_empty() {
@@ -105,6 +115,16 @@ fn rules(outcome: &mut CheckerOutcome) -> Arc<[Text]> {
         Cow::Borrowed(_) => given.shared().clone(),
         Cow::Owned(rules) => rules.into(),
     }
+}
+
+/// Returns a rule UID with `_` instead of `-`, if that makes it one that readers accept. ASAM's
+/// list of rules has `road.geometry.s-value_sum`, but the pattern of ASAM's format forbids `-`.
+fn with_underscores(uid: &str) -> Option<String> {
+    if is_rule_uid(uid) || !uid.contains('-') {
+        return None;
+    }
+    let spelt = uid.replace('-', "_");
+    is_rule_uid(&spelt).then_some(spelt)
 }
 
 /// Returns the metadata that distinguish a blocked checker from one that does not apply.
