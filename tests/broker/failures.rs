@@ -11,7 +11,7 @@ use std::process::{Command, Output};
 use crate::support::content::Content;
 use crate::support::farm::Farm;
 use crate::support::inside::{is_inside, run_inside};
-use crate::support::processes::signal_pid;
+use crate::support::processes::{signal_pid, temporary_name};
 use crate::support::watchdog::until_or;
 use qcbus_messages::Verdict;
 use qcbus_messages::control::{Request, Response};
@@ -379,4 +379,20 @@ fn read_only_shared_memory_is_reported() {
             .collect();
         insta::assert_snapshot!(remark.join("\n"));
     });
+}
+
+/// A killed process that waits for the disk ends later, and the broker is not its parent.
+#[test]
+fn remains_of_a_process_that_outlives_the_earlier_broker_are_removed() {
+    let farm = Farm::new();
+    let mut writer = Command::new("sleep").arg("1000").spawn().unwrap();
+    std::fs::create_dir(farm.out()).unwrap();
+    let partial = farm.out().join(temporary_name(writer.id()));
+    std::fs::write(&partial, "half").unwrap();
+    let _broker = farm.serve_ready();
+    assert!(partial.exists(), "its writer lives");
+    writer.kill().unwrap();
+    writer.wait().unwrap();
+    let is_removed = || (!partial.exists()).then_some(());
+    until_or("the file is removed", is_removed, || farm.log());
 }

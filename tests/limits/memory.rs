@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 use crate::support::content::Content;
 use crate::support::farm::shm_segments;
 use crate::support::inside::{is_inside, run_inside};
-use crate::support::processes::signal_pid;
+use crate::support::processes::{signal_pid, temporary_name};
 use crate::support::watchdog::{until, until_so};
 use qcbus_bus::HostOptions;
 use tempfile::TempDir;
@@ -349,10 +349,7 @@ fn leftovers_of_a_killed_check_are_removed_later() {
     let half = place
         .at("out")
         .join(format!(".qcbus-{}.1-a1b2c3.tmp", killed.id()));
-    let parent = std::process::id();
-    let living = place
-        .at("out")
-        .join(format!(".qcbus-{parent}.{}-a1b2c3.tmp", started(parent)));
+    let living = place.at("out").join(temporary_name(std::process::id()));
     std::fs::write(&half, "half").unwrap();
     std::fs::write(&living, "half").unwrap();
     let (code, said) = place.run(&arguments);
@@ -368,12 +365,4 @@ fn leftovers_of_a_killed_check_are_removed_later() {
 
 fn until_some<T>(look: impl FnMut() -> Option<T>) -> T {
     until("a private instance", look)
-}
-
-/// Returns the start time of a process (proc(5), the 22nd field).
-fn started(pid: u32) -> String {
-    let stat = std::fs::read_to_string(Path::new("/proc").join(pid.to_string()).join("stat"));
-    let stat = stat.unwrap();
-    let (_, rest) = stat.rsplit_once(')').unwrap();
-    rest.split_whitespace().nth(19).unwrap().to_owned()
 }

@@ -11,6 +11,7 @@ use super::cli::files_below;
 use super::content::{Content, STRICT};
 use super::farm::Farm;
 use super::reports::{reported, torn};
+use super::watchdog::until_or;
 
 /// Existing files by name.
 pub type Files = BTreeMap<String, Content>;
@@ -224,7 +225,7 @@ impl Judgement {
                 continue;
             }
             let name = path.to_string_lossy().into_owned();
-            if is_being_written(&path) {
+            if is_being_written(farm, &path) {
                 continue;
             }
             let results = [".xqar", ".verdict.json"];
@@ -244,14 +245,25 @@ impl Judgement {
     }
 }
 
-/// Returns whether a live reporter is writing this file. The file name contains the reporter's
-/// process id.
-fn is_being_written(path: &Path) -> bool {
+/// Checks that a file is partial and that its writer lives. Waits for the broker to remove the
+/// partial file of a dead writer.
+fn is_being_written(farm: &Farm, path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let writer = name
         .strip_prefix(".qcbus-")
         .and_then(|it| it.split_once('.'));
-    writer.is_some_and(|(pid, _)| Path::new("/proc").join(pid).exists())
+    let Some((pid, _)) = writer else {
+        return false;
+    };
+    let process = Path::new("/proc").join(pid);
+    let is_over = || process.exists() || !farm.out().join(path).exists();
+    let log = || format!("{}\n{}", path.display(), farm.log());
+    until_or(
+        "the remains of a dead process are removed",
+        || is_over().then_some(()),
+        log,
+    );
+    true
 }
 
 /// Returns whether the rule that the oracle expects has an issue.

@@ -124,3 +124,12 @@ pub fn peak_private_kib(pid: u32) -> Option<u64> {
     let shared = memory_kib(pid, "RssShmem:")?;
     Some(memory_kib(pid, "VmHWM:")?.saturating_sub(shared))
 }
+
+/// Returns a name that a process gives to a file while it writes it.
+pub fn temporary_name(pid: u32) -> String {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
+    let (_, rest) = stat.rsplit_once(')').unwrap();
+    // This is the start time (proc(5), the 22nd field).
+    let started = rest.split_whitespace().nth(19).unwrap();
+    format!(".qcbus-{pid}.{started}-a1b2c3.tmp")
+}

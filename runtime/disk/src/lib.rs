@@ -240,7 +240,7 @@ fn make_directory(directory: &Path) -> io::Result<()> {
 
 static OWN_PREFIX: LazyLock<String> = LazyLock::new(|| {
     let pid = std::process::id();
-    let started = start_time(pid).unwrap_or(0);
+    let started = Stat::of(pid).map_or(0, |stat| stat.started);
     format!("{PREFIX}{pid}.{started}-")
 });
 
@@ -307,46 +307,51 @@ pub fn is_for_good(error: &io::Error) -> bool {
 }
 
 /// Removes the partial files of killed processes below a directory. Must be called before this
-/// process writes, because it may have the id of a dead one.
-pub fn sweep(directory: &Path) {
-    sweep_where(directory, &|writer| writer.is_own() || writer.is_dead());
+/// process writes, because it may have the id of a dead one. Returns the living writers of the
+/// files that stay.
+pub fn sweep(directory: &Path) -> Vec<Writer> {
+    sweep_where(directory, &|writer| writer.is_own() || writer.is_dead())
 }
 
 /// Works like [`sweep`], while this process may be writing.
-pub fn sweep_dead(directory: &Path) {
-    sweep_where(directory, &|writer| !writer.is_own() && writer.is_dead());
+pub fn sweep_dead(directory: &Path) -> Vec<Writer> {
+    sweep_where(directory, &|writer| !writer.is_own() && writer.is_dead())
 }
 
-fn sweep_where(directory: &Path, is_over: &dyn Fn(Writer) -> bool) {
+fn sweep_where(directory: &Path, is_over: &dyn Fn(Writer) -> bool) -> Vec<Writer> {
+    let mut living = Vec::new();
     // A directory that is missing or cannot be read has no remains to remove.
-    let Ok(entries) = std::fs::read_dir(directory) else {
-        return;
-    };
-    for entry in entries.flatten() {
+    for entry in std::fs::read_dir(directory).into_iter().flatten().flatten() {
         match entry.file_type() {
-            Ok(kind) if kind.is_dir() => sweep_where(&entry.path(), is_over),
-            _ => sweep_entry(&entry, is_over),
+            Ok(kind) if kind.is_dir() => living.extend(sweep_where(&entry.path(), is_over)),
+            _ => living.extend(sweep_entry(&entry, is_over)),
         }
     }
+    living
 }
 
-fn sweep_entry(entry: &DirEntry, is_over: &dyn Fn(Writer) -> bool) {
-    let Some(writer) = Writer::of(&entry.file_name().to_string_lossy()) else {
-        return;
-    };
+/// Removes a partial file if its writer is dead, and returns the writer otherwise.
+fn sweep_entry(entry: &DirEntry, is_over: &dyn Fn(Writer) -> bool) -> Option<Writer> {
+    let writer = Writer::of(&entry.file_name().to_string_lossy())?;
     let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
     let path = entry.path();
-    if !is_file || !is_over(writer) || is_locked(&path) {
-        return;
+    if !is_file {
+        return None;
     }
-    if let Err(error) = remove(&path) {
+    if !is_over(writer) {
+        return Some(writer);
+    }
+    if !is_locked(&path)
+        && let Err(error) = remove(&path)
+    {
         tracing::warn!("cannot remove {}: {error}", path.display());
     }
+    None
 }
 
 /// The process that writes a file, according to its temporary name.
 #[derive(Debug, Clone, Copy)]
-struct Writer {
+pub struct Writer {
     pid: u32,
     /// Start time of the process in clock ticks since boot.
     started: u64,
@@ -366,10 +371,11 @@ impl Writer {
         self.pid == std::process::id()
     }
 
-    /// Checks whether it can no longer be writing: its id is free or belongs to another process.
-    fn is_dead(self) -> bool {
-        match start_time(self.pid) {
-            Some(started) => started != self.started,
+    /// Checks whether it can no longer be writing: its id is free or belongs to another process, or
+    /// it has ended and its parent has not noticed.
+    pub fn is_dead(self) -> bool {
+        match Stat::of(self.pid) {
+            Some(stat) => stat.started != self.started || stat.has_ended(),
             None => !Path::new("/proc").join(self.pid.to_string()).exists(),
         }
     }
@@ -386,12 +392,30 @@ fn is_locked(path: &Path) -> bool {
     })
 }
 
-/// Returns the start time of a process (proc(5): the 22nd field; the second is a name in
-/// parentheses that may contain anything).
-fn start_time(pid: u32) -> Option<u64> {
-    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    let (_, rest) = stat.rsplit_once(')')?;
-    rest.split_whitespace().nth(19)?.parse().ok()
+/// What the system tells about a process (proc(5), `/proc/PID/stat`).
+struct Stat {
+    state: char,
+    /// Start time in clock ticks since boot.
+    started: u64,
+}
+
+impl Stat {
+    /// Reads the 3rd and the 22nd field. The second is a name in parentheses that may contain
+    /// anything.
+    fn of(pid: u32) -> Option<Stat> {
+        let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+        let (_, rest) = stat.rsplit_once(')')?;
+        let mut fields = rest.split_whitespace();
+        Some(Stat {
+            state: fields.next()?.chars().next()?,
+            started: fields.nth(18)?.parse().ok()?,
+        })
+    }
+
+    /// Checks whether it is a zombie or about to vanish. It has closed its files then.
+    fn has_ended(&self) -> bool {
+        matches!(self.state, 'Z' | 'X')
+    }
 }
 
 #[cfg(test)]
@@ -429,7 +453,7 @@ mod tests {
         std::fs::create_dir(&below).unwrap();
         let parent = rustix::process::getppid().unwrap().as_raw_nonzero();
         let parent = u32::try_from(parent.get()).unwrap();
-        let started = start_time(parent).unwrap();
+        let started = Stat::of(parent).unwrap().started;
         let dead = below.join(".qcbus-4194999.1-a1b2c3.tmp");
         let former = below.join(format!(".qcbus-{parent}.1-a1b2c3.tmp"));
         let living = below.join(format!(".qcbus-{parent}.{started}-a1b2c3.tmp"));
@@ -441,12 +465,35 @@ mod tests {
         }
         let writer = File::open(&locked).unwrap();
         flock(&writer, FlockOperation::NonBlockingLockExclusive).unwrap();
-        sweep(dir.path());
+        let left = sweep(dir.path());
+        assert_eq!(left.iter().map(|it| it.pid).collect::<Vec<_>>(), [parent]);
         assert!(!dead.exists() && !former.exists());
         assert!(living.exists() && locked.exists() && result.exists());
         drop(writer);
         sweep_dead(dir.path());
         assert!(!locked.exists());
+    }
+
+    /// In a container whose first process does not wait for its children, zombies stay for ever.
+    #[test]
+    fn file_of_an_ended_process_is_removed_before_its_parent_notices() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut child = std::process::Command::new("sleep");
+        let mut child = child.arg("1000").spawn().unwrap();
+        let started = Stat::of(child.id()).unwrap().started;
+        let name = format!(".qcbus-{}.{started}-a1b2c3.tmp", child.id());
+        let path = dir.path().join(name);
+        std::fs::write(&path, "half").unwrap();
+        let [writer] = sweep_dead(dir.path())[..] else {
+            panic!("the writer lives")
+        };
+        child.kill().unwrap();
+        while !writer.is_dead() {
+            std::thread::yield_now();
+        }
+        assert!(sweep_dead(dir.path()).is_empty());
+        assert!(!path.exists());
+        child.wait().unwrap();
     }
 
     #[test]

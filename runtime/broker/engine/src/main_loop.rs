@@ -4,6 +4,7 @@ mod act;
 mod asked;
 mod early;
 mod looks;
+mod remains;
 mod start;
 mod status;
 mod stores;
@@ -22,6 +23,7 @@ use qcbus_messages::control::{Response, Unseen};
 use qcbus_messages::{Hello, JobId, ToPeer};
 use tokio::sync::{mpsc, oneshot};
 
+use self::remains::Remains;
 use self::stores::StateDirectory;
 pub use self::turns::{Source, Turn};
 use self::watching::Watching;
@@ -150,6 +152,7 @@ pub struct Broker {
     tell: Box<dyn FnMut(Told) + Send>,
     control: Box<dyn Control>,
     state_directory: StateDirectory,
+    remains: Remains,
 }
 
 impl std::fmt::Debug for Broker {
@@ -282,6 +285,9 @@ impl Broker {
                 self.forget_clients();
                 self.notify_watchdog();
                 self.children.look_for_descendants();
+                if self.remains.are_expected() {
+                    self.sweep_dead();
+                }
             }
             if lasts && now() >= next_prune {
                 next_prune = now() + PRUNE_INTERVAL;
@@ -365,8 +371,8 @@ impl Broker {
     /// Removes half-written files of dead processes, outside the loop. A killed process may have
     /// been writing a report.
     fn sweep_dead(&self) {
-        let out = self.options.out.clone();
-        spawn_blocking(move || qcbus_disk::sweep_dead(&out));
+        let remains = self.remains.clone();
+        spawn_blocking(move || remains.sweep_dead());
     }
 
     /// Searches all processes of the machine for stale children and kills them, outside the loop.

@@ -23,6 +23,7 @@ use tokio::sync::mpsc;
 
 use super::early::{early_children, early_or_now};
 use super::looks::Looks;
+use super::remains::Remains;
 use super::stores::{
     StateDirectory, journal_of, reconcile, remembered_by, results_of, store, writers,
 };
@@ -71,7 +72,8 @@ impl Broker {
         let looks = Looks::default();
         let control = control_of(backend, &options, senders.asked)?;
         let store = Arc::new(store(&options, (journal, lock), &looks, &senders.notices)?);
-        let reconciled = reconcile(&options, &loaded, &store)?;
+        let remains = Remains::of(&options);
+        let reconciled = reconcile(&options, &loaded, &store, &remains)?;
         let writers = writers(&options, &store, &inbox, &senders.notices)?;
         let mut broker = Broker {
             started: now(),
@@ -105,6 +107,7 @@ impl Broker {
             tell,
             control,
             state_directory,
+            remains,
             options,
         };
         broker.take_up(members, broker.store.voids()?);

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
 use qcbus_configuration::Loaded;
-use qcbus_disk::sweep;
 use qcbus_environment::is_simulated;
 use qcbus_messages::Role;
 use qcbus_publish::directory_lock::{DirectoryLock, LockError, Purpose};
@@ -21,6 +20,7 @@ use qcbus_watch::probes::Probes;
 use tokio::sync::mpsc;
 
 use super::looks::Looks;
+use super::remains::Remains;
 use super::start::system;
 use super::{Inbox, StartError};
 use crate::options::Options;
@@ -146,17 +146,17 @@ fn gate_of(
     Gate::open(gate, options.instance.name())
 }
 
-/// Removes leftovers and reconciles the disk with the journal before any file is judged.
+/// Removes remains and reconciles the disk with the journal before any file is judged.
 pub(super) fn reconcile(
     options: &Options,
     loaded: &Loaded,
     store: &Store,
+    remains: &Remains,
 ) -> Result<Reconciled, StartError> {
     if !options.watch {
         return Ok(Reconciled::nothing(remove_earlier_results(&store.places)));
     }
-    sweep(&options.out);
-    options.gate.iter().for_each(|gate| sweep(gate));
+    remains.sweep_first();
     let reporters = loaded
         .children
         .iter()
