@@ -14,7 +14,7 @@ pub use model::Validated;
 
 use model::{SCHEMA_DIR, SCHEMAS};
 use qcbus_document::{Attribute, Document, Node};
-use qcbus_schema::{Checked, Code, Later, Outcome, Severity, Version, Violation};
+use qcbus_schema::{Checked, Code, Later, Outcome, Rest, Severity, Version, Violation};
 use qcbus_sdk::{Level, Place, Rule, Sink, Subject};
 
 /// Common fields of the schema rules of all bundles, for struct update syntax (`..`).
@@ -26,20 +26,46 @@ pub const RULE: Rule<Validated> = Rule {
 };
 
 fn run(checked: &Checked<'_>, found: &mut Sink<'_>) {
+    run_with(checked, found, &Harm::EVERYTHING);
+}
+
+/// What readers do with files that violate a schema. By the standard, every violation is an error.
+#[derive(Debug)]
+pub struct Harm {
+    /// Level of a violation.
+    pub of_violation: fn(&Violation<'_>) -> Level,
+    /// Level of a header that names an older version than the file uses.
+    pub of_old_header: Level,
+}
+
+impl Harm {
+    /// Readers refuse every file that violates the schema.
+    pub const EVERYTHING: Harm = Harm {
+        of_violation: |_| Level::Error,
+        of_old_header: Level::Error,
+    };
+}
+
+/// Reports the violations of a document. Their levels follow from the harm that they do to readers.
+pub fn run_with(checked: &Checked<'_>, found: &mut Sink<'_>, harm: &Harm) {
     for fact in checked.provenance() {
         found.fact(fact.key, fact.value, fact.description);
     }
     if let Some(later) = &checked.later {
-        say_later(later, checked.version, found);
+        say_later(later, checked.version, found, harm);
     }
     for violation in &checked.violations {
         let place = match violation.attribute {
             Some(attribute) => Place::from(attribute),
             None => Place::from(violation.node),
         };
-        found
+        let severity = checked.severity(violation);
+        let finding = found
             .issue(place, violation.text.as_str())
-            .level(level(checked.severity(violation)));
+            .level(level(severity));
+        if severity == Severity::Error {
+            finding.readers_level((harm.of_violation)(violation));
+        }
     }
     say_replaced(found);
     for rest in &checked.rest {
@@ -51,10 +77,26 @@ fn run(checked: &Checked<'_>, found: &mut Sink<'_>) {
             rest.count,
             rest.code.about(&rest.subject)
         );
-        found
-            .issue(root, text)
-            .level(level(checked.severity_of_rest(rest)));
+        let severity = checked.severity_of_rest(rest);
+        let finding = found.issue(root, text).level(level(severity));
+        if severity == Severity::Error {
+            finding.readers_level(harm_of_rest(checked, rest, harm));
+        }
     }
+}
+
+/// Returns the worst level of the listed violations of the same kind, else an error.
+fn harm_of_rest(checked: &Checked<'_>, rest: &Rest, harm: &Harm) -> Level {
+    let alike = checked.violations.iter().filter(|violation| {
+        let element = violation.node.name();
+        let in_words = match &violation.attribute {
+            Some(attribute) => format!("{element}/@{}", attribute.name()),
+            None => element.to_owned(),
+        };
+        violation.code == rest.code && in_words == rest.subject
+    });
+    let levels = alike.map(|violation| (harm.of_violation)(violation));
+    levels.min().unwrap_or(Level::Error)
 }
 
 /// Checks the groups of a modular scenario that are replaced by others in its expansion. They are
@@ -84,7 +126,7 @@ fn say_replaced(found: &mut Sink<'_>) {
 const MOST_SHOWN: usize = 3;
 
 /// Reports that a file is written for a later version than its header names.
-fn say_later(later: &Later<'_>, stated: Option<Version>, found: &mut Sink<'_>) {
+fn say_later(later: &Later<'_>, stated: Option<Version>, found: &mut Sink<'_>, harm: &Harm) {
     let Some((newest, stated)) = later.things.first().zip(stated) else {
         return;
     };
@@ -108,7 +150,8 @@ fn say_later(later: &Later<'_>, stated: Option<Version>, found: &mut Sink<'_>) {
          ({wherein}){more}; set `revMinor` to {}, or remove the newer features",
         newest.what, newest.since, later.version.minor
     );
-    let mut finding = found.issue(later.header, text);
+    let finding = found.issue(later.header, text);
+    let mut finding = finding.readers_level(harm.of_old_header);
     for thing in later.things.iter().take(MOST_SHOWN) {
         let what = format!("{}, introduced in version {}", thing.what, thing.since);
         finding = match thing.attribute {

@@ -44,4 +44,4 @@ pub use typing::{Member, Typing, ValueType, came_with};
 pub use user_schemas::{UserSchemaContent, UserSchemaError, UserSchemaFile, user_schemas};
 pub use validate::Overlay;
 pub use versions::{SHIPPED, Shipped, SkipReason, Version, version_of};
-pub use violation::{Code, Limits, Report, Rest, Violation};
+pub use violation::{Code, Detail, Limits, Report, Rest, Violation};

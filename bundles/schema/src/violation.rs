@@ -82,6 +82,18 @@ impl Code {
     }
 }
 
+/// More about a violation than its [`Code`].
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Detail {
+    /// Nothing more.
+    #[default]
+    None,
+    /// Name of the missing attribute.
+    Missing(String),
+    /// A number is expected.
+    Number,
+}
+
 /// One violation of a schema.
 #[derive(Clone, Debug)]
 pub struct Violation<'a> {
@@ -91,6 +103,8 @@ pub struct Violation<'a> {
     pub node: Node<'a>,
     /// The attribute concerned.
     pub attribute: Option<Attribute<'a>>,
+    /// More about the kind of violation.
+    pub detail: Detail,
     /// Reason why the schema is wrong and not the file, if that is known.
     pub known_schema_defect: Option<&'static str>,
     /// The whole message.

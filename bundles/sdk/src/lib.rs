@@ -27,7 +27,7 @@ pub use bundle::{BACKPORT_SUFFIX, Bundle, Checker, Reads};
 pub use cached::LinkedModel;
 pub use check::{Listener, Outcome, check, check_with};
 pub use load::{LoadError, Loaded};
-pub use param::{Default, MAX_ISSUES, Param, ParamError, Values};
+pub use param::{Default, LEVELS, MAX_ISSUES, Param, ParamError, Values};
 pub use permits::Permits;
 pub use place::Place;
 pub use plan::Plan;

@@ -1,7 +1,7 @@
 //! Parameters of rules: they are declared beside the rule, set in a configuration and shown in the
 //! result.
 
-use qcbus_formats::config::{ParamType, ParamValue};
+use qcbus_formats::config::{LEVELS_OF_ASAM, LEVELS_PARAM, ParamType, ParamValue};
 use qcbus_formats::xqar;
 
 /// A parameter of a rule, with its default value.
@@ -122,6 +122,17 @@ pub const MAX_ISSUES: Param = Param::number(
     "maximum number of listed findings of this checker; further findings are only counted",
 );
 
+/// Parameter of every checker: whose levels its findings have. `readers`: what a simulator does with
+/// the file. `asam`: what the standard demands.
+pub const LEVELS: Param = Param::text(
+    LEVELS_PARAM,
+    READERS,
+    "levels of findings: `readers` for what harms readers of the file, `asam` for what the standard demands",
+);
+
+/// Value of [`LEVELS`] without a configuration.
+const READERS: &str = "readers";
+
 /// A configured value that is invalid for its parameter.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("the parameter `{name}` is `{value}`, but must be {expected}")]
@@ -135,6 +146,8 @@ pub struct ParamError {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values {
     values: Vec<(Param, ParamValue)>,
+    /// Whether findings have the levels of ASAM.
+    pub(crate) levels_of_asam: bool,
 }
 
 impl Values {
@@ -153,8 +166,20 @@ impl Values {
             };
             Ok((*param, value))
         });
+        let levels_of_asam = match configured(LEVELS.name).as_deref().map(str::trim) {
+            None | Some(READERS) => false,
+            Some(LEVELS_OF_ASAM) => true,
+            Some(other) => {
+                return Err(ParamError {
+                    name: LEVELS.name,
+                    value: other.to_owned(),
+                    expected: "`readers` or `asam`",
+                });
+            }
+        };
         Ok(Values {
             values: values.collect::<Result<_, ParamError>>()?,
+            levels_of_asam,
         })
     }
 

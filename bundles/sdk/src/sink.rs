@@ -148,6 +148,7 @@ impl<'d> Sink<'d> {
             beside: is_root.then(|| place.offset()),
             note: self.not_normative.as_deref(),
             unlisted,
+            levels_of_asam: self.values.levels_of_asam,
         }
     }
 
@@ -209,6 +210,7 @@ impl<'d> Sink<'d> {
             beside: None,
             note: self.not_normative.as_deref(),
             unlisted: Some(&mut self.unheard),
+            levels_of_asam: self.values.levels_of_asam,
         }
     }
 
@@ -396,6 +398,8 @@ pub struct Finding<'s, 'd> {
     note: Option<&'s str>,
     /// Level of a finding that is only counted. `None` if it is listed.
     unlisted: Option<&'s mut Level>,
+    /// Whether findings have the levels of ASAM.
+    levels_of_asam: bool,
 }
 
 impl Finding<'_, '_> {
@@ -464,6 +468,15 @@ impl Finding<'_, '_> {
         };
         self.set_level(level);
         self
+    }
+
+    /// Sets the severity by what readers do with the file. It replaces the one of the standard,
+    /// unless the levels of ASAM are in force ([`crate::LEVELS`]).
+    pub fn readers_level(self, level: Level) -> Self {
+        match self.levels_of_asam {
+            true => self,
+            false => self.level(level),
+        }
     }
 
     /// Sets the severity of a fault that is wrong in every version, even in those without the rule.

@@ -175,6 +175,9 @@ pub struct CheckArgs {
     /// Do not run these checkers; results and verdicts list them
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub ignore: Vec<String>,
+    /// Use the levels of ASAM: what the standard demands is an error, even if no reader suffers
+    #[arg(long)]
+    pub strict: bool,
     /// Check each file independently: a rejected map does not reject the scenarios that use it
     #[arg(long)]
     pub own_verdict: bool,
@@ -402,6 +405,9 @@ pub struct ServeArgs {
     /// Directory in which only accepted files are published
     #[arg(long, value_name = "DIR")]
     pub gate: Option<PathBuf>,
+    /// Use the levels of ASAM: what the standard demands is an error, even if no reader suffers
+    #[arg(long)]
+    pub strict: bool,
     /// Check each file independently: a rejected map does not reject the scenarios that use it
     #[arg(long)]
     pub own_verdict: bool,

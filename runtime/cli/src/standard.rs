@@ -9,7 +9,7 @@ use qcbus_formats::Text;
 use qcbus_formats::config::{Known, KnownBundle, KnownChecker, KnownParam, Names};
 use qcbus_messages::Role;
 use qcbus_reporter_sdk::{Registration, RulePage, rule_name};
-use qcbus_sdk::{Bundle, Checker, MAX_ISSUES, UserFiles};
+use qcbus_sdk::{Bundle, Checker, LEVELS, MAX_ISSUES, UserFiles};
 use qcbus_types::{ChildSpec, Restart};
 
 /// The standard bundles.
@@ -253,7 +253,7 @@ pub fn known() -> Known {
 }
 
 fn params(checker: &Checker) -> Vec<KnownParam> {
-    let declared = checker.facts.params.iter().chain([&MAX_ISSUES]);
+    let declared = checker.facts.params.iter().chain([&MAX_ISSUES, &LEVELS]);
     let known = declared.map(|param| KnownParam {
         name: param.name.to_owned(),
         value: param.value_type(),

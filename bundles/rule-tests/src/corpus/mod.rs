@@ -7,12 +7,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use qcbus_document::Document;
+use qcbus_formats::config::LEVELS_OF_ASAM;
 use qcbus_formats::pool::CheckerOutcome;
 use qcbus_formats::xqar::{Issue, Location};
 use serde_json::Value;
 
 use qcbus_sdk::run::examine;
-use qcbus_sdk::{Bundle, Loaded, Plan};
+use qcbus_sdk::{Bundle, LEVELS, Loaded, Plan};
 
 pub use findings::print_findings;
 pub use parity::{Deviations, Parity, agrees_or_says};
@@ -39,6 +40,15 @@ pub struct Comparison {
     pub difference: Option<String>,
 }
 
+/// Returns the plan that ASAM's bundles are compared with.
+fn by_levels_of_asam(bundle: &'static Bundle) -> Plan {
+    Plan::new(
+        bundle,
+        |checker| checker.facts.default_on,
+        |_, name| (name == LEVELS.name).then(|| LEVELS_OF_ASAM.to_owned()),
+    )
+}
+
 /// Compares a bundle with the cases in `cases/asam-cases.json`; returns `None` if they are missing.
 /// An input that several cases share is compared once.
 ///
@@ -53,7 +63,7 @@ pub fn compare_asam_cases(
     };
     let recorded: Vec<Value> =
         serde_json::from_slice(&text).map_err(|error| format!("asam-cases.json: {error}"))?;
-    let plan = Plan::by_default(bundle);
+    let plan = by_levels_of_asam(bundle);
     let (mut seen, mut comparisons) = (BTreeSet::new(), Vec::new());
     for case in recorded.iter().filter(|case| case["kind"] == bundle.alias) {
         let input = format!("{}/{}", text_of(&case["repo"]), text_of(&case["input"]));
@@ -94,7 +104,7 @@ pub fn compare_real_files(
         .iter()
         .flat_map(|file| mentioned(&file["peer"]))
         .collect();
-    let plan = Plan::by_default(bundle);
+    let plan = by_levels_of_asam(bundle);
     let mut comparisons = Vec::new();
     for file in recorded.iter().filter(|file| file["kind"] == bundle.alias) {
         let input = format!("{}/{}", text_of(&file["repo"]), text_of(&file["path"]));

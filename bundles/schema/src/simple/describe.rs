@@ -12,7 +12,18 @@ pub struct Expectation {
     pub words: Vec<String>,
 }
 
+/// Words for any number.
+const NUMBER: &str = "a number";
+/// Words for an integer, or their beginning.
+const WHOLE: &str = "a whole number";
+
 impl Expectation {
+    /// Checks whether a number is expected.
+    pub fn is_number(&self) -> bool {
+        let is_number = |words: &String| words.starts_with(NUMBER) || words.starts_with(WHOLE);
+        self.words.iter().any(is_number)
+    }
+
     /// Returns both as one part of a sentence. Long lists of values are cut. Parameters and
     /// expressions come last.
     pub fn sentence(&self) -> String {
@@ -172,8 +183,8 @@ fn noun(builtin: Builtin) -> &'static str {
         }
         Builtin::Boolean => "true or false",
         Builtin::Decimal => "a decimal number without an exponent",
-        Builtin::Float | Builtin::Double => "a number",
-        Builtin::Integer => "a whole number",
+        Builtin::Float | Builtin::Double => NUMBER,
+        Builtin::Integer => WHOLE,
         Builtin::NonNegative => "a whole number of at least 0",
         Builtin::Positive => "a whole number of at least 1",
         Builtin::NonPositive => "a whole number of at most 0",

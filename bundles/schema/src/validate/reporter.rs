@@ -111,12 +111,17 @@ impl<'a, 's> Reporter<'a, 's> {
             return;
         }
         tally.listed += 1;
-        let Wording { text, defect } = word().excused(known);
+        let Wording {
+            text,
+            detail,
+            defect,
+        } = word().excused(known);
         tally.defect &= defect.is_some();
         let violation = Violation {
             code,
             node,
             attribute,
+            detail,
             known_schema_defect: defect,
             text,
         };

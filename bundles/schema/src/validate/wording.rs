@@ -11,22 +11,33 @@ use crate::model::{AttributeUse, ElementDecl, Model, Schema};
 use crate::names::NameId;
 use crate::similar::closest;
 use crate::simple::{EXPRESSION, Expectation, SimpleType, XML_SPACE};
+use crate::violation::Detail;
 use crate::work::steps;
 
-/// The text of a violation, and the schema defect that causes it, if one is known.
+/// The text of a violation, what it is about, and the schema defect that causes it, if one is known.
 #[derive(Debug)]
 pub(super) struct Wording {
     pub(super) text: String,
+    pub(super) detail: Detail,
     pub(super) defect: Option<&'static str>,
 }
 
 impl From<String> for Wording {
     fn from(text: String) -> Self {
-        Self { text, defect: None }
+        Self {
+            text,
+            detail: Detail::None,
+            defect: None,
+        }
     }
 }
 
 impl Wording {
+    fn about(mut self, detail: Detail) -> Self {
+        self.detail = detail;
+        self
+    }
+
     fn suggesting(mut self, suggestion: Option<&str>) -> Self {
         if let Some(meant) = suggestion {
             self.text += &format!("; did you mean \"{meant}\"?");
@@ -307,7 +318,11 @@ pub(super) fn invalid_value(
     }
     let subject = format!("{}={} of <{}>", attribute.name(), quote(value), node.name());
     let hint = foreign_to_expressions(value, &expectation.words);
-    invalid(&subject, value, &expectation, &hint)
+    let wording = invalid(&subject, value, &expectation, &hint);
+    match expectation.is_number() {
+        true => wording.about(Detail::Number),
+        false => wording,
+    }
 }
 
 fn invalid(subject: &str, value: &str, expectation: &Expectation, hint: &str) -> Wording {
@@ -434,11 +449,11 @@ pub(super) fn missing_attribute(
     let value = ty
         .map(|ty| ty.expectation(schema).sentence())
         .unwrap_or_default();
-    format!(
+    let text = format!(
         "<{}> lacks the attribute {name}, which must be {value}",
         node.name()
-    )
-    .into()
+    );
+    Wording::from(text).about(Detail::Missing(name.to_owned()))
 }
 
 pub(super) fn unexpected_text(node: Node<'_>, text: &str) -> Wording {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use qcbus_formats::config::Config;
+use qcbus_formats::config::{Config, LEVELS_OF_ASAM, LEVELS_PARAM};
 use qcbus_formats::pool::{PoolInput, Scope, pool};
 use qcbus_formats::xqar::{self, Dialect};
 use qcbus_messages::path_text::to_text;
@@ -125,10 +125,18 @@ pub(super) fn configured(
         return Plan::by_default(bundle).with_files(given);
     };
     let section = config.bundle(bundle.name, bundle.alias);
-    let demanded = |checker: &Checker| {
-        config
+    // A broker sends a configuration without bundles if only the levels are set. It names the
+    // demanded checkers itself.
+    let everything = config.bundles.is_empty();
+    let demanded = |checker: &Checker| match everything {
+        true => checker.facts.default_on,
+        false => config
             .selects(bundle.name, bundle.alias, &checker.id)
-            .runs(checker.facts.default_on)
+            .runs(checker.facts.default_on),
+    };
+    let levels = || {
+        let of_asam = config.is_of_asam() && !everything;
+        of_asam.then(|| LEVELS_OF_ASAM.to_owned())
     };
     let plan = Plan::new(bundle, demanded, |checker, name| {
         // The request has an empty default, so an empty answer means that the parameter is not
@@ -143,8 +151,12 @@ pub(super) fn configured(
             .find(|param| param.name == name)
             .map(|p| p.value)
             .filter(|v| !v.is_empty())
+            .or_else(|| (name == LEVELS_PARAM).then(levels).flatten())
     });
-    plan.following(config).with_files(given)
+    match everything {
+        true => plan.with_files(given),
+        false => plan.following(config).with_files(given),
+    }
 }
 
 /// Returns the path of the result, as in ASAM's bundles: the bundle's Param, relative to the

@@ -1,8 +1,8 @@
 //! Lookups in a configuration for brokers and bundles.
 
 use super::{
-    BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, Levels, Oddity, ReportConfig,
-    SCENARIO_PATH_PARAM,
+    BundleConfig, CheckerConfig, Config, ConfigParam, INPUT_PARAMS, LEVELS_OF_ASAM, LEVELS_PARAM,
+    Levels, Oddity, ReportConfig, SCENARIO_PATH_PARAM, TextPosition,
 };
 use crate::xqar::{Level, Param};
 
@@ -158,6 +158,40 @@ impl Config {
             push_once(&mut params, &param.name, &param.value);
         }
         params
+    }
+
+    /// Checks whether the configuration was written for ASAM's framework: it has no parameter of
+    /// qcbus. Findings then have the levels of ASAM.
+    pub fn is_of_asam(&self) -> bool {
+        let bundles = self.bundles.iter();
+        let in_bundles = bundles.flat_map(|bundle| {
+            let checkers = bundle.checkers.iter().flat_map(|it| &it.params);
+            bundle.params.iter().chain(checkers)
+        });
+        !self
+            .params
+            .iter()
+            .chain(in_bundles)
+            .any(|param| param.name.starts_with("qcbus."))
+    }
+
+    /// Returns the configuration with the levels of ASAM for all bundles.
+    #[must_use]
+    pub fn with_levels_of_asam(mut self) -> Config {
+        let bundles = self.bundles.iter_mut();
+        let in_bundles = bundles.flat_map(|bundle| {
+            let checkers = bundle.checkers.iter_mut().map(|it| &mut it.params);
+            checkers.chain([&mut bundle.params])
+        });
+        for params in in_bundles.chain([&mut self.params]) {
+            params.retain(|param| param.name != LEVELS_PARAM);
+        }
+        self.params.push(ConfigParam {
+            name: LEVELS_PARAM.to_owned(),
+            value: LEVELS_OF_ASAM.to_owned(),
+            position: TextPosition::default(),
+        });
+        self
     }
 
     /// Returns the parameters of a bundle: its own, then the global ones that it does not set

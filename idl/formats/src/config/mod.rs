@@ -24,6 +24,12 @@ pub use value::{ParamType, ParamValue};
 /// Name of the checker parameter that gives a checker's issues another level.
 pub const LEVEL_PARAM: &str = "qcbus.level";
 
+/// Parameter that selects whose levels findings have: [`LEVELS_OF_ASAM`], or those of readers.
+pub const LEVELS_PARAM: &str = "qcbus.levels";
+
+/// Value of [`LEVELS_PARAM`]: the levels that the standard demands.
+pub const LEVELS_OF_ASAM: &str = "asam";
+
 /// Parameter names for the file to check, the current name first.
 pub const INPUT_PARAMS: [&str; 3] = ["InputFile", "XodrFile", "XoscFile"];
 

@@ -72,10 +72,29 @@ impl InForce {
             None => of_environment,
         };
         InForce::new(loaded.config.clone(), search)
+            .and_then(|in_force| in_force.with_levels_of_asam(sources.strict))
             .map(|in_force| in_force.beside(&loaded.children))
             .map(|in_force| in_force.narrowed(sources.choice.clone()))
             .map(|in_force| in_force.with_own_verdicts(sources.own_verdicts))
             .map_err(|error| LoadError::Config(error.to_string()))
+    }
+
+    /// Returns the configuration in force, with the levels of ASAM for all findings if `strict`.
+    fn with_levels_of_asam(mut self, strict: bool) -> Result<InForce, codec::CodecError> {
+        if !strict {
+            return Ok(self);
+        }
+        let config = self.config.as_deref().cloned().unwrap_or_default();
+        let config = config.with_levels_of_asam();
+        self.encoded = codec::encode(&Some(&config))?;
+        if self.config.is_some() {
+            self.config = Some(Arc::new(config));
+            self.judging = self.config.clone();
+        }
+        let mut hash = Sha256::new_with_prefix(self.digest.0);
+        hash.update("levels of ASAM");
+        self.digest = Digest(hash.finalize().into());
+        Ok(self)
     }
 
     /// Returns the configuration in force for these children, which may contain shadows.

@@ -45,6 +45,8 @@ pub struct Sources {
     pub bundles_d: Option<PathBuf>,
     /// Selection among the demanded checkers.
     pub choice: Choice,
+    /// Whether findings have the levels of ASAM, whatever the configuration says.
+    pub strict: bool,
     /// Whether the verdict on a file is independent of the verdicts on the files that it depends on.
     pub own_verdicts: bool,
     /// The children that come with the program.

@@ -11,6 +11,7 @@ fn sources(directory: &Path) -> Sources {
         bundles_d: Some(directory.join("bundles.d")),
         own_verdicts: false,
         choice: Default::default(),
+        strict: false,
         standard: vec![child("xodrBundle")],
         reporters: vec![child("qc-report-text")],
         known: Known::default(),

@@ -40,6 +40,8 @@ pub struct Options {
     pub retention: Duration,
     /// Selection among the demanded checkers.
     pub choice: Choice,
+    /// Whether findings have the levels of ASAM, whatever the configuration says.
+    pub strict: bool,
     /// Dialect of the results.
     pub dialect: Dialect,
     /// Whether results are flushed to the disk before they are announced.

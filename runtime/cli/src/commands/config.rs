@@ -30,6 +30,7 @@ fn load(file: &Path, bundles_d: Option<&Path>) -> Result<Loaded, String> {
         bundles_d: bundles_d.map(manifest_directory).transpose()?,
         own_verdicts: false,
         choice: Default::default(),
+        strict: false,
         standard: Vec::new(),
         reporters: Vec::new(),
         known: standard::known(),

@@ -220,6 +220,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         state: Some(state),
         retention: args.retention,
         choice: Default::default(),
+        strict: args.strict,
         dialect: dialect(args.output.xqar_dialect),
         durable: true,
         verdict_files: true,

@@ -232,6 +232,7 @@ fn sources_of(options: &Options) -> Sources {
         lasting: options.watch,
         bundles_d: options.bundles_d.clone(),
         choice: options.choice.clone(),
+        strict: options.strict,
         own_verdicts: options.settings.own_verdicts,
         standard: options.standard.clone(),
         reporters: options.reporters.clone(),

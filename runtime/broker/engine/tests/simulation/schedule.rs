@@ -111,6 +111,7 @@ fn options(dir: &Path) -> Options {
         state: Some(dir.join("state")),
         retention: Duration::from_secs(3600),
         choice: Default::default(),
+        strict: false,
         dialect: qcbus_formats::xqar::Dialect::default(),
         durable: false,
         verdict_files: true,

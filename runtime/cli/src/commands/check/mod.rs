@@ -162,6 +162,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         single_result: asam.then(|| out.join("Result.xqar")),
         out,
         choice: choice(args)?,
+        strict: args.strict,
         state: None,
         retention: Duration::MAX,
         dialect: dialect(args.output.xqar_dialect),

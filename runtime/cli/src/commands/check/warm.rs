@@ -185,6 +185,7 @@ fn may_ask(args: &CheckArgs, options: &Options) -> bool {
         && options.bundles_d.is_none()
         && args.schema_dir.is_none()
         && options.choice.is_everything()
+        && !options.strict
 }
 
 /// Returns the check context of a file for a check in this process.
