@@ -88,6 +88,9 @@ pub struct Rule<M: Model> {
     pub uids: &'static [&'static str],
     /// Severity of its issues, unless a finding sets another. [`Level::Error`] by default.
     pub level: Level,
+    /// Severity of its issues by what readers do with the file, if it differs from `level`, which is
+    /// that of the standard. It does not apply to findings that set another level.
+    pub readers: Option<Level>,
     /// Versions of the standard that it applies to; see [`crate::VersionRange`].
     pub versions: &'static str,
     /// Whether older documents are checked, too.
@@ -153,6 +156,7 @@ impl<M: Model> Rule<M> {
         id: "",
         uids: &[],
         level: Level::Error,
+        readers: None,
         versions: "",
         backport: Backport::None,
         after: &[],
@@ -266,6 +270,7 @@ pub struct Facts {
     pub id: &'static str,
     pub uids: &'static [&'static str],
     pub level: Level,
+    pub readers: Option<Level>,
     pub versions: &'static str,
     pub backport: Backport,
     pub after: &'static [&'static str],
@@ -281,6 +286,7 @@ impl<M: Model> AnyRule for Rule<M> {
             id: self.id,
             uids: self.uids,
             level: self.level,
+            readers: self.readers,
             versions: self.versions,
             backport: self.backport,
             after: self.after,

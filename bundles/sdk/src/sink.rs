@@ -116,10 +116,14 @@ impl<'d> Sink<'d> {
     }
 
     fn list(&mut self, place: &Place<'_>, text: String) -> Finding<'_, 'd> {
+        let level = match self.values.levels_of_asam {
+            true => self.facts.level,
+            false => self.facts.readers.unwrap_or(self.facts.level),
+        };
         let level = if self.not_normative.is_some() {
-            lower(self.facts.level)
+            lower(level)
         } else {
-            self.facts.level
+            level
         };
         let full = self.kept.len() >= self.limit();
         let issue = if full {

@@ -1,6 +1,7 @@
 use crate::families::ids::{KINDS, Kind, Scope};
 use crate::prelude::*;
-use foldhash::HashMap;
+use foldhash::{HashMap, HashSet};
+use std::cell::OnceCell;
 
 pub const RULE: Rule<Document> = Rule {
     versions: "1.1.0..",
@@ -14,9 +15,25 @@ fn run(document: &Document<'_>, found: &mut Sink<'_>) {
     }
 }
 
+/// Returns the ids of all signals that something refers to.
+fn used_signals<'d>(document: &Document<'d>) -> HashSet<&'d str> {
+    const REFERENCES: [(&str, &str); 4] = [
+        ("signalReference", "id"),
+        ("control", "signalId"),
+        ("dependency", "id"),
+        ("reference", "elementId"),
+    ];
+    let ids = REFERENCES.into_iter().flat_map(|(element, attribute)| {
+        let elements = document.elements(element);
+        elements.filter_map(move |node| node.attr(attribute))
+    });
+    ids.collect()
+}
+
 fn check<'d>(kind: &Kind, document: &Document<'d>, found: &mut Sink<'_>) {
     let mut exact: HashMap<(Option<Node<'d>>, &str), Node<'d>> = HashMap::default();
     let mut numeric: HashMap<u64, Node<'d>> = HashMap::default();
+    let used = OnceCell::new();
     for node in kind.nodes(document) {
         // An empty id does not count as an id. Another rule reports it.
         let given = node.attr("id").filter(|id| !id.trim().is_empty());
@@ -29,9 +46,13 @@ fn check<'d>(kind: &Kind, document: &Document<'d>, found: &mut Sink<'_>) {
                 "the id `{id}` is already used by another {} of {whole}; each needs its own id",
                 kind.name
             );
-            found
+            let finding = found
                 .issue(node, text)
                 .at(*first, format!("the first {} with this id", kind.name));
+            // Readers place each signal. Only a reference to it would be ambiguous.
+            if kind.name == "signal" && !used.get_or_init(|| used_signals(document)).contains(id) {
+                finding.readers_level(Level::Warning);
+            }
             continue;
         }
         exact.insert((home, id), node);

@@ -1,4 +1,4 @@
-use crate::families::junction_area::{Stretch, boundary};
+use crate::families::junction_area::{Stretch, boundary, harm};
 use crate::prelude::*;
 
 const GAP: Param = Param::number(
@@ -41,7 +41,8 @@ fn check(junction: &Junction<'_>, stretches: &[Stretch<'_>], found: &mut Sink<'_
                 .issue(stretch.segment.node(), text)
                 .point(end.x, end.y, 0.0)
                 .at(next.segment.node(), "the next segment")
-                .point(start.x, start.y, 0.0);
+                .point(start.x, start.y, 0.0)
+                .readers_level(harm(junction));
         }
     }
 }

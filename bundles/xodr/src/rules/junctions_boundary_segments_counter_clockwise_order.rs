@@ -1,4 +1,4 @@
-use crate::families::junction_area::{Stretch, boundary, doubled_area, ring};
+use crate::families::junction_area::{Stretch, boundary, doubled_area, harm, ring};
 use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
@@ -28,6 +28,9 @@ fn check(junction: &Junction<'_>, stretches: &[Stretch<'_>], found: &mut Sink<'_
             junction.id(),
             -area
         );
-        found.issue(node, text).point(first.x, first.y, 0.0);
+        found
+            .issue(node, text)
+            .point(first.x, first.y, 0.0)
+            .readers_level(harm(junction));
     }
 }

@@ -118,7 +118,8 @@ fn report(map: &RoadMap<'_>, gap: &LaneGap<'_, '_>, found: &mut Sink<'_>) {
     );
     let widest = gap.edges.iter().map(|(apart, _)| *apart);
     let widest = widest.fold(0.0, f64::max);
-    let misfit = match Misfit::gap(widest, gap.whole, found) {
+    let by_size = Misfit::gap(widest, gap.whole, found);
+    let misfit = match by_size {
         Misfit::Slight if is_normative(found) && widest >= found.number(&LANE_ERROR_FROM) => {
             Misfit::Plain
         }
@@ -126,8 +127,11 @@ fn report(map: &RoadMap<'_>, gap: &LaneGap<'_, '_>, found: &mut Sink<'_>) {
         Misfit::Broken if !(is_route(gap.from) && is_route(gap.to)) => Misfit::Plain,
         misfit => misfit,
     };
-    let mut finding = misfit
-        .put(found.issue(gap.from.node(), text))
+    let mut finding = misfit.put(found.issue(gap.from.node(), text));
+    if by_size == Misfit::Slight {
+        finding = finding.readers_level(Level::Warning);
+    }
+    finding = finding
         .at_lane_end(gap.from, gap.joint.from.end)
         .at(gap.to.node(), "the linked lane");
     for (_, middle) in &gap.edges {

@@ -2,6 +2,7 @@ use crate::families::center_lane;
 use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
+    readers: Some(Level::Warning),
     versions: "1.1.0..",
     each: Some(each),
     ..Rule::after(READABLE)

@@ -92,6 +92,11 @@ fn not_returned(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
         if !demands_link_back(map, joint, from, to) || links_back(map, joint, from, to) {
             continue;
         }
+        // Only traffic needs the way back.
+        let harm = match is_drivable(from) && is_drivable(to) {
+            true => Level::Error,
+            false => Level::Warning,
+        };
         let back = joint.to.end.link_name();
         let text = format!(
             "{} has {} as its {}, which does not have {} as its {back}; lanes that continue must be linked in both \
@@ -105,7 +110,8 @@ fn not_returned(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
             .issue(to.node(), text)
             .here(&what_it_says(map, joint, from, to))
             .at_lane_end(to, joint.to.end)
-            .at(joint.node, "the link that has no link back");
+            .at(joint.node, "the link that has no link back")
+            .readers_level(harm);
     }
 }
 

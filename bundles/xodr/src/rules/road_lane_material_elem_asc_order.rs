@@ -2,6 +2,7 @@ use crate::families::ascending;
 use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
+    readers: Some(Level::Warning),
     versions: "1.1.0..",
     params: &[ascending::TOLERANCE],
     each: Some(each),

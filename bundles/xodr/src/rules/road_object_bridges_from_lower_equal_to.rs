@@ -2,6 +2,7 @@ use crate::families::lane_ranges;
 use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
+    readers: Some(Level::Warning),
     versions: "1.7.0..",
     backport: Backport::Alike { since: "" },
     run,

@@ -2,6 +2,7 @@ use crate::families::object_parts::check_types;
 use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
+    readers: Some(Level::Warning),
     versions: "1.7.0..",
     run,
     ..Rule::after(READABLE)
