@@ -117,6 +117,7 @@ fn module_facts() -> Facts {
         id: MODULE_CHECKER,
         uids: &[MODULE_UID],
         level: Level::Error,
+        readers: None,
         versions: "",
         backport: Backport::None,
         after: &[],

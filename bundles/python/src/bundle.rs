@@ -121,6 +121,7 @@ impl Native {
             id: leak(id),
             uids: leak_all(uids),
             level: level_of(level)?,
+            readers: None,
             versions: leak(versions),
             backport: match backport {
                 true => Backport::Lower { since: "" },

@@ -172,12 +172,3 @@ pub(crate) fn beside(line: &Placed, point: Point) -> (f64, f64) {
     let (dx, dy) = (point.x - line.origin.x, point.y - line.origin.y);
     (dx * cos + dy * sin, dy * cos - dx * sin)
 }
-
-/// Returns the level of a faulty boundary. Readers use a boundary only together with an elevation
-/// grid.
-pub(crate) fn harm(junction: &Junction<'_>) -> Level {
-    match junction.node().child("elevationGrid") {
-        Some(_) => Level::Error,
-        None => Level::Warning,
-    }
-}

@@ -15,10 +15,11 @@ fn run(document: &Document<'_>, found: &mut Sink<'_>) {
     }
 }
 
-/// Returns the ids of all signals that something refers to.
-fn used_signals<'d>(document: &Document<'d>) -> HashSet<&'d str> {
-    const REFERENCES: [(&str, &str); 4] = [
+/// Returns the ids of all signals and objects that something refers to.
+fn used<'d>(document: &Document<'d>) -> HashSet<&'d str> {
+    const REFERENCES: [(&str, &str); 5] = [
         ("signalReference", "id"),
+        ("objectReference", "id"),
         ("control", "signalId"),
         ("dependency", "id"),
         ("reference", "elementId"),
@@ -33,7 +34,7 @@ fn used_signals<'d>(document: &Document<'d>) -> HashSet<&'d str> {
 fn check<'d>(kind: &Kind, document: &Document<'d>, found: &mut Sink<'_>) {
     let mut exact: HashMap<(Option<Node<'d>>, &str), Node<'d>> = HashMap::default();
     let mut numeric: HashMap<u64, Node<'d>> = HashMap::default();
-    let used = OnceCell::new();
+    let used_ids = OnceCell::new();
     for node in kind.nodes(document) {
         // An empty id does not count as an id. Another rule reports it.
         let given = node.attr("id").filter(|id| !id.trim().is_empty());
@@ -49,8 +50,9 @@ fn check<'d>(kind: &Kind, document: &Document<'d>, found: &mut Sink<'_>) {
             let finding = found
                 .issue(node, text)
                 .at(*first, format!("the first {} with this id", kind.name));
-            // Readers place each signal. Only a reference to it would be ambiguous.
-            if kind.name == "signal" && !used.get_or_init(|| used_signals(document)).contains(id) {
+            // Readers place each signal and object. Only a reference to it would be ambiguous.
+            let beside = ["signal", "object"].contains(&kind.name);
+            if beside && !used_ids.get_or_init(|| used(document)).contains(id) {
                 finding.readers_level(Level::Warning);
             }
             continue;

@@ -1,4 +1,4 @@
-use crate::families::junction_area::{Stretch, boundary, harm};
+use crate::families::junction_area::{Stretch, boundary};
 use crate::prelude::*;
 
 const GAP: Param = Param::number(
@@ -9,6 +9,8 @@ const GAP: Param = Param::number(
 );
 
 pub const RULE: Rule<Roads> = Rule {
+    // No known reader uses the boundary.
+    readers: Some(Level::Warning),
     versions: "1.8.0..",
     params: &[GAP],
     run,
@@ -41,8 +43,7 @@ fn check(junction: &Junction<'_>, stretches: &[Stretch<'_>], found: &mut Sink<'_
                 .issue(stretch.segment.node(), text)
                 .point(end.x, end.y, 0.0)
                 .at(next.segment.node(), "the next segment")
-                .point(start.x, start.y, 0.0)
-                .readers_level(harm(junction));
+                .point(start.x, start.y, 0.0);
         }
     }
 }

@@ -1,7 +1,9 @@
-use crate::families::junction_area::{Stretch, boundary, doubled_area, harm, ring};
+use crate::families::junction_area::{Stretch, boundary, doubled_area, ring};
 use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
+    // No known reader uses the boundary.
+    readers: Some(Level::Warning),
     versions: "1.8.0..",
     run,
     ..Rule::after(READABLE)
@@ -28,9 +30,6 @@ fn check(junction: &Junction<'_>, stretches: &[Stretch<'_>], found: &mut Sink<'_
             junction.id(),
             -area
         );
-        found
-            .issue(node, text)
-            .point(first.x, first.y, 0.0)
-            .readers_level(harm(junction));
+        found.issue(node, text).point(first.x, first.y, 0.0);
     }
 }

@@ -53,6 +53,8 @@ fn harm(violation: &Violation<'_>) -> Level {
         | Code::ConditionFailed
         | Code::DuplicateKey => is_lenient,
         Code::MissingAttribute => is_lenient && !lacks_place(violation),
+        // maliput refuses an unknown orientation.
+        Code::InvalidValue if attribute == Some("orientation") => false,
         Code::InvalidValue => {
             is_lenient && (is_code(node, attribute) || !is_broken_number(violation))
         }

@@ -109,7 +109,7 @@ fn lane_links_between_sections_give_expected_findings() {
         (
             "a predecessor where the road has none",
             split(&lane("-1", "p-1 s-1"), &lane("-1", "p-1")),
-            &["error road_lane_link_no_link"],
+            &["warning road_lane_link_no_link"],
         ),
     ];
     super::run(&rows);

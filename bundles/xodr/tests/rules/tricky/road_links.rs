@@ -189,7 +189,7 @@ fn links_between_two_roads_give_expected_findings() {
             }
             .text(),
             &[
-                "error lane_smoothness_contact_point_no_horizontal_gaps",
+                "warning lane_smoothness_contact_point_no_horizontal_gaps",
                 "warning road_geometry_contact_point",
             ],
         ),

@@ -59,7 +59,7 @@ fn signals_and_controllers_give_expected_findings() {
         (
             "from high to low",
             with(&valid(["-1", "-2"]), "RHT"),
-            &["error road_object_bridges_from_lower_equal_to"],
+            &["warning road_object_bridges_from_lower_equal_to"],
         ),
         (
             "behind the end of the road",
@@ -77,7 +77,7 @@ fn signals_and_controllers_give_expected_findings() {
                 &signals(&[signal("1", "50", ""), signal("1", "60", "")]),
                 "RHT",
             ),
-            &["error ids_id_unique_in_class"],
+            &["warning ids_id_unique_in_class"],
         ),
         (
             "controlled",
@@ -145,7 +145,7 @@ fn objects_give_expected_findings() {
         (
             "a cylinder and a box",
             object("50", r#"length="4" width="2" radius="1""#, ""),
-            &["error road_object_circular_vs_angular"],
+            &["warning road_object_circular_vs_angular"],
         ),
         (
             "behind the end of the road",

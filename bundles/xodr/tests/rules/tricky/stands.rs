@@ -181,7 +181,7 @@ fn duplicate_signs_give_expected_findings() {
         (
             "twice with one id",
             signals(&[sign("1", place, FIFTY, ""), sign("1", place, FIFTY, "")]),
-            &["error ids_id_unique_in_class"],
+            &["warning ids_id_unique_in_class"],
         ),
     ];
     super::run(&rows);
