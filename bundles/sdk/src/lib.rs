@@ -37,7 +37,7 @@ pub use qcbus_messages::BUILD_DATE;
 pub use resource::{Resource, ResourceError, ResourceFile, ResourceValue, UserFiles};
 #[doc(hidden)]
 pub use rule::Built;
-pub use rule::{AnyRule, Backport, Each, Facts, Model, Rule, Unbuilt};
+pub use rule::{AnyRule, Backport, Each, Facts, Model, Readers, Rule, Unbuilt};
 pub use run::{Exit, Mode, Timings, examine, examine_timed, findings, main, run};
 pub use sink::{Finding, Sink};
 pub use subject::{Linked, Subject};

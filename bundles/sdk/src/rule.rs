@@ -88,9 +88,9 @@ pub struct Rule<M: Model> {
     pub uids: &'static [&'static str],
     /// Severity of its issues, unless a finding sets another. [`Level::Error`] by default.
     pub level: Level,
-    /// Severity of its issues by what readers do with the file, if it differs from `level`, which is
-    /// that of the standard. It does not apply to findings that set another level.
-    pub readers: Option<Level>,
+    /// What readers do with files that violate it, if it differs from `level`, which is that of the
+    /// standard.
+    pub readers: Option<Readers>,
     /// Versions of the standard that it applies to; see [`crate::VersionRange`].
     pub versions: &'static str,
     /// Whether older documents are checked, too.
@@ -263,6 +263,34 @@ pub trait AnyRule: Sync {
     fn as_any(&self) -> &dyn Any;
 }
 
+/// Level of a rule by what simulators do with a file that violates it, and the reason.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Readers {
+    /// Level of findings that set no other level.
+    pub level: Level,
+    /// The reason: what readers do. `docs/levels.md` shows it.
+    pub because: &'static str,
+}
+
+impl Readers {
+    /// All known readers pass over violations.
+    pub const fn warning(because: &'static str) -> Readers {
+        Readers {
+            level: Level::Warning,
+            because,
+        }
+    }
+
+    /// Readers suffer from some violations and pass over others, for which the rule sets
+    /// [`crate::Finding::readers_level`].
+    pub const fn by_case(because: &'static str) -> Readers {
+        Readers {
+            level: Level::Error,
+            because,
+        }
+    }
+}
+
 /// Everything about a rule except its function and its model; see [`Rule`] for the fields.
 #[expect(missing_docs, reason = "the fields are those of `Rule`")]
 #[derive(Debug, Clone, Copy)]
@@ -270,7 +298,7 @@ pub struct Facts {
     pub id: &'static str,
     pub uids: &'static [&'static str],
     pub level: Level,
-    pub readers: Option<Level>,
+    pub readers: Option<Readers>,
     pub versions: &'static str,
     pub backport: Backport,
     pub after: &'static [&'static str],

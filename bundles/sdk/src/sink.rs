@@ -118,7 +118,7 @@ impl<'d> Sink<'d> {
     fn list(&mut self, place: &Place<'_>, text: String) -> Finding<'_, 'd> {
         let level = match self.values.levels_of_asam {
             true => self.facts.level,
-            false => self.facts.readers.unwrap_or(self.facts.level),
+            false => self.facts.readers.map_or(self.facts.level, |it| it.level),
         };
         let level = if self.not_normative.is_some() {
             lower(level)

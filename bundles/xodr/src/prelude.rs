@@ -12,4 +12,6 @@ pub(crate) use qcbus_opendrive::{
     RoadEnd, RoadLink, RoadMap, SectionRef, ShapeKind, Side, Station, Stretch, Traffic,
     TrafficRule, is_user_data,
 };
-pub(crate) use qcbus_sdk::{Backport, Finding, Level, Param, Place, Rule, Sink, Version, basic};
+pub(crate) use qcbus_sdk::{
+    Backport, Finding, Level, Param, Place, Readers, Rule, Sink, Version, basic,
+};

@@ -4,6 +4,9 @@ use foldhash::{HashMap, HashSet};
 use std::cell::OnceCell;
 
 pub const RULE: Rule<Document> = Rule {
+    readers: Some(Readers::by_case(
+        "readers suffer from a signal or object whose id occurs twice only where something refers to it",
+    )),
     versions: "1.1.0..",
     run,
     ..Rule::after(READABLE)

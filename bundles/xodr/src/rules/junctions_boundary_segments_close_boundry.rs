@@ -9,8 +9,9 @@ const GAP: Param = Param::number(
 );
 
 pub const RULE: Rule<Roads> = Rule {
-    // No known reader uses the boundary.
-    readers: Some(Level::Warning),
+    readers: Some(Readers::warning(
+        "no known reader uses the boundary of a junction without an elevation grid",
+    )),
     versions: "1.8.0..",
     params: &[GAP],
     run,

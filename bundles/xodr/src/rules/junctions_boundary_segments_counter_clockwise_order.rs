@@ -2,8 +2,9 @@ use crate::families::junction_area::{Stretch, boundary, doubled_area, ring};
 use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
-    // No known reader uses the boundary.
-    readers: Some(Level::Warning),
+    readers: Some(Readers::warning(
+        "no known reader uses the boundary of a junction without an elevation grid",
+    )),
     versions: "1.8.0..",
     run,
     ..Rule::after(READABLE)

@@ -25,6 +25,9 @@ const LANE_ERROR_FROM: Param = Param::number(
 );
 
 pub const RULE: Rule<Roads> = Rule {
+    readers: Some(Readers::by_case(
+        "readers drive over small gaps between lanes",
+    )),
     versions: "1.7.0..",
     backport: Backport::Separate { since: "" },
     params: &[

@@ -2,7 +2,9 @@ use crate::families::center_lane;
 use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
-    readers: Some(Level::Warning),
+    readers: Some(Readers::warning(
+        "readers ignore the width of the center lane",
+    )),
     versions: "1.1.0..",
     each: Some(each),
     ..Rule::after(READABLE)

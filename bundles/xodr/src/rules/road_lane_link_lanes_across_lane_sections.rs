@@ -17,6 +17,9 @@ const ANNEX_F: &str = "asam.net:xodr:1.4.0:road.lane.link.lanes_across_laneSecti
 const NARROW: f64 = 0.1;
 
 pub const RULE: Rule<Roads> = Rule {
+    readers: Some(Readers::by_case(
+        "a missing link harms only between lanes that vehicles drive on",
+    )),
     uids: &[
         // ASAM's checker prints this UID.
         "asam.net:xodr:1.4.0:road.lane.link.lanes_across_lane_sections",

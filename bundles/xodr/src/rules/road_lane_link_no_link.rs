@@ -2,8 +2,9 @@ use crate::prelude::*;
 use qcbus_opendrive::LaneLayer;
 
 pub const RULE: Rule<Roads> = Rule {
-    // Readers ignore a link that leads nowhere.
-    readers: Some(Level::Warning),
+    readers: Some(Readers::warning(
+        "readers ignore lane links where the road has none",
+    )),
     versions: "1.1.0..",
     each: Some(each),
     ..Rule::after(READABLE)

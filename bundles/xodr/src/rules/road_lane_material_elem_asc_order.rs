@@ -2,7 +2,9 @@ use crate::families::ascending;
 use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
-    readers: Some(Level::Warning),
+    readers: Some(Readers::warning(
+        "no known reader uses the material of lanes by its order",
+    )),
     versions: "1.1.0..",
     params: &[ascending::TOLERANCE],
     each: Some(each),

@@ -2,7 +2,9 @@ use crate::families::lane_ranges;
 use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
-    readers: Some(Level::Warning),
+    readers: Some(Readers::warning(
+        "no known reader uses the validity of a bridge",
+    )),
     versions: "1.7.0..",
     backport: Backport::Alike { since: "" },
     run,

@@ -2,7 +2,9 @@ use crate::families::object_parts::check_types;
 use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
-    readers: Some(Level::Warning),
+    readers: Some(Readers::warning(
+        "readers build the road without the bridge",
+    )),
     versions: "1.7.0..",
     run,
     ..Rule::after(READABLE)

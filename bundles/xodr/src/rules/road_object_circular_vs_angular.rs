@@ -2,7 +2,7 @@ use crate::families::object_parts::{self, Stands, listed, named, number, objects
 use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
-    readers: Some(Level::Warning),
+    readers: Some(Readers::warning("readers take one of the two shapes")),
     versions: "1.7.0..",
     backport: Backport::Alike { since: "" },
     run,

@@ -4,6 +4,10 @@ use qcbus_schema_rule::{Harm, Validated, run_with};
 
 pub const RULE: Rule<Validated> = Rule {
     after: &["check_asam_xodr_xml_version_is_defined"],
+    readers: Some(Readers::by_case(
+        "readers pass over the order of children, older headers, and most faults of road marks, \
+         objects, signals and foreign data",
+    )),
     run,
     ..qcbus_schema_rule::RULE
 };
