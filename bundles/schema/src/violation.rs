@@ -92,6 +92,8 @@ pub enum Detail {
     Missing(String),
     /// A number is expected.
     Number,
+    /// The missing elements come later.
+    Later,
 }
 
 /// One violation of a schema.

@@ -148,12 +148,14 @@ pub(super) fn missing_before(
             names.iter().any(|name| one.is(name))
         })
     };
-    let text = if comes_later() {
-        format!("<{name}> in <{parent_name}> comes too early: {list} must come before it")
+    let wording = if comes_later() {
+        let text =
+            format!("<{name}> in <{parent_name}> comes too early: {list} must come before it");
+        Wording::from(text).about(Detail::Later)
     } else {
-        format!("<{parent_name}> lacks {list}, which must come before <{name}>")
+        format!("<{parent_name}> lacks {list}, which must come before <{name}>").into()
     };
-    Wording::from(text).excused(defect)
+    wording.excused(defect)
 }
 
 /// Sibling that makes a child misplaced.

@@ -15,7 +15,7 @@ fn run(document: &Document<'_>, found: &mut Sink<'_>) {
         (1, 0..=9) => return,
         (0, _) => (
             Level::Warning,
-            "earlier versions were drafts that current readers do not know",
+            "earlier versions were drafts that current readers do not know, so it cannot be judged",
         ),
         (1, 10) => (
             Level::Warning,
@@ -42,4 +42,7 @@ fn run(document: &Document<'_>, found: &mut Sink<'_>) {
     found
         .issue(Place::attribute_or_node(header, attribute), text)
         .level(level);
+    if version.major == 0 {
+        found.fail(format!("no rule judges version 0.{}", version.minor));
+    }
 }

@@ -8,6 +8,7 @@ pub const RULE: Rule<Document> = Rule {
         "readers suffer from a signal or object whose id occurs twice only where something refers to it",
     )),
     versions: "1.1.0..",
+    backport: Backport::Alike { since: "" },
     run,
     ..Rule::after(READABLE)
 };

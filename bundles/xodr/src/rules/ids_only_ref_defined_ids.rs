@@ -6,6 +6,7 @@ use foldhash::{HashMap, HashSet};
 
 pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
+    backport: Backport::Alike { since: "" },
     each: Some(each),
     run,
     ..Rule::after(READABLE)

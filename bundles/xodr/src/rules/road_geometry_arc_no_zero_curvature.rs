@@ -32,7 +32,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                         Level::Error,
                         "but must not be zero, because readers divide by it",
                     ),
-                    false => (Level::Warning, "which is practically zero"),
+                    false => (Level::Information, "which is practically zero"),
                 };
                 let text = format!(
                     "the curvature of the arc is {shown}, {fault}; a straight geometry is a `line`"

@@ -39,7 +39,7 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                         Level::Error,
                         "but they must differ, because readers divide by the difference",
                     ),
-                    false => (Level::Warning, "which is practically the same"),
+                    false => (Level::Information, "which is practically the same"),
                 };
                 let text = format!(
                     "the spiral starts with curvature {} and ends with {}, {fault}; a geometry of constant \

@@ -95,8 +95,9 @@ fn not_returned(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
         if !demands_link_back(map, joint, from, to) || links_back(map, joint, from, to) {
             continue;
         }
-        // Only traffic needs the way back.
-        let harm = match is_drivable(from) && is_drivable(to) {
+        // Only traffic that leaves the lane there needs its link.
+        let leaves = Traffic::of(to).may_run_towards(joint.to.end);
+        let harm = match leaves && is_drivable(from) && is_drivable(to) {
             true => Level::Error,
             false => Level::Warning,
         };

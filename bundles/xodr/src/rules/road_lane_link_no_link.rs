@@ -3,7 +3,7 @@ use qcbus_opendrive::LaneLayer;
 
 pub const RULE: Rule<Roads> = Rule {
     readers: Some(Readers::warning(
-        "readers ignore lane links where the road has none",
+        "readers ignore lane links where the road has none, except those of connecting roads",
     )),
     versions: "1.1.0..",
     each: Some(each),
@@ -85,7 +85,11 @@ fn check<'a>(
         if lanes.len() == 1 { "has" } else { "have" },
         end.link_name()
     );
-    let finding = found.issue(first.node(), text);
+    let mut finding = found.issue(first.node(), text);
+    // The connections of a junction do not help at the ends of its own roads.
+    if road.junction().is_some() && road.link(end).is_none() {
+        finding = finding.readers_level(Level::Error);
+    }
     if let Some(s) = road.end_s(end) {
         finding.road(road.id(), s, 0.0);
     }

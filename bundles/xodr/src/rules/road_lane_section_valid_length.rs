@@ -3,6 +3,7 @@ use crate::prelude::*;
 
 pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
+    backport: Backport::Alike { since: "" },
     params: &[LEAST, SHORT],
     each: Some(each),
     ..Rule::after(READABLE)

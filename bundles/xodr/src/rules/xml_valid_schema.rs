@@ -49,7 +49,10 @@ fn harm(violation: &Violation<'_>) -> Level {
     let attribute = violation.attribute.map(|attribute| attribute.name());
     let harmless = match violation.code {
         Code::MisplacedElement => true,
-        Code::MissingElement => is_lenient || node.is("left") || node.is("right"),
+        Code::MissingElement => {
+            let comes_later = violation.detail == Detail::Later;
+            comes_later || is_lenient || node.is("left") || node.is("right")
+        }
         Code::UnexpectedElement
         | Code::RepeatedElement
         | Code::UnexpectedAttribute
