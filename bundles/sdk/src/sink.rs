@@ -11,6 +11,9 @@ use crate::place::{Place, Spot, copied_by, locate, locate_from, put_there};
 use crate::rule::Facts;
 use crate::{Param, Subject, Values, Version};
 
+/// Start of the reason that [`Sink::leave_open`] gives.
+pub const UNKNOWN_VERSION: &str = "no rule judges version";
+
 /// Collects the findings of one checker about one subject.
 ///
 /// ```text
@@ -232,6 +235,15 @@ impl<'d> Sink<'d> {
     /// traceback of the language of the rule.
     pub fn fail(&mut self, why: impl Into<String>) {
         self.end(Ending::Failed { reason: why.into() });
+    }
+
+    /// Reports that the version of the file is one that no rule judges. The verdict about the file
+    /// stays open.
+    pub fn leave_open(&mut self, version: Version) {
+        self.fail(format!(
+            "{UNKNOWN_VERSION} {}.{}",
+            version.major, version.minor
+        ));
     }
 
     /// Sets the ending of a rule that delegates to another program. The first call counts.

@@ -75,7 +75,7 @@ fn temporary_lanes_give_expected_findings() {
             works(&["p-2 permanent", "s-1 permanent"], &both),
             &[
                 "error ids_only_ref_defined_ids",
-                "error road_lane_link_lanes_across_lane_sections",
+                "warning road_lane_link_lanes_across_lane_sections",
             ],
         ),
         (

@@ -32,7 +32,7 @@ fn lane_links_between_sections_give_expected_findings() {
         (
             "the first one only",
             split(&lane("-1", "s-1"), &lane("-1", "")),
-            &["error road_lane_link_lanes_across_lane_sections"],
+            &["warning road_lane_link_lanes_across_lane_sections"],
         ),
         (
             "the second one only",

@@ -202,6 +202,7 @@ fn links_between_two_roads_give_expected_findings() {
             .text(),
             &[
                 "error road_geometry_contact_point",
+                "warning road_lane_link_lanes_across_lane_sections",
                 "error road_lane_link_lanes_across_lane_sections",
                 "error road_linkage_both_sides_consistency",
             ],
