@@ -8,4 +8,4 @@ pub(crate) use qcbus_openscenario::{
     Actors, CatalogKind, DataType, Declaration, Declared, Element, Entity, EntityKind, Form,
     LaneAt, Network, Resolution, Scenario, Value, ValueFaultKind, bare,
 };
-pub(crate) use qcbus_sdk::{Backport, Level, Param, Place, Rule, Sink, basic};
+pub(crate) use qcbus_sdk::{Backport, Level, Param, Place, Readers, Rule, Sink, basic};

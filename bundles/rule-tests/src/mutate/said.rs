@@ -6,7 +6,7 @@ use qcbus_formats::pool::{CheckerOutcome, Remark};
 use qcbus_formats::xqar::{Issue, Level, Location, Locations, Status};
 
 use super::change::normal;
-use qcbus_sdk::{Loaded, Plan, examine};
+use qcbus_sdk::{Loaded, Plan, UNKNOWN_VERSION, examine};
 
 /// An issue, independent of the directory of the scenario.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -86,7 +86,8 @@ impl Reader<'_> {
     fn checker(&self, checker: &CheckerOutcome) -> Vec<Said> {
         let issues = checker.issues.iter();
         let mut all: Vec<Said> = issues.map(|it| self.issue(&checker.id, it)).collect();
-        if checker.status() == Status::Error {
+        let leaves_open = checker.reason().starts_with(UNKNOWN_VERSION);
+        if checker.status() == Status::Error && !leaves_open {
             all.push(Said {
                 checker: checker.id.to_string(),
                 level: Level::Error,

@@ -1,7 +1,7 @@
 //! Names within one element.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use crate::prelude::*;
 
@@ -10,6 +10,7 @@ use crate::prelude::*;
 /// Properties are left out. Their names are keys of values and not targets of references.
 pub(crate) fn unique_among_siblings(document: &Document<'_>, found: &mut Sink<'_>) {
     let Some(root) = document.root() else { return };
+    let referred = Referred::of(root);
     for parent in std::iter::once(root).chain(root.descendants()) {
         let named = || {
             parent
@@ -31,13 +32,56 @@ pub(crate) fn unique_among_siblings(document: &Document<'_>, found: &mut Sink<'_
                     known.name(),
                     parent.name()
                 );
-                found
+                let finding = found
                     .issue(child, text)
                     .at(Place::Node(*known), "the first element with this name");
+                if !referred.may_be(child, name) {
+                    finding.readers_level(Level::Warning);
+                }
             } else {
                 first.insert(name, child);
             }
         }
+    }
+}
+
+/// Why siblings of the same name harm by case.
+pub(crate) const BY_CASE: Readers = Readers::by_case(
+    "an element of the story whose name occurs twice harms only if something refers to the name",
+);
+
+/// Elements of a story. Only conditions refer to them.
+const STORY: &[&str] = &[
+    "Story",
+    "Act",
+    "ManeuverGroup",
+    "Maneuver",
+    "Event",
+    "Action",
+    "ConditionGroup",
+    "Condition",
+];
+
+/// Names in the references to elements of the story.
+struct Referred<'d> {
+    names: HashSet<&'d str>,
+    /// A parameter names an element.
+    any: bool,
+}
+
+impl<'d> Referred<'d> {
+    fn of(root: Node<'d>) -> Referred<'d> {
+        let references = root
+            .descendants()
+            .filter_map(|node| node.attr("storyboardElementRef"));
+        let names: HashSet<&str> = references.flat_map(|it| it.split("::")).collect();
+        let any = names.iter().any(|name| name.contains('$'));
+        Referred { names, any }
+    }
+
+    fn may_be(&self, element: Node<'_>, name: &str) -> bool {
+        let in_story = STORY.iter().any(|it| element.is(it));
+        !in_story || self.any || self.names.contains(name)
     }
 }
 

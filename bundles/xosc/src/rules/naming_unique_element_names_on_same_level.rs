@@ -7,6 +7,7 @@ pub const RULE: Rule<Document> = Rule {
         "qcbus.dev:xosc:1.0.0:parameters.duplicate_declaration",
     ],
     versions: "1.0.0..1.2.0",
+    readers: Some(names::BY_CASE),
     run,
     ..Rule::after(READABLE)
 };

@@ -10,6 +10,7 @@ pub const RULE: Rule<Document> = Rule {
         "qcbus.dev:xosc:1.0.0:monitors.duplicate",
     ],
     versions: "1.2.0..",
+    readers: Some(names::BY_CASE),
     run,
     ..Rule::after(READABLE)
 };
