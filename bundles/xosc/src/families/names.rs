@@ -35,7 +35,7 @@ pub(crate) fn unique_among_siblings(document: &Document<'_>, found: &mut Sink<'_
                 let finding = found
                     .issue(child, text)
                     .at(Place::Node(*known), "the first element with this name");
-                if !referred.may_be(child, name) {
+                if !referred.may_be(child, name) || is_repeated(child, *known) {
                     finding.readers_level(Level::Warning);
                 }
             } else {
@@ -45,9 +45,20 @@ pub(crate) fn unique_among_siblings(document: &Document<'_>, found: &mut Sink<'_
     }
 }
 
+/// Checks whether both declare the same parameter with the same value.
+fn is_repeated(one: Node<'_>, other: Node<'_>) -> bool {
+    let alike = |name| one.attr(name) == other.attr(name);
+    one.is("ParameterDeclaration")
+        && other.is("ParameterDeclaration")
+        && ["parameterType", "value"].into_iter().all(alike)
+        && one.children().next().is_none()
+        && other.children().next().is_none()
+}
+
 /// Why siblings of the same name harm by case.
 pub(crate) const BY_CASE: Readers = Readers::by_case(
-    "an element of the story whose name occurs twice harms only if something refers to the name",
+    "an element of the story whose name occurs twice harms only if something refers to the name, and a parameter only \
+     if its values differ",
 );
 
 /// Elements of a story. Only conditions refer to them.

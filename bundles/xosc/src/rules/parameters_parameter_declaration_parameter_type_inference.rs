@@ -4,6 +4,9 @@ use crate::prelude::*;
 use qcbus_openscenario::ValueFault;
 
 pub const RULE: Rule<Scene> = Rule {
+    readers: Some(Readers::by_case(
+        "a value of another type does no harm where the parameter is only used as text of properties",
+    )),
     run,
     ..Rule::after(READABLE)
 };
@@ -13,7 +16,10 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         if values::is_of_other_rule(scenario, fault) {
             continue;
         }
-        values::say(fault, found).level(level(fault));
+        let finding = values::say(fault, found).level(level(fault));
+        if is_text_only(fault.attribute.node()) {
+            finding.readers_level(Level::Warning);
+        }
     }
     let kinds = [ValueFaultKind::Declared, ValueFaultKind::Parameter];
     for (element, fault) in scenario.entry_faults_of(&kinds) {
@@ -54,6 +60,30 @@ fn level(fault: &ValueFault<'_>) -> Level {
     } else {
         Level::Error
     }
+}
+
+/// Checks whether a declared parameter is used only in values of properties, which are text.
+fn is_text_only(declaration: Node<'_>) -> bool {
+    let scope = declaration.parent().and_then(|it| it.parent());
+    let (Some(scope), Some(name)) = (scope, declaration.attr("name")) else {
+        return false;
+    };
+    let uses = |value: &str| {
+        let mut found = value.match_indices(name);
+        value.contains('$')
+            && found.any(|(at, _)| {
+                let rest = &value[at + name.len()..];
+                !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_')
+            })
+    };
+    scope.descendants().all(|node| {
+        let mut attributes = node.attributes();
+        attributes.all(|attribute| match attribute.name() {
+            "parameterRef" => attribute.value() != name,
+            "value" if node.is("Property") => true,
+            _ => !uses(attribute.value()),
+        })
+    })
 }
 
 /// Checks values that a parameter is set to or compared with at run time.
