@@ -91,7 +91,8 @@ impl<'d> Referred<'d> {
     }
 
     fn may_be(&self, element: Node<'_>, name: &str) -> bool {
-        let in_story = STORY.iter().any(|it| element.is(it));
+        let is_entry = element.parent().is_some_and(|it| it.is("Catalog"));
+        let in_story = !is_entry && STORY.iter().any(|it| element.is(it));
         !in_story || self.any || self.names.contains(name)
     }
 }

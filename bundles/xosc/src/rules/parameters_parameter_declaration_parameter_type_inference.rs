@@ -76,14 +76,17 @@ fn is_text_only(declaration: Node<'_>) -> bool {
                 !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_')
             })
     };
-    scope.descendants().all(|node| {
-        let mut attributes = node.attributes();
-        attributes.all(|attribute| match attribute.name() {
-            "parameterRef" => attribute.value() != name,
-            "value" if node.is("Property") => true,
-            _ => !uses(attribute.value()),
-        })
-    })
+    let attributes = scope
+        .descendants()
+        .flat_map(|node| node.attributes().map(move |attribute| (node, attribute)));
+    let mut places = attributes.filter(|(_, attribute)| match attribute.name() {
+        "parameterRef" => attribute.value() == name,
+        _ => uses(attribute.value()),
+    });
+    let is_property =
+        |(node, attribute): (Node<'_>, Attribute<'_>)| node.is("Property") && attribute.is("value");
+    // An unused parameter may be meant for a set of values.
+    places.next().is_some_and(is_property) && places.all(is_property)
 }
 
 /// Checks values that a parameter is set to or compared with at run time.
