@@ -96,6 +96,7 @@ pub(super) fn store(
     Ok(Store {
         places,
         choice: options.choice.clone(),
+        strict: options.strict,
         dialect: options.dialect,
         durable: options.durable,
         verdict_files: options.verdict_files,
