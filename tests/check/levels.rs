@@ -100,7 +100,7 @@ fn configuration_selects_the_levels() {
         let has_note = said.stdout.contains("note: levels of ASAM: ");
         assert_eq!(
             has_note,
-            config.contains("asam") || expected == OF_ASAM,
+            config.contains("\"asam\"") || expected == OF_ASAM,
             "{whole}"
         );
         let valid = cli.qcbus(&["config", "check", "config.xml"]);
@@ -179,4 +179,33 @@ fn invalid_levels_are_reported_with_their_position() {
         whole.contains("`qcbus.levels` is empty, which means `readers`"),
         "{whole}"
     );
+}
+
+#[test]
+fn page_of_a_rule_names_both_levels() {
+    let cli = Cli::new();
+    for (rule, level) in [
+        (
+            "road.object.circular_vs_angular",
+            "warning (error with `--strict`)",
+        ),
+        (SCHEMA, "by case (error with `--strict`)"),
+        ("check_asam_xodr_xml_fileheader_is_present", "error"),
+    ] {
+        let said = cli.qcbus(&["rule", rule]);
+        assert!(
+            said.stdout.contains(&format!("\n  level {level}, ")),
+            "{}",
+            said.whole(&cli)
+        );
+    }
+    let said = cli.qcbus(&[
+        "rule",
+        "road.object.circular_vs_angular",
+        "--format",
+        "json",
+    ]);
+    let described: serde_json::Value = serde_json::from_str(&said.stdout).unwrap();
+    assert_eq!(described["level"], "error");
+    assert_eq!(described["readers"]["level"], "warning");
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use qcbus_rule_tests::corpus::agrees_or_says;
-use qcbus_sdk::{Bundle, Checker, Level};
+use qcbus_sdk::{Bundle, Checker};
 
 use super::root;
 
@@ -80,13 +80,9 @@ fn name(rule: &Checker) -> &str {
 }
 
 /// Returns the level of a rule without `--strict`.
-fn level(rule: &Checker) -> String {
-    match rule.facts.readers {
-        // Some findings of such a rule have the level of the standard, and some have another.
-        Some(readers) if readers.level == Level::Error => "by case".to_owned(),
-        Some(readers) => readers.level.as_str().to_owned(),
-        None => rule.facts.level.as_str().to_owned(),
-    }
+fn level(rule: &Checker) -> &'static str {
+    let of_readers = rule.facts.readers.map(|readers| readers.in_a_word());
+    of_readers.unwrap_or(rule.facts.level.as_str())
 }
 
 /// Returns the first sentence of the reasons on a rule's page, else that of its introduction.

@@ -151,11 +151,11 @@ fn page(checker: &Checker) -> String {
         let _ = writeln!(head, "  {uid}");
     }
     let level = match facts.readers {
-        Some(readers) if readers.level != facts.level => {
-            let (own, of_asam) = (readers.level.as_str(), facts.level.as_str());
-            format!("{own} ({of_asam} with `--strict`)")
+        Some(readers) => {
+            let of_asam = facts.level.as_str();
+            format!("{} ({of_asam} with `--strict`)", readers.in_a_word())
         }
-        _ => facts.level.as_str().to_owned(),
+        None => facts.level.as_str().to_owned(),
     };
     let versions = match &checker.range {
         Ok(range) if range.is_everything() => "every version".to_owned(),
