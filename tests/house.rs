@@ -8,6 +8,8 @@
 
 #[path = "house/documents.rs"]
 mod documents;
+#[path = "house/levels.rs"]
+mod levels;
 #[path = "house/sizes.rs"]
 mod sizes;
 #[path = "house/targets.rs"]

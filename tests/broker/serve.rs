@@ -375,6 +375,38 @@ fn requested_polling_finds_new_files() {
     until_so("it is gone", || !farm.out().join("a.xodr.xqar").exists());
 }
 
+/// A broker that starts again with other levels judges its files again.
+#[test]
+fn strict_broker_rejects_what_the_standard_forbids() {
+    let mut farm = Farm::new();
+    farm.write("a.xodr", &Content::colourless_road_mark());
+    farm.write("b.xodr", &Content::Good(1).bytes());
+    let states_levels = |farm: &Farm| {
+        let params = &farm.result("a.xodr").bundles[0].params;
+        params
+            .iter()
+            .any(|it| it.name == "qcbus.levels" && it.value == "asam")
+    };
+    for (strict, expected) in [
+        (false, Verdict::Accepted),
+        (true, Verdict::Rejected),
+        (false, Verdict::Accepted),
+    ] {
+        farm.arguments = strict.then(|| "--strict".to_owned()).into_iter().collect();
+        let broker = farm.serve_ready();
+        assert_eq!(farm.verdict("a.xodr").verdict, expected, "strict: {strict}");
+        assert_eq!(farm.verdict("b.xodr").verdict, Verdict::Accepted);
+        farm.settle(2);
+        assert_eq!(states_levels(&farm), strict);
+        // `check` does not use a broker with other levels.
+        let file = farm.root().join("a.xodr");
+        let (file, out) = (file.to_string_lossy(), farm.base().join("checked"));
+        let said = farm.qcbus(&["check", &file, "--out", &out.to_string_lossy()]);
+        assert_eq!(said.status.code(), Some(0), "strict: {strict}");
+        drop(broker);
+    }
+}
+
 fn scenario(map: &str) -> String {
     format!(
         "<OpenSCENARIO>\n<FileHeader revMajor=\"1\" revMinor=\"2\" date=\"2026-01-31T12:00:00\" \

@@ -16,6 +16,7 @@ mod demanded;
 mod farm;
 mod hosted_real;
 mod hostile;
+mod levels;
 mod modular;
 mod output;
 mod own_schemas;

@@ -89,6 +89,14 @@ impl Content {
         )
     }
 
+    /// Returns a map that lacks the colour of a road mark. Its schema demands the colour, and
+    /// readers pass over it.
+    pub fn colourless_road_mark() -> Vec<u8> {
+        let whole = String::from_utf8(Content::Good(1).bytes()).unwrap();
+        let mark = "<roadMark sOffset=\"0\" type=\"solid\"/></lane></right>";
+        whole.replace("</lane></right>", mark).into_bytes()
+    }
+
     /// Returns the bytes.
     pub fn bytes(&self) -> Vec<u8> {
         let text = match self {

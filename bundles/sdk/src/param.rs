@@ -1,7 +1,9 @@
 //! Parameters of rules: they are declared beside the rule, set in a configuration and shown in the
 //! result.
 
-use qcbus_formats::config::{LEVELS_OF_ASAM, LEVELS_PARAM, ParamType, ParamValue};
+use qcbus_formats::config::{
+    LEVELS_OF_ASAM, LEVELS_OF_READERS, LEVELS_PARAM, ParamType, ParamValue,
+};
 use qcbus_formats::xqar;
 
 /// A parameter of a rule, with its default value.
@@ -126,12 +128,9 @@ pub const MAX_ISSUES: Param = Param::number(
 /// the file. `asam`: what the standard demands.
 pub const LEVELS: Param = Param::text(
     LEVELS_PARAM,
-    READERS,
+    LEVELS_OF_READERS,
     "levels of findings: `readers` for what harms readers of the file, `asam` for what the standard demands",
 );
-
-/// Value of [`LEVELS`] without a configuration.
-const READERS: &str = "readers";
 
 /// A configured value that is invalid for its parameter.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -167,7 +166,7 @@ impl Values {
             Ok((*param, value))
         });
         let levels_of_asam = match configured(LEVELS.name).as_deref().map(str::trim) {
-            None | Some(READERS) => false,
+            None | Some(LEVELS_OF_READERS) => false,
             Some(LEVELS_OF_ASAM) => true,
             Some(other) => {
                 return Err(ParamError {

@@ -289,6 +289,14 @@ impl Readers {
             because,
         }
     }
+
+    /// Returns the word for its level: `by case` if findings differ.
+    pub fn in_a_word(&self) -> &'static str {
+        match self.level {
+            Level::Error => "by case",
+            level => level.as_str(),
+        }
+    }
 }
 
 /// Everything about a rule except its function and its model; see [`Rule`] for the fields.

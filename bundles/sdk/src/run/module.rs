@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use qcbus_formats::config::{Config, LEVELS_OF_ASAM, LEVELS_PARAM};
-use qcbus_formats::pool::{PoolInput, Scope, pool};
+use qcbus_formats::pool::{self, PoolInput, Scope};
 use qcbus_formats::xqar::{self, Dialect};
 use qcbus_messages::path_text::to_text;
 
@@ -87,15 +87,18 @@ fn module(
     } else {
         Plan::new(bundle, |_| false, |_, _| None)
     };
-    let bundles = vec![examine_timed(&plan, &loaded, permits)?.0];
+    let mut bundles = vec![examine_timed(&plan, &loaded, permits)?.0];
+    if config.is_of_asam() {
+        pool::state_levels_of_asam(&mut bundles);
+    }
     let remarks = if bundle.kinds.contains(&loaded.kind()) {
         loaded.remarks(&bundles)?
     } else {
         Vec::new()
     };
     let input = to_text(&input);
-    let mut nowhere = qcbus_formats::pool::NoPlaces;
-    let pooled = pool(
+    let mut nowhere = pool::NoPlaces;
+    let pooled = pool::pool(
         PoolInput {
             input_file: &input,
             config: Some(&config),
@@ -125,9 +128,8 @@ pub(super) fn configured(
         return Plan::by_default(bundle).with_files(given);
     };
     let section = config.bundle(bundle.name, bundle.alias);
-    // A broker sends a configuration without bundles if only the levels are set. It names the
-    // demanded checkers itself.
-    let everything = config.bundles.is_empty();
+    // A broker that sets only the levels names the demanded checkers itself.
+    let everything = config.sets_only_levels();
     let demanded = |checker: &Checker| match everything {
         true => checker.facts.default_on,
         false => config
@@ -135,7 +137,7 @@ pub(super) fn configured(
             .runs(checker.facts.default_on),
     };
     let levels = || {
-        let of_asam = config.is_of_asam() && !everything;
+        let of_asam = config.is_of_asam();
         of_asam.then(|| LEVELS_OF_ASAM.to_owned())
     };
     let plan = Plan::new(bundle, demanded, |checker, name| {

@@ -163,16 +163,29 @@ impl Config {
     /// Checks whether the configuration was written for ASAM's framework: it has no parameter of
     /// qcbus. Findings then have the levels of ASAM.
     pub fn is_of_asam(&self) -> bool {
-        let bundles = self.bundles.iter();
-        let in_bundles = bundles.flat_map(|bundle| {
+        !self.all_params().any(|it| it.name.starts_with("qcbus."))
+    }
+
+    /// Checks whether a parameter selects the levels of ASAM, for all or for some checkers.
+    pub fn selects_levels_of_asam(&self) -> bool {
+        self.all_params()
+            .any(|it| it.name == LEVELS_PARAM && it.value.trim() == LEVELS_OF_ASAM)
+    }
+
+    /// Returns the global parameters and those of all bundles and checkers.
+    fn all_params(&self) -> impl Iterator<Item = &ConfigParam> {
+        let in_bundles = self.bundles.iter().flat_map(|bundle| {
             let checkers = bundle.checkers.iter().flat_map(|it| &it.params);
             bundle.params.iter().chain(checkers)
         });
-        !self
-            .params
-            .iter()
-            .chain(in_bundles)
-            .any(|param| param.name.starts_with("qcbus."))
+        self.params.iter().chain(in_bundles)
+    }
+
+    /// Checks whether the configuration only selects levels. A broker without a configuration file
+    /// sends such a one to its bundles; every checker that is on by default is then demanded.
+    pub fn sets_only_levels(&self) -> bool {
+        let sets_levels = |param: &ConfigParam| param.name == LEVELS_PARAM;
+        self.bundles.is_empty() && !self.params.is_empty() && self.params.iter().all(sets_levels)
     }
 
     /// Returns the configuration with the levels of ASAM for all bundles.

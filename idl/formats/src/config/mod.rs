@@ -30,6 +30,9 @@ pub const LEVELS_PARAM: &str = "qcbus.levels";
 /// Value of [`LEVELS_PARAM`]: the levels that the standard demands.
 pub const LEVELS_OF_ASAM: &str = "asam";
 
+/// Value of [`LEVELS_PARAM`]: the levels by what readers do with the file.
+pub const LEVELS_OF_READERS: &str = "readers";
+
 /// Parameter names for the file to check, the current name first.
 pub const INPUT_PARAMS: [&str; 3] = ["InputFile", "XodrFile", "XoscFile"];
 

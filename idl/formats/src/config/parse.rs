@@ -2,8 +2,8 @@
 
 use super::lookup::canonical_bundle;
 use super::{
-    BundleConfig, CheckerConfig, Config, ConfigError, ConfigParam, LEVEL_PARAM, Levels, Oddity,
-    Parsed, ReportConfig, TextPosition,
+    BundleConfig, CheckerConfig, Config, ConfigError, ConfigParam, LEVEL_PARAM, LEVELS_OF_ASAM,
+    LEVELS_OF_READERS, LEVELS_PARAM, Levels, Oddity, Parsed, ReportConfig, TextPosition,
 };
 use crate::distance::did_you_mean;
 use crate::xml::{self, Document, Element, Node};
@@ -155,11 +155,13 @@ impl Parser<'_> {
             return Ok(());
         }
         let value = element.value("value").unwrap_or_default().to_owned();
-        params.push(ConfigParam {
+        let param = ConfigParam {
             name,
             value,
             position: self.position(element.offset),
-        });
+        };
+        self.oddities.extend(invalid_levels(&param));
+        params.push(param);
         Ok(())
     }
 
@@ -309,6 +311,23 @@ impl Parser<'_> {
             hint: hint.to_owned(),
         }
     }
+}
+
+/// Returns a warning if a parameter selects levels that do not exist.
+fn invalid_levels(param: &ConfigParam) -> Option<Oddity> {
+    if param.name != LEVELS_PARAM {
+        return None;
+    }
+    let value = param.value.trim();
+    let text = match value {
+        LEVELS_OF_ASAM | LEVELS_OF_READERS => return None,
+        "" => format!("`{LEVELS_PARAM}` is empty, which means `{LEVELS_OF_READERS}`"),
+        _ => format!(
+            "the parameter `{LEVELS_PARAM}` is `{value}`, but must be `{LEVELS_OF_READERS}` or \
+             `{LEVELS_OF_ASAM}`: checkers that read it check nothing"
+        ),
+    };
+    Some(Oddity::warning(param.position, text))
 }
 
 /// Adds a bundle's second entry to its first. An entry without checkers requests all default

@@ -17,7 +17,9 @@ use crate::xqar::{Issue, Results};
 use crate::{Text, Verdict};
 
 pub use asked::NotAsked;
-pub use outcome::{Asked, BundleOutcome, CheckerOutcome, Ending, in_the_answer};
+pub use outcome::{
+    Asked, BundleOutcome, CheckerOutcome, Ending, in_the_answer, state_levels_of_asam,
+};
 pub use places::{NoPlaces, Resolver, XPathPlace};
 pub use remarks::chosen;
 pub use uid::{RuleUids, is_rule_uid};

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::RuleUids;
 use crate::Text;
+use crate::config::{LEVELS_OF_ASAM, LEVELS_PARAM};
 use crate::xqar::{Issue, Metadata, Param, Status};
 
 /// How a checker ended.
@@ -92,6 +93,16 @@ pub struct BundleOutcome {
     pub absent: Option<String>,
     /// Numbers of demanded and available checkers; `None` when they were not counted.
     pub asked: Option<Asked>,
+}
+
+/// States in the results of bundles that their findings have the levels of ASAM.
+pub fn state_levels_of_asam(bundles: &mut [BundleOutcome]) {
+    for bundle in bundles {
+        bundle.params.push(Param {
+            name: LEVELS_PARAM.to_owned(),
+            value: LEVELS_OF_ASAM.to_owned(),
+        });
+    }
 }
 
 /// Numbers of demanded and available checkers of a bundle.

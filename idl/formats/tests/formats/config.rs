@@ -309,6 +309,62 @@ fn unreadable_value_is_reported_at_every_place() {
 }
 
 #[test]
+fn invalid_levels_are_reported_at_every_place() {
+    let told_of = |value: &str| {
+        let param = format!(r#"<Param name="qcbus.levels" value="{value}"/>"#);
+        let text = format!(
+            "<Config>\n{param}\n<CheckerBundle application='xodr'>\n{param}\n\
+             <Checker checkerId='check_lanes'>\n{param}</Checker></CheckerBundle></Config>"
+        );
+        let oddities = parse(&text).oddities;
+        let rows: Vec<u64> = oddities.iter().map(|oddity| oddity.row).collect();
+        (rows, told(&oddities))
+    };
+    for right in ["asam", "readers", " asam "] {
+        assert_eq!(told_of(right).1, "");
+    }
+    let (rows, text) = told_of("Asam");
+    assert_eq!(rows, [2, 4, 6]);
+    let message = "is `Asam`, but must be `readers` or `asam`: checkers that read it check nothing";
+    assert_eq!(text.matches(message).count(), 3, "{text}");
+    let (rows, text) = told_of("");
+    assert_eq!(rows, [2, 4, 6]);
+    assert!(text.contains("is empty, which means `readers`"), "{text}");
+}
+
+#[test]
+fn configuration_without_parameters_of_qcbus_has_the_levels_of_asam() {
+    let of = |text: &str| parse(text).config;
+    assert!(of("<Config><CheckerBundle application='xodr'/></Config>").is_of_asam());
+    let other = "<Param name='gap' value='1'/>";
+    assert!(
+        of(&format!(
+            "<Config>{other}<CheckerBundle application='xodr'/></Config>"
+        ))
+        .is_of_asam()
+    );
+    // `GOOD` has the parameter `qcbus.level` at a checker.
+    assert!(!of(GOOD).is_of_asam());
+    assert!(!of(GOOD).selects_levels_of_asam());
+    assert!(!of(GOOD).sets_only_levels());
+    let strict = of(GOOD).with_levels_of_asam();
+    assert!(strict.selects_levels_of_asam() && !strict.sets_only_levels());
+    let readers = "<Param name='qcbus.levels' value='readers'/>";
+    let everywhere = format!(
+        "<Config>{readers}<CheckerBundle application='xodr'>{readers}<Checker checkerId='a'>{readers}\
+         </Checker></CheckerBundle></Config>"
+    );
+    let strict = of(&everywhere).with_levels_of_asam();
+    let bundle = &strict.bundles[0];
+    assert!(bundle.params.is_empty() && bundle.checkers[0].params.is_empty());
+    let defaults = [param("qcbus.levels", "readers")];
+    let effective = strict.effective_params(Some(bundle), "a", &defaults);
+    assert_eq!(effective, [param("qcbus.levels", "asam")]);
+    assert!(Config::default().with_levels_of_asam().sets_only_levels());
+    assert!(!Config::default().sets_only_levels());
+}
+
+#[test]
 fn unknown_names_in_configuration_are_reported() {
     let checker = |id: &str, params: &[&str]| KnownChecker {
         id: id.into(),

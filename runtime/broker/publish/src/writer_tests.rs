@@ -32,6 +32,7 @@ fn store_in(dir: &Path) -> Store {
         probes: Probes::default(),
         places: ResultPaths::of_watched(dir.join("out"), vec![dir.join("farm")]),
         choice: Default::default(),
+        strict: false,
         dialect: Dialect::default(),
         durable: false,
         verdict_files: true,

@@ -150,7 +150,13 @@ fn page(checker: &Checker) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(head, "  {uid}");
     }
-    let level = facts.level.as_str();
+    let level = match facts.readers {
+        Some(readers) => {
+            let of_asam = facts.level.as_str();
+            format!("{} ({of_asam} with `--strict`)", readers.in_a_word())
+        }
+        None => facts.level.as_str().to_owned(),
+    };
     let versions = match &checker.range {
         Ok(range) if range.is_everything() => "every version".to_owned(),
         Ok(range) => match range.to_string() {
@@ -160,6 +166,9 @@ fn page(checker: &Checker) -> String {
         Err(why) => why.clone(),
     };
     let _ = writeln!(head, "  level {level}, {versions}");
+    if let Some(readers) = facts.readers {
+        let _ = writeln!(head, "  {}", readers.because);
+    }
     if let Some((cited, link)) = facts.uids.iter().find_map(|uid| standard::section(uid)) {
         let _ = writeln!(head, "  {cited}: {link}");
     }
@@ -179,6 +188,7 @@ fn describe(bundle: &str, checker: &Checker) -> serde_json::Value {
         "bundle": bundle,
         "uids": facts.uids,
         "level": checker.level().as_str(),
+        "readers": facts.readers.map(|it| serde_json::json!({"level": it.level.as_str(), "because": it.because})),
         "versions": facts.versions,
         "default": facts.default_on,
         "after": facts.after,

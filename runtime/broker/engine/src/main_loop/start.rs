@@ -24,9 +24,7 @@ use tokio::sync::mpsc;
 use super::early::{early_children, early_or_now};
 use super::looks::Looks;
 use super::remains::Remains;
-use super::stores::{
-    StateDirectory, journal_of, reconcile, remembered_by, results_of, store, writers,
-};
+use super::stores::{StateDirectory, numbered_journal, reconcile, results_of, store, writers};
 use super::watching::Watching;
 use super::{AttendedTime, Broker, Inbox, Sessions, StartError, Told};
 use crate::backend::{Backend, Bus, Control, Processes, System};
@@ -63,10 +61,7 @@ impl Broker {
         let (inbox, senders) = Inbox::new();
         let early = early_children(backend, &mut options, &loaded, descriptors, &inbox);
         let mut host = backend.bus(&options.instance, shape(&options, &loaded))?;
-        options.settings.generation = host.generation();
-        let journal = journal_of(&options)?;
-        let (numbers, members) = remembered_by(journal.as_ref())?;
-        options.settings.numbers = numbers.max(host.generation());
+        let (journal, members) = numbered_journal(&mut options, host.generation())?;
         let (state_directory, lock) = (StateDirectory::of(journal.as_ref()), results_of(&options)?);
         let in_force = put_in_force(&mut *host, &sources, &loaded)?;
         let looks = Looks::default();

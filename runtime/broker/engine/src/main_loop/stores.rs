@@ -42,14 +42,26 @@ impl StateDirectory {
     }
 }
 
-pub(super) fn journal_of(options: &Options) -> Result<Option<Journal>, JournalError> {
+/// Opens the journal and numbers this start. Returns the journal, if there is one, and its registry.
+pub(super) fn numbered_journal(
+    options: &mut Options,
+    generation: u64,
+) -> Result<(Option<Journal>, Vec<Member>), JournalError> {
+    let journal = journal_of(options)?;
+    let (numbers, members) = remembered_by(journal.as_ref())?;
+    options.settings.generation = generation;
+    options.settings.numbers = numbers.max(generation);
+    Ok((journal, members))
+}
+
+fn journal_of(options: &Options) -> Result<Option<Journal>, JournalError> {
     let state = options.state.as_ref();
     let opened = state.map(|state| Journal::open(state, options.instance.name()));
     opened.transpose()
 }
 
 /// Returns the first new number and the registry from the journal. Both are empty without a journal.
-pub(super) fn remembered_by(journal: Option<&Journal>) -> Result<(u64, Vec<Member>), JournalError> {
+fn remembered_by(journal: Option<&Journal>) -> Result<(u64, Vec<Member>), JournalError> {
     let Some(journal) = journal else {
         return Ok((0, Vec::new()));
     };
@@ -96,6 +108,7 @@ pub(super) fn store(
     Ok(Store {
         places,
         choice: options.choice.clone(),
+        strict: options.strict,
         dialect: options.dialect,
         durable: options.durable,
         verdict_files: options.verdict_files,

@@ -49,6 +49,8 @@ pub struct Store {
     pub places: ResultPaths,
     /// Selection among the demanded checkers.
     pub choice: Choice,
+    /// Whether findings have the levels of ASAM, whatever the configuration says.
+    pub strict: bool,
     /// Dialect of the results.
     pub dialect: Dialect,
     /// Whether results are flushed to the disk before they are announced.

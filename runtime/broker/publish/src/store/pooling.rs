@@ -17,7 +17,7 @@ impl Store {
     pub(super) fn pool(
         &self,
         job: &FinishedJob,
-        bundles: Vec<BundleOutcome>,
+        mut bundles: Vec<BundleOutcome>,
         (config, scope): (Option<&Config>, Scope),
         root: Option<&[u8]>,
     ) -> Pooled {
@@ -31,6 +31,9 @@ impl Store {
             }
             (None, Some(_)) => remarks.push(unseen_root()),
             (_, None) => {}
+        }
+        if self.strict || config.is_some_and(Config::is_of_asam) {
+            pool::state_levels_of_asam(&mut bundles);
         }
         let input = PoolInput {
             input_file: &to_text(&job.path),

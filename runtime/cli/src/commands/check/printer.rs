@@ -45,6 +45,8 @@ pub(super) struct Printer {
     config: Option<Arc<Config>>,
     /// Whether the command line selects or ignores checkers.
     has_choice: bool,
+    /// Whether `--strict` selects the levels of ASAM.
+    strict: bool,
     outputs: Outputs,
     args: PrintArgs,
     progress: talk::Progress,
@@ -78,6 +80,7 @@ impl Printer {
             roots,
             config,
             has_choice: !args.select.is_empty() || !args.ignore.is_empty(),
+            strict: args.strict,
             outputs,
             args: args.print.clone(),
             progress: talk::Progress::new(!args.print.quiet),
@@ -359,6 +362,9 @@ impl Printer {
             for sentence in self.tally.not_looked() {
                 lines.push_str(&format!("note: {sentence}\n"));
             }
+            if let Some(why) = levels_of_asam(self.strict, self.config.as_deref()) {
+                lines.push_str(&format!("note: levels of ASAM: {why}\n"));
+            }
             let open = Verdict::Undetermined;
             if self.tally.count(open) > 0 {
                 let files = shown::line(&self.tally.open_files()).into_owned();
@@ -449,6 +455,21 @@ impl LeftOut {
             it.issues = issues;
         }
     }
+}
+
+/// Returns the reason why findings have the levels of ASAM, if they do.
+fn levels_of_asam(strict: bool, config: Option<&Config>) -> Option<&'static str> {
+    if strict {
+        return Some("`--strict`");
+    }
+    let config = config?;
+    if config.is_of_asam() {
+        let why = "the configuration has no parameter of qcbus; `qcbus.levels` with the value `readers` selects the \
+                   levels of readers";
+        return Some(why);
+    }
+    let selects = config.selects_levels_of_asam();
+    selects.then_some("where `qcbus.levels` in the configuration is `asam`")
 }
 
 /// Returns the findings of one file in full. If the verdict is undetermined, the reasons follow.
