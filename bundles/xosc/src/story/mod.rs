@@ -6,14 +6,13 @@ mod init;
 mod never;
 mod waits;
 
-use qcbus_openscenario::{
-    Actors, Element, Moment, Scenario, Span, StoryElement, StoryKind, Strictness, Timeline,
-};
+use qcbus_openscenario::{Actors, Element, Scenario, Span, StoryElement, Strictness, Timeline};
 use qcbus_sdk::{Model as _, Subject, Unbuilt};
 
 use crate::model::Scene;
 
 pub use init::{Opening, Place};
+pub use qcbus_openscenario::{Moment, StoryKind};
 
 /// What a scenario does in a run.
 #[derive(Debug)]
