@@ -12,7 +12,7 @@ pub struct Opening {
     /// Name of the entity.
     pub entity: String,
     /// Its position. `None` if `Init` gives none.
-    pub place: Option<Place>,
+    pub position: Option<StartPosition>,
     /// Its speed in m/s, if it is an absolute one.
     pub speed: Option<f64>,
     /// Kinds of its other actions.
@@ -21,7 +21,7 @@ pub struct Opening {
 
 /// Position of an entity at the start.
 #[derive(Debug)]
-pub struct Place {
+pub struct StartPosition {
     /// The position as it is written, such as "road `1`, lane `-1`, s 50 m".
     pub written: String,
     /// `x` and `y` in m and the heading in rad, if they are known.
@@ -67,7 +67,7 @@ fn opening(
         .filter(|it| speed(it).is_none() && !it.action.is("TeleportAction"));
     Opening {
         entity: entity.to_owned(),
-        place: last.map(|(at, start)| Place {
+        position: last.map(|(at, start)| StartPosition {
             written: written(start.position),
             world: origins.place(at).map(|it| [it.x, it.y, it.heading]),
         }),

@@ -2,6 +2,7 @@
 //!
 //! The rules report what is wrong with a scenario. The story shows what it does, for people.
 
+mod gaps;
 mod init;
 mod never;
 mod waits;
@@ -11,7 +12,9 @@ use qcbus_sdk::{Model as _, Subject, Unbuilt};
 
 use crate::model::Scene;
 
-pub use init::{Opening, Place};
+pub use crate::families::actions::short;
+pub use gaps::Gap;
+pub use init::{Opening, StartPosition};
 pub use qcbus_openscenario::{Moment, StoryKind};
 
 /// What a scenario does in a run.
@@ -23,15 +26,17 @@ pub struct Story {
     pub globals: Vec<String>,
     /// Whether times are known. They are unknown if a part of the storyboard is.
     pub is_timed: bool,
+    /// Unknown parts of the storyboard.
+    pub gaps: Vec<Gap>,
     /// Storyboard elements. Each comes after its parent and before its next sibling.
-    pub elements: Vec<Part>,
+    pub elements: Vec<StoryboardElement>,
     /// End of the run.
     pub end: End,
 }
 
 /// A storyboard element.
 #[derive(Debug)]
-pub struct Part {
+pub struct StoryboardElement {
     /// Its kind.
     pub kind: StoryKind,
     /// Its name with parameters replaced, if it is known.
@@ -42,8 +47,10 @@ pub struct Part {
     pub parent: Option<usize>,
     /// Name of the action's element, such as `SpeedAction`.
     pub action: Option<String>,
-    /// Actors of a maneuver group.
+    /// Named actors of a maneuver group.
     pub actors: Vec<String>,
+    /// Whether the entities that trigger the act are actors of the maneuver group, too.
+    pub are_triggering_actors: bool,
     /// File, row and column.
     pub place: String,
     /// Times by the standard.
@@ -85,9 +92,11 @@ impl Story {
     /// story.
     ///
     /// # Errors
-    /// As the model of the rules: without a root element, or in an unsupported version.
-    pub fn of(subject: &Subject<'_>) -> Result<Story, Unbuilt> {
-        let scenario = Scene::build(subject)?;
+    /// The reason if the scenario has no root element or an unsupported version.
+    pub fn of(subject: &Subject<'_>) -> Result<Story, String> {
+        let scenario = Scene::build(subject).map_err(|why| match why {
+            Unbuilt::NotApplicable(why) | Unbuilt::Broken(why) | Unbuilt::Failed(why) => why,
+        })?;
         let timeline = scenario.timeline();
         let elements = scenario.storyboard().elements();
         let mut depths: Vec<usize> = Vec::with_capacity(elements.len());
@@ -96,26 +105,27 @@ impl Story {
             let above = one.parent().and_then(|parent| depths.get(parent));
             depths.push(above.map_or(0, |depth| depth + 1));
             let depth = depths.last().copied().unwrap_or(0);
-            parts.push(part(&scenario, timeline, place, one, depth));
+            parts.push(told(&scenario, timeline, place, one, depth));
         }
         let (openings, globals) = init::read(&scenario);
         Ok(Story {
             openings,
             globals,
             is_timed: timeline.is_some(),
+            gaps: gaps::all(&scenario),
             elements: parts,
             end: end(&scenario, timeline),
         })
     }
 }
 
-fn part<'d>(
+fn told<'d>(
     scenario: &Scenario<'d>,
     timeline: Option<&Timeline>,
     place: usize,
     one: &StoryElement<'d>,
     depth: usize,
-) -> Part {
+) -> StoryboardElement {
     let element = one.element(scenario);
     let times = |strictness| match timeline.and_then(|it| it.spans(strictness).get(place)) {
         Some(span) => Times::of(span),
@@ -124,16 +134,18 @@ fn part<'d>(
     let trigger = element
         .child("StartTrigger")
         .filter(|_| matches!(one.kind(), StoryKind::Act | StoryKind::Event));
-    Part {
+    let (actors, are_triggering_actors) = match one.kind() {
+        StoryKind::ManeuverGroup => actors(element),
+        _ => (Vec::new(), false),
+    };
+    StoryboardElement {
         kind: one.kind(),
         name: one.name().map(str::to_owned),
         depth,
         parent: one.parent(),
         action: action_of(element),
-        actors: match one.kind() {
-            StoryKind::ManeuverGroup => actors(element),
-            _ => Vec::new(),
-        },
+        actors,
+        are_triggering_actors,
         place: place_of(element),
         standard: times(Strictness::Standard),
         tolerant: times(Strictness::Tolerant),
@@ -193,19 +205,16 @@ fn inner(mut kind: Element<'_, '_>) -> Option<String> {
     Some(kind.name().to_owned())
 }
 
-fn actors(group: Element<'_, '_>) -> Vec<String> {
+/// Returns the named actors, and whether the triggering entities are actors, too.
+fn actors(group: Element<'_, '_>) -> (Vec<String>, bool) {
     let Some(actors) = Actors::of(group) else {
-        return Vec::new();
+        return (Vec::new(), false);
     };
     let named = actors.named.iter();
-    let mut names: Vec<String> = named
+    let names = named
         .filter_map(|one| one.text("entityRef"))
-        .map(std::borrow::Cow::into_owned)
-        .collect();
-    if actors.triggering {
-        names.push("the triggering entities".to_owned());
-    }
-    names
+        .map(std::borrow::Cow::into_owned);
+    (names.collect(), actors.triggering)
 }
 
 fn place_of(element: Element<'_, '_>) -> String {

@@ -49,7 +49,7 @@ fn all<'d>(
     let reasons = reasons.filter_map(|cause| reason(scenario, timeline, trigger, *cause));
     let mut reasons: Vec<String> = reasons.collect();
     reasons.dedup();
-    (!reasons.is_empty()).then(|| reasons.join("; "))
+    (!reasons.is_empty()).then(|| reasons.join(", and because "))
 }
 
 fn reason<'d>(

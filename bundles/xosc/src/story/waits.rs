@@ -6,7 +6,7 @@ use crate::prelude::*;
 /// Maximum number of conditions of a trigger that are described.
 const MOST: usize = 4;
 
-/// Describes the conditions of a trigger.
+/// Describes the conditions of a trigger. The text follows "waits until".
 pub(super) fn trigger(trigger: Element<'_, '_>) -> String {
     let mut left = MOST;
     let mut more = 0_usize;
@@ -28,7 +28,7 @@ pub(super) fn trigger(trigger: Element<'_, '_>) -> String {
     }
     let text = groups.join(", or ");
     match (text.is_empty(), more) {
-        (true, _) => "an empty trigger".to_owned(),
+        (true, _) => "its trigger, which has no conditions, is true".to_owned(),
         (false, 0) => text,
         (false, more) => format!("{text}, and {more} more conditions"),
     }
@@ -43,14 +43,22 @@ pub(super) fn condition(condition: Element<'_, '_>) -> String {
         _ => {}
     }
     match condition.number("delay").filter(|delay| *delay > 0.0) {
-        Some(delay) => format!("{text}, {} s later", short(delay)),
+        Some(delay) => format!("{text} (delay {} s)", short(delay)),
         None => text,
     }
 }
 
 fn expression(condition: Element<'_, '_>) -> Option<String> {
     if let Some(by_value) = condition.child("ByValueCondition") {
-        return Some(value(by_value.children().next()?));
+        let kind = by_value.children().next()?;
+        // CARLA's criteria compare a parameter with an empty name. Only their own names differ.
+        let is_criterion = kind
+            .text("parameterRef")
+            .is_some_and(|name| name.is_empty());
+        return Some(match condition.text("name").filter(|_| is_criterion) {
+            Some(name) => format!("the condition `{name}` is true"),
+            None => value(kind),
+        });
     }
     let by_entity = condition.child("ByEntityCondition")?;
     let kind = by_entity.child("EntityCondition")?.children().next()?;
@@ -132,8 +140,8 @@ fn entity(kind: Element<'_, '_>, who: &str) -> String {
         },
         "ReachPositionCondition" => format!("{who} reaches a position"),
         "StandStillCondition" => format!("{who} stands still{}", lasts()),
-        "EndOfRoadCondition" => format!("{who} at the end of the road{}", lasts()),
-        "OffroadCondition" => format!("{who} off the road{}", lasts()),
+        "EndOfRoadCondition" => format!("{who} is at the end of the road{}", lasts()),
+        "OffroadCondition" => format!("{who} is off the road{}", lasts()),
         "CollisionCondition" => format!("{who} collides"),
         name => format!("`{name}` of {who}"),
     }
