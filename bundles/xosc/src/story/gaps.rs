@@ -49,7 +49,10 @@ fn within(around: Element<'_, '_>) -> Vec<Gap> {
             // A misspelt element may contain storyboard elements.
             name if StoryKind::of_element(name).is_some() => return None,
             name if is_known && child.class().is_none() => {
-                format!("`{name}` is not allowed in {}", called(around))
+                format!(
+                    "`{name}` is not allowed in {}, so its content is unknown",
+                    called(around)
+                )
             }
             _ => return None,
         };

@@ -5,6 +5,7 @@ use crate::families::actions::short;
 use crate::families::init::{self, InitAction};
 use crate::families::origins::Origins;
 use crate::prelude::*;
+use qcbus_opendrive::geometry::wrap_angle;
 
 /// Start of an entity.
 #[derive(Debug)]
@@ -24,7 +25,7 @@ pub struct Opening {
 pub struct StartPosition {
     /// The position as it is written, such as "road `1`, lane `-1`, s 50 m".
     pub written: String,
-    /// `x` and `y` in m and the heading in rad, if they are known.
+    /// `x` and `y` in m and the heading in rad in (-π, π], if they are known.
     pub world: Option<[f64; 3]>,
 }
 
@@ -69,7 +70,9 @@ fn opening(
         entity: entity.to_owned(),
         position: last.map(|(at, start)| StartPosition {
             written: written(start.position),
-            world: origins.place(at).map(|it| [it.x, it.y, it.heading]),
+            world: origins
+                .place(at)
+                .and_then(|it| Some([it.x, it.y, wrap_angle(it.heading)?])),
         }),
         speed: actions.iter().filter_map(speed).next_back(),
         actions: others.map(|it| it.action.name().to_owned()).collect(),
@@ -95,9 +98,9 @@ fn written(position: Element<'_, '_>) -> String {
         ],
         other => {
             let lanes = position.integer("dLane");
+            let from = text("entityRef").map_or_else(String::new, |it| format!(" from {it}"));
             let mut parts = vec![
-                Some(format!("`{other}`")),
-                text("entityRef").map(|it| format!("from {it}")),
+                Some(format!("`{other}`{from}")),
                 lanes.map(|by| format!("dLane {by}")),
             ];
             parts.extend(["ds", "dt", "dx", "dy", "dz", "offset"].map(number));

@@ -4,7 +4,7 @@ use super::waits;
 use crate::families::actions::short;
 use crate::families::impossible::described;
 use crate::families::timeline::{ends_never, state_never_comes};
-use crate::families::triggers::called;
+use crate::families::triggers::{called, edge_of_time};
 use crate::prelude::*;
 use qcbus_openscenario::{At, Cause, Strictness, Timeline};
 
@@ -75,10 +75,7 @@ fn reason<'d>(
                 None => format!("{} is never true", waits::condition(condition)),
             }
         }
-        Cause::Over { at } => format!(
-            "{} is over before it is checked for the first time",
-            waits::condition(condition(at)?)
-        ),
+        Cause::Over { at } => over(condition(at)?),
         Cause::Apart { one, other } => format!(
             "{} and {} are never true together",
             waits::condition(condition(one)?),
@@ -94,4 +91,16 @@ fn reason<'d>(
             format!("it has the priority `skip`, and {other} runs whenever it is triggered")
         }
     })
+}
+
+/// Describes why a condition is never true when it is checked.
+fn over(condition: Element<'_, '_>) -> String {
+    let text = waits::condition(condition);
+    match (edge_of_time(condition), condition.word("conditionEdge")) {
+        (Some((_, why)), _) => why,
+        (None, Some(edge)) if edge != "none" => {
+            format!("the `{edge}` edge of {text} comes before it is first looked at")
+        }
+        _ => format!("{text} is true only before it is first looked at"),
+    }
 }

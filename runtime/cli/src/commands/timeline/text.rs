@@ -12,7 +12,12 @@ const MOST_GAPS: usize = 10;
 
 /// Returns the story as text. Only colours in it are control codes.
 pub(super) fn of(story: &Story) -> String {
-    let mut lines = vec!["Init".to_owned()];
+    let mut lines = vec![
+        match story.openings.is_empty() && story.globals.is_empty() {
+            true => "Init: no entities and no global actions".to_owned(),
+            false => "Init".to_owned(),
+        },
+    ];
     lines.extend(story.openings.iter().map(opening));
     if !story.globals.is_empty() {
         lines.push(plain(&format!(
@@ -43,10 +48,10 @@ pub(super) fn of(story: &Story) -> String {
 
 fn opening(opening: &Opening) -> String {
     let mut facts = Vec::new();
-    match &opening.position {
-        None => facts.push("no position in `Init`".to_owned()),
-        Some(position) => facts.extend(place(position)),
-    }
+    facts.push(match &opening.position {
+        None => "no position in `Init`".to_owned(),
+        Some(position) => place(position),
+    });
     facts.extend(opening.speed.map(|speed| format!("{} m/s", short(speed))));
     if !opening.actions.is_empty() {
         facts.push(format!("`{}`", opening.actions.join("`, `")));
@@ -55,16 +60,16 @@ fn opening(opening: &Opening) -> String {
 }
 
 /// Formats a position as it is written, and its place in the world.
-fn place(position: &StartPosition) -> [String; 2] {
-    let written = position.written.clone();
+fn place(position: &StartPosition) -> String {
+    let written = &position.written;
     let Some([x, y, heading]) = position.world else {
-        return [written, "place on the map unknown".to_owned()];
+        return format!("{written}; place on the map unknown");
     };
     let place = format!("x {} m, y {} m", short(x), short(y));
     let heading = format!("heading {} rad", short(heading));
     match written.starts_with(&place) {
-        true => [written, heading],
-        false => [written, format!("{place}, {heading}")],
+        true => format!("{written}, {heading}"),
+        false => format!("{written}; {place}, {heading}"),
     }
 }
 
@@ -132,46 +137,47 @@ fn untimed(element: &StoryboardElement) -> Facts {
 
 /// Returns the facts about all elements.
 fn facts(story: &Story) -> Vec<Facts> {
-    let own: Vec<(String, String)> = story
-        .elements
-        .iter()
-        .map(|element| (start(story, element), end(story, element)))
-        .collect();
-    let all = story
-        .elements
-        .iter()
-        .zip(&own)
-        .map(|(element, (start, end))| {
-            let above = element.parent.and_then(|parent| {
-                let is_never = story.elements.get(parent)?.standard.start.is_never();
-                Some((own.get(parent)?, is_never))
-            });
-            if above.is_some_and(|(_, is_never)| is_never) {
-                return untimed(element);
-            }
-            let above = above.map(|(texts, _)| texts);
-            let is_never = element.standard.start.is_never();
-            // The start of an element with a trigger is a fact of its own.
-            let is_own = |above: &(String, String)| element.waits.is_some() || above.0 != *start;
-            let start = above.is_none_or(is_own).then(|| start.clone());
-            let end = above
-                .is_none_or(|above| above.1 != *end)
-                .then(|| end.clone());
-            match start.as_deref().zip(end.as_deref()).and_then(at_once) {
-                Some(both) => Facts {
-                    start: Some(both),
-                    end: None,
-                    waits: element.waits.clone(),
-                },
-                None => Facts {
-                    start,
-                    end: end.filter(|_| !is_never),
-                    // The reason of an element that never starts already names its conditions.
-                    waits: element.waits.clone().filter(|_| !is_never),
-                },
-            }
-        });
-    all.collect()
+    let elements = story.elements.iter();
+    let facts = elements.map(|element| {
+        let above = element.parent.and_then(|parent| story.elements.get(parent));
+        match above {
+            Some(above) if above.standard.start.is_never() => untimed(element),
+            above => own_facts(story, element, above),
+        }
+    });
+    facts.collect()
+}
+
+fn own_facts(
+    story: &Story,
+    element: &StoryboardElement,
+    above: Option<&StoryboardElement>,
+) -> Facts {
+    if element.standard.start.is_never() {
+        // The reason of an element that never starts already names its conditions.
+        return Facts {
+            start: Some(start(element, 0.0)),
+            ..Facts::default()
+        };
+    }
+    // An element starts after its parent in any case.
+    let known = above.map_or(0.0, |above| above.standard.start.earliest);
+    // The start of an element with a trigger is a fact of its own.
+    let is_own = |above: &StoryboardElement| {
+        element.waits.is_some() || start(above, 0.0) != start(element, 0.0)
+    };
+    let start = above.is_none_or(is_own).then(|| start(element, known));
+    let end_above = above.map(|above| end(story, above));
+    let end = Some(end(story, element)).filter(|end| end_above.as_ref() != Some(end));
+    let waits = element.waits.clone();
+    match start.as_deref().zip(end.as_deref()).and_then(at_once) {
+        Some(both) => Facts {
+            start: Some(both),
+            end: None,
+            waits,
+        },
+        None => Facts { start, end, waits },
+    }
 }
 
 /// Joins "starts at 3 s" and "ends at 3 s".
@@ -180,20 +186,24 @@ fn at_once((start, end): (&str, &str)) -> Option<String> {
         return Some("start and end unknown".to_owned());
     }
     let (start, end) = (start.strip_prefix("starts ")?, end.strip_prefix("ends ")?);
-    (start == end).then(|| format!("starts and ends {start}"))
+    let rough = start
+        .strip_prefix("at ")
+        .map(|time| format!("at about {time}"));
+    let is_same = start == end || rough.as_deref() == Some(end);
+    is_same.then(|| format!("starts and ends {end}"))
 }
 
-fn start(story: &Story, element: &StoryboardElement) -> String {
+/// Describes the start of an element. The reader knows that it is not before `known`.
+fn start(element: &StoryboardElement, known: f64) -> String {
     let standard = element.standard.start;
-    let above = element.parent.and_then(|parent| story.elements.get(parent));
-    // An element starts after its parent in any case.
-    let known = above.map_or(0.0, |above| above.standard.start.earliest);
-    let mut text = match standard.is_never() {
-        true => format!("{}{}", red("never starts"), because(&element.never_starts)),
-        false => moment("start", standard, known),
-    };
+    let own = moment("start", standard, known);
     let tolerant = moment("start", element.tolerant.start, 0.0);
-    if is_definite(standard) && tolerant != moment("start", standard, known) {
+    let differs = is_definite(standard) && tolerant != own;
+    let mut text = match standard.is_never() {
+        true => format!("{}{}", red(&own), because(&element.never_starts)),
+        false => own,
+    };
+    if differs {
         let tolerant = match tolerant.as_str() {
             "start unknown" => "may start at any time or never",
             text => text,
@@ -250,6 +260,12 @@ fn is_definite(moment: Moment) -> bool {
 /// Range in seconds that is shown as one time. Simulators need some steps for a transition.
 const ONE_TIME: f64 = 0.45;
 
+/// Range in seconds that is shown as one rough time. Transitions often follow each other.
+const ROUGH_TIME: f64 = 1.0;
+
+/// Difference in seconds that is not shown.
+const ROUNDED: f64 = 0.001;
+
 /// Formats a moment: "starts at 3 s", "starts between 2 and 5 s", "start unknown". The reader knows
 /// that it is not before `known`.
 fn moment(word: &str, moment: Moment, known: f64) -> String {
@@ -258,14 +274,15 @@ fn moment(word: &str, moment: Moment, known: f64) -> String {
         return format!("never {word}s");
     }
     if !moment.is_certain() {
-        return match moment.earliest > known + ONE_TIME {
+        return match moment.earliest > known + ROUNDED {
             true => format!("{word}s at {earliest} s at the earliest, or never"),
             false => format!("{word} unknown"),
         };
     }
-    match moment.latest - moment.earliest <= ONE_TIME {
-        true => format!("{word}s at {earliest} s"),
-        false => format!("{word}s between {earliest} and {} s", short(moment.latest)),
+    match moment.latest - moment.earliest {
+        range if range <= ONE_TIME => format!("{word}s at {earliest} s"),
+        range if range <= ROUGH_TIME => format!("{word}s at about {earliest} s"),
+        _ => format!("{word}s between {earliest} and {} s", short(moment.latest)),
     }
 }
 
