@@ -21,4 +21,5 @@ mod output;
 mod own_schemas;
 mod pages;
 mod references;
+mod timeline;
 mod warm;

@@ -1,15 +1,12 @@
 //! A story for programs.
 
-use std::path::Path;
-
-use qcbus_messages::path_text::to_text;
 use qcbus_xosc::story::{Moment, Opening, StoryboardElement};
 use serde_json::{Value, json};
 
 use super::{Told, Warning};
 
 /// Returns the story as JSON. `docs/timeline.md` describes its keys.
-pub(super) fn of(path: &Path, told: &Told) -> Value {
+pub(super) fn of(told: &Told) -> Value {
     let story = &told.story;
     let end = &story.end;
     let noted = |text: &str, place: &str| json!({"text": text, "place": place});
@@ -18,7 +15,7 @@ pub(super) fn of(path: &Path, told: &Told) -> Value {
     let gaps = story.gaps.iter().map(|gap| noted(&gap.text, &gap.place));
     json!({
         "schema": 1,
-        "file": to_text(path),
+        "file": told.file,
         "warnings": warnings.collect::<Vec<_>>(),
         "timesKnown": story.is_timed,
         "unknown": gaps.collect::<Vec<_>>(),
@@ -71,6 +68,8 @@ fn element(element: &StoryboardElement) -> Value {
 
 /// Returns a moment: `earliest` is null for never, `latest` is null if it may never come.
 fn moment(moment: Moment) -> Value {
-    let finite = |seconds: f64| seconds.is_finite().then_some(seconds);
+    // "After 3 s" is computed as 3.000001 s.
+    let rounded = |seconds: f64| (seconds * 1000.0).round() / 1000.0;
+    let finite = |seconds: f64| seconds.is_finite().then(|| rounded(seconds));
     json!({"earliest": finite(moment.earliest), "latest": finite(moment.latest)})
 }

@@ -17,6 +17,8 @@ use crate::talk;
 
 /// A story and the references of the scenario that have no target.
 struct Told {
+    /// Absolute path of the scenario, and its member if it is in an archive.
+    file: String,
     story: Story,
     warnings: Vec<Warning>,
 }
@@ -42,7 +44,7 @@ pub fn run(args: &TimelineArgs) -> Exit {
                 );
             }
             talk::print(&match args.json {
-                true => format!("{:#}\n", json::of(&args.file, &told)),
+                true => format!("{:#}\n", json::of(&told)),
                 false => text::of(&told.story),
             });
             // Without times, the elements that are shown may be incomplete.
@@ -63,7 +65,7 @@ fn told(path: &Path) -> Result<Told, Failed> {
     let subject = loaded
         .subject(&qcbus_xosc::BUNDLE)
         .map_err(|error| internal(&error))?;
-    refuse_unreadable(path, &subject)?;
+    refuse_unreadable(&subject)?;
     let root = subject.root().root();
     if root.is_none_or(|root| root.child("Storyboard").is_none()) {
         let text = format!(
@@ -79,8 +81,12 @@ fn told(path: &Path) -> Result<Told, Failed> {
     let remarks = loaded.remarks(&[]).map_err(|error| internal(&error))?;
     let issues = remarks.iter().filter_map(|remark| remark.issue.as_ref());
     let issues = issues.filter(|issue| issue.level != Level::Information);
-    let warnings = issues.map(|issue| warning(path, issue)).collect();
-    Ok(Told { story, warnings })
+    let file = subject.written().path();
+    Ok(Told {
+        file: file.to_owned(),
+        story,
+        warnings: issues.map(|issue| warning(file, issue)).collect(),
+    })
 }
 
 fn internal(error: &LoadError) -> Failed {
@@ -88,7 +94,7 @@ fn internal(error: &LoadError) -> Failed {
 }
 
 /// Returns an error if the scenario or a scenario that it refers to cannot be read.
-fn refuse_unreadable(path: &Path, subject: &Subject<'_>) -> Result<(), Failed> {
+fn refuse_unreadable(subject: &Subject<'_>) -> Result<(), Failed> {
     if subject.is_expanded() {
         return Ok(());
     }
@@ -96,21 +102,21 @@ fn refuse_unreadable(path: &Path, subject: &Subject<'_>) -> Result<(), Failed> {
         return Ok(());
     };
     // The reason often begins with its place.
-    let text = match why.text.starts_with(&to_text(path)) {
+    let text = match why.text.starts_with(subject.written().path()) {
         true => why.text,
         false => format!("{}: {}", why.place, why.text),
     };
     Err((Exit::Rejected, text))
 }
 
-fn warning(path: &Path, issue: &Issue) -> Warning {
+fn warning(file: &str, issue: &Issue) -> Warning {
     let places = issue.locations.iter().flat_map(|it| &it.places);
     let mut positions = places.filter_map(|place| match place {
-        Location::File { row, column, .. } => Some(format!("{}:{row}:{column}", to_text(path))),
+        Location::File { row, column, .. } => Some(format!("{file}:{row}:{column}")),
         _ => None,
     });
     Warning {
         text: issue.description.clone(),
-        place: positions.next().unwrap_or_else(|| to_text(path)),
+        place: positions.next().unwrap_or_else(|| file.to_owned()),
     }
 }
