@@ -1,5 +1,7 @@
 //! `qcbus timeline`: the story of a scenario as text and as JSON, and scenarios without one.
 
+use std::path::Path;
+
 use serde_json::{Value, json};
 
 use crate::support::cli::{Cli, Said, sample_farm};
@@ -275,6 +277,38 @@ fn archive_has_the_story_of_its_expansion() {
         cli.qcbus(&["timeline", "modular/convoy.xosc"]).stdout
     );
     insta::assert_snapshot!(said.whole(&cli));
+}
+
+/// Returns the page about the command.
+fn page() -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    std::fs::read_to_string(root.join("docs/timeline.md")).unwrap()
+}
+
+#[test]
+fn document_shows_the_story_of_the_sample() {
+    let sample = sample_farm().join("modular/convoy.xosc");
+    let said = Cli::new().qcbus(&["timeline", sample.to_str().unwrap()]);
+    let block = format!("```text\n{}```", said.stdout);
+    assert!(page().contains(&block), "{block}");
+}
+
+#[test]
+fn document_describes_every_key() {
+    let sample = sample_farm().join("modular/convoy.xosc");
+    let said = Cli::new().qcbus(&["timeline", sample.to_str().unwrap(), "--json"]);
+    let story = as_json(&said);
+    let page = page();
+    for object in [
+        &story,
+        &story["init"][0],
+        &story["elements"][0],
+        &story["run"],
+    ] {
+        for key in object.as_object().unwrap().keys() {
+            assert!(page.contains(&format!("`{key}`")), "{key}");
+        }
+    }
 }
 
 #[test]

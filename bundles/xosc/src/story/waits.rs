@@ -30,6 +30,7 @@ pub(super) fn trigger(trigger: Element<'_, '_>) -> String {
     match (text.is_empty(), more) {
         (true, _) => "its trigger, which has no conditions, is true".to_owned(),
         (false, 0) => text,
+        (false, 1) => format!("{text}, and 1 more condition"),
         (false, more) => format!("{text}, and {more} more conditions"),
     }
 }
