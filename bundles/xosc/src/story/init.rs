@@ -57,8 +57,8 @@ fn opening(
     actions: &[&InitAction<'_, '_>],
     origins: &Origins<'_, '_, '_, '_>,
 ) -> Opening {
-    let starts = origins.starts.iter().enumerate();
-    let last = starts.filter(|(_, start)| start.name == entity).last();
+    let mut starts = origins.starts.iter().enumerate();
+    let last = starts.rfind(|(_, start)| start.name == entity);
     let speed = |one: &&InitAction<'_, '_>| {
         let path = ["SpeedActionTarget", "AbsoluteTargetSpeed"];
         one.action.path(&path)?.number("value")
