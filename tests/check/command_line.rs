@@ -37,6 +37,7 @@ fn help_of_every_command() {
             "bundle remove --help",
             "rule --help",
             "config check --help",
+            "timeline --help",
             "doctor --help",
         ]
     ));

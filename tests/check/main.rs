@@ -22,4 +22,5 @@ mod output;
 mod own_schemas;
 mod pages;
 mod references;
+mod timeline;
 mod warm;

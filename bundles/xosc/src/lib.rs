@@ -8,6 +8,7 @@ mod families;
 mod model;
 mod prelude;
 mod rules;
+pub mod story;
 
 use qcbus_document::FileKind;
 use qcbus_sdk::{Bundle, Version, basic};

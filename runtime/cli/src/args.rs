@@ -63,6 +63,8 @@ pub enum Command {
     /// Compile XML schemas to tables
     #[command(subcommand)]
     Schema(SchemaCommand),
+    /// Show when the elements of a scenario start and end, and why
+    Timeline(TimelineArgs),
     /// Convert a modular scenario to a plain scenario
     Expand(ExpandArgs),
     /// Pack a modular scenario and its referenced files into an archive
@@ -536,6 +538,19 @@ pub struct RuleArgs {
     /// Broker to ask about the rules of other bundles.
     #[command(flatten)]
     pub instance: InstanceArgs,
+}
+
+/// `qcbus timeline`.
+#[derive(Debug, ClapArgs)]
+pub struct TimelineArgs {
+    /// A scenario (.xosc) or an archive of a modular one (.mosc)
+    pub file: PathBuf,
+    /// Print JSON for programs
+    #[arg(long)]
+    pub json: bool,
+    /// When to use colour
+    #[arg(long, value_name = "WHEN", value_enum, default_value_t = ColorArg::Auto)]
+    pub color: ColorArg,
 }
 
 /// `qcbus expand`.

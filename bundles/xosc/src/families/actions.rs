@@ -73,7 +73,7 @@ pub(crate) fn domains(private: Element<'_, '_>) -> Vec<Domain> {
 }
 
 /// Formats a number with at most three decimals.
-pub(crate) fn short(value: f64) -> String {
+pub fn short(value: f64) -> String {
     let rounded = (value * 1000.0).round() / 1000.0;
     format!("{}", if rounded == 0.0 { 0.0 } else { rounded })
 }

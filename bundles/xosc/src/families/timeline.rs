@@ -128,6 +128,16 @@ pub(crate) fn state_never_comes(
     format!("`{word}` of {name} never comes{why}")
 }
 
+/// Describes why an element never ends: "the action `Follow` has `continuous="true"` and does not
+/// end by itself".
+pub(crate) fn ends_never(
+    scenario: &Scenario<'_>,
+    timeline: &Timeline,
+    of: usize,
+) -> Option<String> {
+    why(scenario, timeline, "completeState", of)
+}
+
 fn why(scenario: &Scenario<'_>, timeline: &Timeline, word: &str, of: usize) -> Option<String> {
     let plan = &timeline.plan;
     let part = plan.parts.get(of)?;

@@ -81,7 +81,7 @@ fn written_out(text: &str) -> Result<Exit, Failed> {
 }
 
 /// Reads a modular scenario and all files that belong to it.
-fn load(path: &Path) -> Result<Loaded, Failed> {
+pub(super) fn load(path: &Path) -> Result<Loaded, Failed> {
     let folder = path.parent().filter(|it| !it.as_os_str().is_empty());
     let boundary = folder.unwrap_or(Path::new("."));
     let usage = |error: qcbus_sdk::LoadError| (Exit::Usage, format!("failed to {error}"));
@@ -144,12 +144,13 @@ fn say_moved(expansion: &Expansion<'_>, args: &ExpandArgs) {
 }
 
 /// Reason why no plain scenario can be made, with its place.
-struct InTheWay {
-    place: String,
-    text: String,
+pub(super) struct InTheWay {
+    pub(super) place: String,
+    pub(super) text: String,
 }
 
-fn in_the_way(expansion: &Expansion<'_>) -> Option<InTheWay> {
+/// Returns the first reason why no plain scenario can be made, or `None`.
+pub(super) fn in_the_way(expansion: &Expansion<'_>) -> Option<InTheWay> {
     let root = expansion.pieces.first()?.document;
     if root.root().is_none() {
         let fault = root.faults().next();

@@ -22,6 +22,7 @@ mod serve;
 mod settings;
 mod status;
 mod stops;
+mod timeline;
 mod trials;
 mod upgrade;
 
@@ -93,6 +94,7 @@ pub fn run(args: Args) -> Exit {
             config::check(&file, bundles_d.as_deref())
         }
         Command::Schema(SchemaCommand::Compile { path, output }) => schema::compile(&path, &output),
+        Command::Timeline(args) => timeline::run(&args),
         Command::Expand(args) => expand::run(&args),
         Command::Pack(args) => pack::run(&args),
         Command::Doctor(args) => doctor::run(&args),
