@@ -72,7 +72,7 @@ fn reason<'d>(
             let condition = condition(at)?;
             match scenario.impossible(condition) {
                 Some(impossible) => described(&impossible),
-                None => format!("{} is never true", waits::condition(condition)),
+                None => format!("it is never the case that {}", waits::condition(condition)),
             }
         }
         Cause::Over { at } => over(condition(at)?),

@@ -100,7 +100,12 @@ fn value(kind: Element<'_, '_>) -> String {
         "TrafficSignalCondition" => {
             format!("signal `{}` shows `{}`", text("name"), text("state"))
         }
-        other => format!("`{other}`"),
+        "TrafficSignalControllerCondition" => format!(
+            "traffic signal controller `{}` is in phase `{}`",
+            text("trafficSignalControllerRef"),
+            text("phase")
+        ),
+        other => format!("`{other}` is true"),
     }
 }
 
@@ -144,7 +149,7 @@ fn entity(kind: Element<'_, '_>, who: &str) -> String {
         "EndOfRoadCondition" => format!("{who} is at the end of the road{}", lasts()),
         "OffroadCondition" => format!("{who} is off the road{}", lasts()),
         "CollisionCondition" => format!("{who} collides"),
-        name => format!("`{name}` of {who}"),
+        name => format!("`{name}` of {who} is true"),
     }
 }
 
