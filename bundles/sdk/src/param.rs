@@ -165,6 +165,7 @@ impl Values {
             };
             Ok((*param, value))
         });
+        let values = values.collect::<Result<_, ParamError>>()?;
         let levels_of_asam = match configured(LEVELS.name).as_deref().map(str::trim) {
             None | Some(LEVELS_OF_READERS) => false,
             Some(LEVELS_OF_ASAM) => true,
@@ -177,7 +178,7 @@ impl Values {
             }
         };
         Ok(Values {
-            values: values.collect::<Result<_, ParamError>>()?,
+            values,
             levels_of_asam,
         })
     }
@@ -263,6 +264,27 @@ mod tests {
                 ("gap".into(), "2.5".into()),
                 ("strict".into(), "false".into())
             ]
+        );
+    }
+
+    #[test]
+    fn levels_are_those_of_readers_or_of_asam() {
+        let resolve = |value: Option<&str>| {
+            Values::resolve(&[], |name| {
+                value.filter(|_| name == LEVELS.name).map(str::to_owned)
+            })
+        };
+        for (value, of_asam) in [
+            (None, false),
+            (Some("readers"), false),
+            (Some(" asam "), true),
+        ] {
+            assert_eq!(resolve(value).unwrap().levels_of_asam, of_asam, "{value:?}");
+        }
+        let error = resolve(Some("strict")).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "the parameter `qcbus.levels` is `strict`, but must be `readers` or `asam`"
         );
     }
 
