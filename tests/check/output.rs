@@ -164,7 +164,7 @@ fn ignored_rules_are_named_in_output_and_result() {
     assert!(!said.stdout.contains("elementId"), "{whole}");
     assert!(
         said.stdout
-            .contains("not requested, so the verdicts do not cover it: 1 of"),
+            .contains("not requested, so the verdicts do not cover it: 2 of"),
         "{whole}"
     );
     let results = cli.result(&format!("out/{file}.xqar"));
