@@ -37,7 +37,10 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         let Some((from, to)) = lanes.filter(|(from, to)| from.kind() != to.kind()) else {
             continue;
         };
-        let clash = (is_route(from) && is_for_others(to)) || (is_route(to) && is_for_others(from));
+        let clash = (is_route(from) && is_for_others(to))
+            || (is_route(to) && is_for_others(from))
+            || runs_onto_shoulder(joint.from, from, to)
+            || runs_onto_shoulder(joint.to, to, from);
         if !clash || !is_wide(joint, from, to, found.number(&NARROW)) {
             continue;
         }
@@ -61,6 +64,12 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
 
 fn is_for_others(lane: LaneRef<'_, '_>) -> bool {
     lane.kind().is_some_and(|kind| FOR_OTHERS.contains(&kind))
+}
+
+/// Checks whether vehicles that follow a lane to this end continue on a shoulder.
+fn runs_onto_shoulder(end: LaneEnd, from: LaneRef<'_, '_>, to: LaneRef<'_, '_>) -> bool {
+    let leaves = Traffic::of(from).may_run_towards(end.end);
+    leaves && is_route(from) && to.kind() == Some("shoulder")
 }
 
 fn is_wide(joint: &LaneJoint<'_>, from: LaneRef<'_, '_>, to: LaneRef<'_, '_>, narrow: f64) -> bool {

@@ -11,13 +11,19 @@ const LEAST: Param = Param::number(
 );
 const MOST: Param = Param::number(
     "most",
-    12.0,
+    10.0,
     "m",
     "largest plausible width of a single lane for vehicles",
 );
+const ASIDE: Param = Param::number(
+    "aside",
+    20.0,
+    "m",
+    "largest plausible width of a lane for pedestrians, bicycles or parking, of a curb and of a shoulder",
+);
 const ANY: Param = Param::number(
     "any",
-    500.0,
+    100.0,
     "m",
     "largest plausible width of any other lane",
 );
@@ -38,7 +44,7 @@ const ABSURD: f64 = 1e9;
 
 pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
-    params: &[LEAST, MOST, ANY, LENGTH],
+    params: &[LEAST, MOST, ASIDE, ANY, LENGTH],
     each: Some(each),
     ..Rule::after(READABLE)
 };
@@ -52,25 +58,36 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         let wide = lane
             .widths()
             .stretches(length)
-            .find_map(|stretch| Some((stretch, wide(&stretch, traffic, found)?)));
+            .find_map(|stretch| Some((stretch, wide(&stretch, lane, found)?)));
         match wide {
-            Some((stretch, width)) => report_wide(lane, &stretch, width, traffic, found),
+            Some((stretch, width)) => report_wide(lane, &stretch, width, found),
             None if traffic && length >= found.number(&LENGTH) => narrow(lane, length, found),
             None => {}
         }
     }
 }
 
+/// Returns the largest plausible width of a lane, and a name for lanes of its kind.
+fn most(lane: LaneRef<'_, '_>, found: &Sink<'_>) -> (f64, String) {
+    let kind = lane.kind().unwrap_or_default();
+    match kind {
+        _ if is_route(lane) => (found.number(&MOST), "lane for vehicles".to_owned()),
+        "sidewalk" | "walking" | "biking" | "curb" | "shoulder" | "stop" | "parking" => {
+            (found.number(&ASIDE), format!("lane of type `{kind}`"))
+        }
+        _ => (found.number(&ANY), "lane".to_owned()),
+    }
+}
+
 /// Returns the width of a stretch that is too wide for a lane.
-fn wide(stretch: &Stretch<'_, '_>, traffic: bool, found: &Sink<'_>) -> Option<f64> {
+fn wide(stretch: &Stretch<'_, '_>, lane: LaneRef<'_, '_>, found: &Sink<'_>) -> Option<f64> {
     let length = stretch.length();
-    let any = found.number(&ANY);
+    let (most, _) = most(lane, found);
     let greatest = stretch.cubic.maximum(0.0, length)?.value;
-    if greatest > any {
+    if greatest > found.number(&ANY) {
         return (stretch.cubic.a.abs() < ABSURD).then_some(greatest);
     }
-    let most = found.number(&MOST);
-    if !traffic || greatest <= most || length < found.number(&LENGTH) {
+    if greatest <= most || length < found.number(&LENGTH) {
         return None;
     }
     // Lanes at junctions widen only at their ends.
@@ -81,18 +98,8 @@ fn wide(stretch: &Stretch<'_, '_>, traffic: bool, found: &Sink<'_>) -> Option<f6
     (least > most).then_some(greatest)
 }
 
-fn report_wide(
-    lane: LaneRef<'_, '_>,
-    stretch: &Stretch<'_, '_>,
-    width: f64,
-    traffic: bool,
-    found: &mut Sink<'_>,
-) {
-    let (most, what) = if traffic {
-        (found.number(&MOST), "lane for vehicles")
-    } else {
-        (found.number(&ANY), "lane")
-    };
+fn report_wide(lane: LaneRef<'_, '_>, stretch: &Stretch<'_, '_>, width: f64, found: &mut Sink<'_>) {
+    let (most, what) = most(lane, found);
     let text = format!(
         "{} is up to {} m wide; a {what} of more than {most} m is implausible; widths are in metres",
         lane_name(lane),
