@@ -145,10 +145,19 @@ fn say_later(later: &Later<'_>, stated: Option<Version>, found: &mut Sink<'_>, h
         1 => ", and one more feature of a later version".to_owned(),
         more => format!(", and {more} more features of later versions"),
     };
+    let remedy = match later.advice {
+        Some(version) => format!(
+            "set `revMinor` to {}, or remove the newer features",
+            version.minor
+        ),
+        None => "remove the newer features; a later `revMinor` alone would not help, because the file violates the later \
+                 versions at more places"
+            .to_owned(),
+    };
     let text = format!(
         "the header says version {stated}, but the file uses {}, which was introduced in version {} \
-         ({wherein}){more}; set `revMinor` to {}, or remove the newer features",
-        newest.what, newest.since, later.version.minor
+         ({wherein}){more}; {remedy}",
+        newest.what, newest.since
     );
     let finding = found.issue(later.header, text);
     let mut finding = finding.readers_level(harm.of_old_header);

@@ -8,7 +8,7 @@ use qcbus_document::{Document, FileKind};
 use crate::later::{Later, is_strange, later};
 use crate::model::Schema;
 use crate::validate::Overlay;
-use crate::versions::{SkipReason, Version, select, version_of};
+use crate::versions::{SHIPPED, SkipReason, Version, select, version_of};
 use crate::violation::{Limits, Report, Rest, Violation};
 
 /// A user schema that replaces the shipped one.
@@ -189,9 +189,14 @@ fn checked<'a>(
     };
     let report = schema.validate_with(document, options.limits, overlay);
     let is_own = sources.is_empty() && !newer && !report.is_valid();
-    let later = version
+    let mut later = version
         .filter(|_| is_own)
         .and_then(|version| later(document, kind, version, &report));
+    if let Some(later) = &mut later {
+        later.advice = best(later, &report, kind, |schema| {
+            schema.validate_with(document, options.limits, overlay)
+        });
+    }
     let Report { violations, rest } = match &later {
         None => report,
         Some(later) if kind == FileKind::Xodr => without(later, report),
@@ -215,6 +220,33 @@ fn checked<'a>(
         violations,
         rest,
     }
+}
+
+/// Returns the version with the fewest violations among those that have the later features, if it
+/// has no more of them than the report for the header's version. The first such version counts.
+fn best<'a>(
+    later: &Later<'_>,
+    stated: &Report<'a>,
+    kind: FileKind,
+    validate: impl Fn(&Schema) -> Report<'a>,
+) -> Option<Version> {
+    let tried = SHIPPED
+        .iter()
+        .filter(|one| same_kind(one.kind, kind) && one.version >= later.version)
+        .filter_map(|one| {
+            let chosen = select(kind, one.version).ok()?;
+            Some((one.version, count(&validate(chosen.schema))))
+        });
+    let best = tried.min_by_key(|(version, count)| (*count, *version));
+    best.filter(|(_, found)| *found <= count(stated))
+        .map(|(version, _)| version)
+}
+
+/// Returns the number of violations.
+fn count(report: &Report<'_>) -> u64 {
+    let listed = u64::try_from(report.violations.len()).unwrap_or(u64::MAX);
+    let rest = report.rest.iter().map(|rest| rest.count);
+    rest.fold(listed, u64::saturating_add)
 }
 
 /// Removes the uses of later features from a report for the header's version. Versions of OpenDRIVE

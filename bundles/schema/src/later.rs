@@ -16,6 +16,9 @@ pub struct Later<'a> {
     pub header: Attribute<'a>,
     /// The first version that has all of these features.
     pub version: Version,
+    /// The version that the header may name instead: the one with the fewest violations. `None` if
+    /// the document violates every version with these features at more places than its own.
+    pub advice: Option<Version>,
     /// One entry for each kind of feature at its first use. The newest ones come first.
     pub things: Vec<Thing<'a>>,
     /// Number of uses, including repeated ones.
@@ -136,6 +139,7 @@ pub(crate) fn later<'a>(
     Some(Later {
         header,
         version,
+        advice: None,
         things,
         count,
     })

@@ -329,6 +329,27 @@ fn features_of_later_version_are_reported_once() {
     assert_eq!(weighed("4", &speed("fast")).len(), 3);
 }
 
+/// In 1.4, `userData` needs no attributes. A later version would complain about each of them.
+#[test]
+fn version_is_advised_only_if_the_file_violates_it_less() {
+    let outlines = "<outlines><outline id=\"0\"><cornerLocal u=\"0\" v=\"0\" z=\"0\" height=\"1\"/></outline></outlines>";
+    let advice = |more: &str| {
+        let object = format!("<object id=\"1\" s=\"0\" t=\"0\" zOffset=\"0\">{outlines}</object>");
+        let text = map("revMajor=\"1\" revMinor=\"4\"", "").replace(
+            "</road>",
+            &format!("<objects>{object}</objects>{more}</road>"),
+        );
+        let bytes = image("t.xodr", &text);
+        match check(&open(&bytes), FileKind::Xodr, &Options::default()) {
+            Outcome::Checked(checked) => checked.later.unwrap().advice,
+            other => panic!("the version has a schema: {other:?}"),
+        }
+    };
+    // The outlines came with 1.5, which has other violations of this file than 1.6.
+    assert_eq!(advice("").map(|version| version.minor), Some(6));
+    assert_eq!(advice(&"<userData/>".repeat(20)), None);
+}
+
 #[test]
 fn features_of_later_version_are_not_reported_as_typos() {
     let outlines = "<outlines><outline id=\"0\"><cornerLocal u=\"0\" v=\"0\" z=\"0\" height=\"1\"/></outline></outlines>";
