@@ -24,8 +24,15 @@ pub(crate) struct View<'v> {
 }
 
 impl View<'_> {
-    /// Writes the headline, the places with source lines, the rule and the reason.
-    pub(crate) fn write(&self, out: &mut String, entry: &Entry<'_>, why: Option<&str>) {
+    /// Writes the headline, the places with source lines, the rule, the reason, and a note about
+    /// findings that are alike.
+    pub(crate) fn write(
+        &self,
+        out: &mut String,
+        entry: &Entry<'_>,
+        why: Option<&str>,
+        alike: &str,
+    ) {
         let gutter = gutter(&entry.places);
         self.headline(out, entry);
         for (number, place) in entry.places.iter().enumerate() {
@@ -49,6 +56,9 @@ impl View<'_> {
         }
         if let Some(why) = why {
             note("why", why);
+        }
+        if !alike.is_empty() {
+            note("also", alike);
         }
     }
 

@@ -6,6 +6,7 @@
 //! Parameters: `OutputFile` (see [`Output`]; in a shared file, each report is under a line
 //! `==== PATH ====`) and `LineWidth` in characters (40 to 1000, default 100).
 
+mod alike;
 mod concise;
 mod issue;
 mod paint;
@@ -61,6 +62,8 @@ pub struct Options {
     pub full_names: bool,
     /// Whether inapplicable checkers are listed with the reason and not only counted.
     pub inapplicable: bool,
+    /// Whether only the first of several findings is shown that differ only in numbers and places.
+    pub merges: bool,
 }
 
 impl Default for Options {
@@ -72,6 +75,7 @@ impl Default for Options {
             failed_names: usize::MAX,
             full_names: true,
             inapplicable: true,
+            merges: false,
         }
     }
 }
@@ -97,7 +101,15 @@ pub fn findings(result: &ResultMessage, options: &Options, sources: &dyn Sources
     let paint = Paint::new(options.color);
     let mut explained = std::collections::BTreeSet::new();
     let mut out = String::new();
-    for entry in &sorted(result) {
+    let entries = sorted(result);
+    let alike = match options.merges {
+        true => alike::notes(&entries),
+        false => vec![Some(String::new()); entries.len()],
+    };
+    for (entry, alike) in entries.iter().zip(alike) {
+        let Some(alike) = alike else {
+            continue;
+        };
         // The reason for a rule appears once per report and not under each of a hundred issues.
         let why = result.rules.get(&entry.issue.rule_uid);
         let why = why.filter(|_| explained.insert(entry.issue.rule_uid.as_str()));
@@ -108,7 +120,7 @@ pub fn findings(result: &ResultMessage, options: &Options, sources: &dyn Sources
             width: options.width,
             full_names: options.full_names,
         };
-        view.write(&mut out, entry, why.map(String::as_str));
+        view.write(&mut out, entry, why.map(String::as_str), &alike);
         out.push('\n');
     }
     out

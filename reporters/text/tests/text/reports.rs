@@ -345,3 +345,47 @@ fn new_reporter(color: bool, keep: bool) -> Box<dyn Reporter> {
         ..plain_run()
     })
 }
+
+#[test]
+fn findings_that_differ_only_in_numbers_are_shown_once() {
+    let wide = |row: u64| {
+        let text = format!("lane `-{row}` is {row}.5 m wide");
+        issue(Level::Warning, &text, UNIQUE, vec![at(row, 2, "/a", "")])
+    };
+    let narrow = issue(
+        Level::Warning,
+        "lane `-1` is 0.1 m narrow",
+        UNIQUE,
+        vec![at(5, 2, "/a", "")],
+    );
+    let said = |count: u64| {
+        let issues = (1..=count).map(wide).chain([narrow.clone()]).collect();
+        let found = checker("check_width", Status::Completed, "", issues);
+        let options = Options {
+            merges: true,
+            ..Options::default()
+        };
+        let result = result("a.xodr", Verdict::Accepted, vec![found]);
+        render(&result, &options, &pages())
+    };
+    let few = said(3);
+    assert!(
+        few.contains("3.5 m wide") && !few.contains("= also"),
+        "{few}"
+    );
+    let many = said(4);
+    assert!(
+        many.contains("1.5 m wide") && many.contains("0.1 m narrow"),
+        "{many}"
+    );
+    assert!(!many.contains("2.5 m wide"), "{many}");
+    assert!(
+        many.contains("3 more findings like this, in rows 2, 3, 4; `--verbose`"),
+        "{many}"
+    );
+    let more = said(12);
+    assert!(
+        more.contains("11 more findings like this, in rows 2, 3, 4, 5, 6, 7, 8, 9 and 3 others;"),
+        "{more}"
+    );
+}

@@ -202,6 +202,7 @@ impl Printer {
             failed_names: if self.args.verbose { usize::MAX } else { 10 },
             full_names: self.args.verbose,
             inapplicable: self.args.verbose,
+            merges: !self.args.verbose && !self.args.quiet,
         };
         let text = match self.terminal() {
             Terminal::Reporter => String::new(),
