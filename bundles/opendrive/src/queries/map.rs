@@ -167,6 +167,12 @@ impl<'a> RoadMap<'a> {
         &self.junctions
     }
 
+    /// Checks whether a junction has the id `-1`, by which a road says that it belongs to none. The
+    /// roads of this junction cannot be told from those outside of junctions.
+    pub fn has_reserved_junction(&self) -> bool {
+        self.junction("-1").is_some()
+    }
+
     /// Returns the first junction with this id.
     #[inline]
     pub fn junction(&self, id: &str) -> Option<&Junction<'a>> {

@@ -12,6 +12,10 @@ pub const RULE: Rule<Roads> = Rule {
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    // Another rule reports such a junction, and nothing is certain about its roads.
+    if map.has_reserved_junction() {
+        return;
+    }
     let used = Used::of(map);
     for (road, end, junction) in arms(map) {
         if !used.is_whole(junction, road) {

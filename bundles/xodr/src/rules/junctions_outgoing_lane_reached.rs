@@ -13,6 +13,10 @@ pub const RULE: Rule<Roads> = Rule {
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    // Another rule reports such a junction, and nothing is certain about its roads.
+    if map.has_reserved_junction() {
+        return;
+    }
     let used = Used::of(map);
     // `road.linkage.both_sides_consistency` reports roads that the junction does not mention.
     let known = Known::by(map);

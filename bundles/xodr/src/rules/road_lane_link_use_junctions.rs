@@ -10,6 +10,10 @@ pub const RULE: Rule<Roads> = Rule {
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    // Another rule reports such a junction, and nothing is certain about its roads.
+    if map.has_reserved_junction() {
+        return;
+    }
     // The lanes that are linked to each lane end, across roads that belong to no junction.
     let mut named: BTreeMap<LaneEnd, Vec<(LaneRef<'_, '_>, &LaneJoint<'_>)>> = BTreeMap::new();
     for joint in map.roads().iter().flat_map(|road| map.joints_of(road)) {

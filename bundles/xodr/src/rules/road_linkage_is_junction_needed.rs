@@ -12,6 +12,10 @@ pub const RULE: Rule<Roads> = Rule {
 };
 
 fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
+    // Another rule reports such a junction, and nothing is certain about its roads.
+    if map.has_reserved_junction() {
+        return;
+    }
     // The links to each road end, from roads outside junctions.
     let mut named: BTreeMap<RoadEnd, Vec<(&str, Node<'_>)>> = BTreeMap::new();
     for road in map.roads().iter().filter(|road| road.junction().is_none()) {

@@ -160,6 +160,15 @@ fn common_junctions_give_expected_findings() {
     let rows: Vec<Row> = vec![
         ("plain", Common::new().text(), &[]),
         (
+            "an id that means no junction",
+            ["junction=", "elementId=", "<junction id="]
+                .iter()
+                .fold(Common::new().text(), |text, at| {
+                    text.replace(&format!("{at}\"7\""), &format!("{at}\"-1\""))
+                }),
+            &["error junctions_cross_path_correct_junction_id"],
+        ),
+        (
             "an id in words",
             Common {
                 id: "seven",
