@@ -94,6 +94,8 @@ pub enum Detail {
     Number,
     /// The missing elements come later.
     Later,
+    /// The missing elements belong before this one, into its parent.
+    Before,
 }
 
 /// One violation of a schema.

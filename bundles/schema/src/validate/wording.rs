@@ -153,7 +153,8 @@ pub(super) fn missing_before(
             format!("<{name}> in <{parent_name}> comes too early: {list} must come before it");
         Wording::from(text).about(Detail::Later)
     } else {
-        format!("<{parent_name}> lacks {list}, which must come before <{name}>").into()
+        let text = format!("<{parent_name}> lacks {list}, which must come before <{name}>");
+        Wording::from(text).about(Detail::Before)
     };
     wording.excused(defect)
 }

@@ -43,7 +43,11 @@ const PLACES: [&str; 11] = [
 ];
 
 fn harm(violation: &Violation<'_>) -> Level {
-    let node = violation.node;
+    let parent = || violation.node.parent();
+    let node = match violation.detail {
+        Detail::Before => parent().unwrap_or(violation.node),
+        _ => violation.node,
+    };
     let around = || std::iter::once(node).chain(node.ancestors());
     let is_lenient = around().any(|it| LENIENT.iter().any(|name| it.is(name)));
     let attribute = violation.attribute.map(|attribute| attribute.name());
