@@ -15,3 +15,9 @@ pub(crate) fn note(text: &str) {
     // The error is ignored, because the note is only an aid.
     let _ = std::io::stderr().lock().write_all(text.as_bytes());
 }
+
+/// Checks whether a rule has run and leaves the verdict open because no rule judges the version of
+/// the file. `reason` is that of its ending.
+pub(crate) fn leaves_open(reason: &str) -> bool {
+    reason.starts_with(qcbus_sdk::UNKNOWN_VERSION)
+}

@@ -6,7 +6,8 @@ use qcbus_formats::pool::{CheckerOutcome, Remark};
 use qcbus_formats::xqar::{Issue, Level, Location, Locations, Status};
 
 use super::change::normal;
-use qcbus_sdk::{Loaded, Plan, UNKNOWN_VERSION, examine};
+use crate::leaves_open;
+use qcbus_sdk::{Loaded, Plan, examine};
 
 /// An issue, independent of the directory of the scenario.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -86,8 +87,7 @@ impl Reader<'_> {
     fn checker(&self, checker: &CheckerOutcome) -> Vec<Said> {
         let issues = checker.issues.iter();
         let mut all: Vec<Said> = issues.map(|it| self.issue(&checker.id, it)).collect();
-        let leaves_open = checker.reason().starts_with(UNKNOWN_VERSION);
-        if checker.status() == Status::Error && !leaves_open {
+        if checker.status() == Status::Error && !leaves_open(checker.reason()) {
             all.push(Said {
                 checker: checker.id.to_string(),
                 level: Level::Error,
