@@ -15,12 +15,14 @@ const ROWS: usize = 8;
 /// For each finding in order: `None` if an earlier one stands for it, else the note about those
 /// that it stands for, which may be empty.
 pub(crate) fn notes(entries: &[Entry<'_>]) -> Vec<Option<String>> {
-    let mut groups: HashMap<(Level, &str, String), Vec<usize>> = HashMap::new();
+    let mut groups: HashMap<(Level, &str, Option<&str>, String), Vec<usize>> = HashMap::new();
     for (number, entry) in entries.iter().enumerate() {
         let issue = entry.issue;
         let key = (
             issue.level,
             issue.rule_uid.as_str(),
+            // The named rows are those of one file.
+            entry.places.first().and_then(|place| place.path.as_deref()),
             shape(&issue.description),
         );
         groups.entry(key).or_default().push(number);

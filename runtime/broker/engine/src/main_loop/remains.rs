@@ -8,8 +8,8 @@ use qcbus_disk::Writer;
 use crate::options::Options;
 
 /// Removes partial files below the directories of the broker. A killed process that waits for the
-/// disk lives on for a while, and nobody reports its end if an earlier broker has started it. So
-/// the writers of the files that stay are remembered, and looked at again.
+/// disk lives on for a while, and nobody reports its end if an earlier broker has started it.
+/// Therefore the writers of the files that stay are remembered, and looked at again.
 #[derive(Debug, Clone)]
 pub(super) struct Remains {
     directories: Arc<[PathBuf]>,
