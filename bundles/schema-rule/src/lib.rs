@@ -15,7 +15,7 @@ pub use model::Validated;
 use model::{SCHEMA_DIR, SCHEMAS};
 use qcbus_document::{Attribute, Document, Node};
 use qcbus_schema::{Checked, Code, Later, Outcome, Rest, Severity, Version, Violation};
-use qcbus_sdk::{Level, Place, Rule, Sink, Subject};
+use qcbus_sdk::{Level, Place, Rule, Sink, Subject, fault_of};
 
 /// Common fields of the schema rules of all bundles, for struct update syntax (`..`).
 pub const RULE: Rule<Validated> = Rule {
@@ -60,9 +60,19 @@ pub fn run_with(checked: &Checked<'_>, found: &mut Sink<'_>, harm: &Harm) {
             None => Place::from(violation.node),
         };
         let severity = checked.severity(violation);
+        // A rule about the same attribute says more, so it is reported first.
+        let fault = match violation.attribute {
+            Some(attribute) => format!(
+                "attribute {} of {}",
+                attribute.name(),
+                fault_of(violation.node)
+            ),
+            None => fault_of(violation.node),
+        };
         let finding = found
             .issue(place, violation.text.as_str())
-            .level(level(severity));
+            .level(level(severity))
+            .follows(fault);
         if severity == Severity::Error {
             finding.readers_level((harm.of_violation)(violation));
         }

@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use qcbus_document::Node;
-use qcbus_formats::pool::Ending;
-use qcbus_formats::xqar::{DomainInfo, InfoElement, Issue, Level, Location, Metadata};
+use qcbus_formats::pool::{Cause, Ending, rule_info};
+use qcbus_formats::xqar::{DomainInfo, Issue, Level, Location, Metadata};
 
 use crate::param::MAX_ISSUES;
 use crate::place::{Place, Spot, copied_by, locate, locate_from, put_there};
@@ -463,16 +463,23 @@ impl Finding<'_, '_> {
     /// Names a further rule of the standard that the same fact violates. An issue has one UID, so
     /// this one becomes a separate fact, `qcbus.rule`.
     pub fn also_violates(self, uid: &str) -> Self {
-        let rule = InfoElement {
-            name: "Rule".to_owned(),
-            attributes: vec![("ruleUID".to_owned(), uid.to_owned())],
-            text: String::new(),
-            children: Vec::new(),
-        };
-        self.info(DomainInfo {
-            name: qcbus_formats::pool::RULE_INFO.to_owned(),
-            content: vec![rule],
-        })
+        self.info(rule_info(uid))
+    }
+
+    /// Names the fault. Findings of the bundle with the same key are about one fault: the worst of
+    /// them is reported, with the places of the others.
+    pub fn fault(self, key: impl Into<String>) -> Self {
+        self.cause(key.into(), false)
+    }
+
+    /// Names the fault that this finding follows from. It is like [`Self::fault`], but the finding
+    /// is not the first to be reported.
+    pub fn follows(self, key: impl Into<String>) -> Self {
+        self.cause(key.into(), true)
+    }
+
+    fn cause(self, key: String, follows: bool) -> Self {
+        self.info(Cause { key, follows }.to_info())
     }
 
     /// Sets another severity than the rule's. It is lowered in the same way as the rule's.
@@ -536,6 +543,12 @@ impl Finding<'_, '_> {
     fn is_listed(&self) -> bool {
         self.unlisted.is_none()
     }
+}
+
+/// Returns the name of a fault of an element, for [`Finding::fault`] and [`Finding::follows`]. The
+/// schema rule uses it for elements that lack something.
+pub fn fault_of(node: Node<'_>) -> String {
+    format!("element {} of {}", node.offset(), node.document().path())
 }
 
 /// Returns the next lower severity. Information stays information.

@@ -114,6 +114,30 @@ pub trait About<'d> {
     ) -> Finding<'_, 'd>;
 }
 
+/// Adds the name of a fault to a finding, if the fault is known.
+pub(crate) trait OfFault {
+    /// The finding is about this fault.
+    fn maybe_fault(self, fault: Option<String>) -> Self;
+    /// The finding is a consequence of this fault.
+    fn maybe_follows(self, fault: Option<String>) -> Self;
+}
+
+impl OfFault for Finding<'_, '_> {
+    fn maybe_fault(self, fault: Option<String>) -> Self {
+        match fault {
+            Some(fault) => self.fault(fault),
+            None => self,
+        }
+    }
+
+    fn maybe_follows(self, fault: Option<String>) -> Self {
+        match fault {
+            Some(fault) => self.follows(fault),
+            None => self,
+        }
+    }
+}
+
 impl<'d> About<'d> for Sink<'d> {
     fn about(
         &mut self,

@@ -1,6 +1,6 @@
 //! Names that most rules use.
 
-pub(crate) use crate::model::{About as _, Scene};
+pub(crate) use crate::model::{About as _, OfFault as _, Scene};
 pub(crate) use crate::rules::READABLE;
 pub(crate) use qcbus_document::{Attribute, Document, Node};
 pub(crate) use qcbus_opendrive::{Road, RoadMap, Side};

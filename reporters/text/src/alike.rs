@@ -41,7 +41,7 @@ pub(crate) fn notes(entries: &[Entry<'_>]) -> Vec<Option<String>> {
 }
 
 /// Returns a text without its numbers.
-fn shape(text: &str) -> String {
+pub(crate) fn shape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         let is_number = c.is_ascii_digit() || (c == '.' && out.ends_with('#'));

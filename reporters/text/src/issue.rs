@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use qcbus_formats::pool::{ALSO, ALSO_HERE, RULE_INFO};
 use qcbus_formats::xqar::{DomainInfo, InfoElement, Level};
 use qcbus_messages::{ResultMessage, shown};
 use qcbus_reporter_sdk::{
@@ -9,6 +10,7 @@ use qcbus_reporter_sdk::{
 };
 
 use crate::Entry;
+use crate::alike::shape;
 use crate::paint::Paint;
 use crate::snippet::snippet;
 use crate::wrap::wrap;
@@ -21,7 +23,15 @@ pub(crate) struct View<'v> {
     pub(crate) width: usize,
     /// Whether UID and checker are written in full, in addition to the rule's name in the headline.
     pub(crate) full_names: bool,
+    /// Whether only the first few findings about the same fault are shown.
+    pub(crate) merges: bool,
 }
+
+/// Maximum number of shown findings about the same fault.
+const MOST_JOINED: usize = 3;
+
+/// Maximum number of shown places of which the same is true.
+const MOST_ROWS: usize = 8;
 
 impl View<'_> {
     /// Writes the headline, the places with source lines, the rule, the reason, and a note about
@@ -35,7 +45,13 @@ impl View<'_> {
     ) {
         let gutter = gutter(&entry.places);
         self.headline(out, entry);
-        for (number, place) in entry.places.iter().enumerate() {
+        let (repeated, others): (Vec<_>, Vec<_>) = entry
+            .places
+            .iter()
+            .partition(|place| place.description == ALSO_HERE);
+        let (joined, places): (Vec<_>, Vec<_>) =
+            others.into_iter().partition(|place| is_joined(place));
+        for (number, place) in places.into_iter().enumerate() {
             self.place(out, place, entry.issue.level, gutter, number == 0);
         }
         if entry.places.is_empty() {
@@ -50,12 +66,23 @@ impl View<'_> {
         for info in &entry.issue.domain_info {
             match info.name.as_str() {
                 qcbus_formats::location::NAME => {}
-                qcbus_formats::pool::RULE_INFO => note("also violates", &further_rules(info)),
+                RULE_INFO => {
+                    let rules = further_rules(info, &joined);
+                    if !rules.is_empty() {
+                        note("also violates", &rules);
+                    }
+                }
                 name => note(&one_line(name), &flat(info)),
             }
         }
         if let Some(why) = why {
             note("why", why);
+        }
+        if !repeated.is_empty() {
+            note("also at", &self.rows(&repeated));
+        }
+        for text in self.joined(&entry.issue.description, &joined) {
+            note("also", &text);
         }
         if !alike.is_empty() {
             note("also", alike);
@@ -102,6 +129,71 @@ impl View<'_> {
         if !place.also.is_empty() {
             let also = place.also.iter().map(|&at| row_column(at)[1..].to_owned());
             self.note(out, gutter, "also at", &also.collect::<Vec<_>>().join(", "));
+        }
+    }
+
+    /// Returns the texts of joined findings. Those that differ only in numbers are shown once.
+    fn joined(&self, main: &str, joined: &[&IssueLocation]) -> Vec<String> {
+        let text_of = |place: &IssueLocation| {
+            let text = place.description.strip_prefix(ALSO);
+            text.unwrap_or_default().to_owned()
+        };
+        let whole = |place: &&IssueLocation| format!("{}{}", text_of(place), self.reference(place));
+        if !self.merges {
+            return joined.iter().map(whole).collect();
+        }
+        let mut groups: Vec<(String, Vec<&IssueLocation>)> = Vec::new();
+        for place in joined {
+            let shape = shape(&text_of(place));
+            match groups.iter_mut().find(|(other, _)| *other == shape) {
+                Some((_, members)) => members.push(place),
+                None => groups.push((shape, vec![place])),
+            }
+        }
+        let is_like_main = |of: &str| {
+            let words = of.rsplit_once(" [").map_or(of, |(words, _)| words);
+            words == shape(main.trim())
+        };
+        let text = |(shape, members): &(String, Vec<&IssueLocation>)| match members.as_slice() {
+            all if is_like_main(shape) => format!("similar findings: {}", self.rows(all)),
+            [one, others @ ..] if !others.is_empty() => {
+                let others = self.rows(others);
+                format!("{}; similar findings: {others}", whole(one))
+            }
+            members => members.iter().map(whole).collect(),
+        };
+        let mut texts: Vec<String> = groups.iter().take(MOST_JOINED).map(text).collect();
+        let hidden: usize = groups.iter().skip(MOST_JOINED).map(|it| it.1.len()).sum();
+        if hidden > 0 {
+            texts.push(format!("{hidden} more; `--verbose` prints them all"));
+        }
+        texts
+    }
+
+    /// Returns the positions of further places: `rows 7, 9, 12`.
+    fn rows(&self, places: &[&IssueLocation]) -> String {
+        let shown = if self.merges { MOST_ROWS } else { usize::MAX };
+        let name = |place: &&IssueLocation| match (&place.path, place.row) {
+            (None, Some(row)) => row.to_string(),
+            _ => self.name(place),
+        };
+        let mut names: Vec<String> = places.iter().map(name).collect();
+        names.dedup();
+        let word = if names.len() == 1 { "row" } else { "rows" };
+        let more = match names.len().saturating_sub(shown) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        names.truncate(shown);
+        format!("{word} {}{more}", names.join(", "))
+    }
+
+    /// Returns the position of another place in brackets: ` (row 7)`.
+    fn reference(&self, place: &IssueLocation) -> String {
+        match (&place.path, place.row) {
+            (Some(_), _) => format!(" ({})", self.name(place)),
+            (None, Some(row)) => format!(" (row {row})"),
+            (None, None) => String::new(),
         }
     }
 
@@ -172,10 +264,20 @@ fn gutter(places: &[IssueLocation]) -> usize {
     rows.max().map_or(1, |row| row.to_string().len().min(8))
 }
 
-/// Returns the UIDs of further rules that the same fact violates.
-fn further_rules(info: &DomainInfo) -> String {
+/// Checks whether a place stands for another finding about the same fault.
+fn is_joined(place: &IssueLocation) -> bool {
+    place.description.starts_with(ALSO)
+}
+
+/// Returns the UIDs of further rules that the same fact violates, without those of joined findings.
+fn further_rules(info: &DomainInfo, joined: &[&IssueLocation]) -> String {
     let values = info.content.iter().flat_map(|element| &element.attributes);
-    let uids: Vec<String> = values.map(|(_, uid)| one_line(uid)).collect();
+    let is_named = |uid: &str| {
+        let name = format!("[{}]", rule_name(uid, ""));
+        joined.iter().any(|it| it.description.ends_with(&name))
+    };
+    let uids = values.filter(|(_, uid)| !is_named(uid));
+    let uids: Vec<String> = uids.map(|(_, uid)| one_line(uid)).collect();
     uids.join(", ")
 }
 

@@ -119,6 +119,7 @@ pub fn findings(result: &ResultMessage, options: &Options, sources: &dyn Sources
             paint,
             width: options.width,
             full_names: options.full_names,
+            merges: options.merges,
         };
         view.write(&mut out, entry, why.map(String::as_str), &alike);
         out.push('\n');

@@ -180,6 +180,9 @@ pub struct CheckArgs {
     /// Use the levels of ASAM: what the standard demands is an error, even if no reader suffers
     #[arg(long)]
     pub strict: bool,
+    /// List every finding as an issue of its own, even if several are about one fault
+    #[arg(long)]
+    pub all: bool,
     /// Check each file independently: a rejected map does not reject the scenarios that use it
     #[arg(long)]
     pub own_verdict: bool,
@@ -410,6 +413,9 @@ pub struct ServeArgs {
     /// Use the levels of ASAM: what the standard demands is an error, even if no reader suffers
     #[arg(long)]
     pub strict: bool,
+    /// List every finding as an issue of its own, even if several are about one fault
+    #[arg(long)]
+    pub all: bool,
     /// Check each file independently: a rejected map does not reject the scenarios that use it
     #[arg(long)]
     pub own_verdict: bool,

@@ -399,6 +399,7 @@ fn pooled(document: Document<'_>, bundle: BundleOutcome) -> Result<xqar::Results
         bundles: vec![bundle],
         remarks: Vec::new(),
         scope: Scope::Whole,
+        separate: false,
         version: "1.0.0",
         build_date: BUILD_DATE,
     };

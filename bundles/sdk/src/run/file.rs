@@ -132,6 +132,7 @@ fn judge(plan: &Plan, loaded: &Loaded, permits: &Permits) -> Result<Judged, crat
         remarks: loaded.remarks(&bundles)?,
         bundles,
         scope: Scope::Alone,
+        separate: true,
         version: plan.bundle().version,
         build_date: BUILD_DATE,
     };

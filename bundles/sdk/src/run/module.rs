@@ -105,6 +105,7 @@ fn module(
             bundles,
             remarks,
             scope: Scope::Alone,
+            separate: true,
             version: bundle.version,
             build_date: BUILD_DATE,
         },

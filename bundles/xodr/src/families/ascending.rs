@@ -2,6 +2,7 @@
 
 use super::shown::{beside, number};
 use crate::prelude::*;
+use qcbus_sdk::fault_of;
 
 /// Maximum difference between two starts that count as equal.
 pub(crate) const TOLERANCE: Param = Param::number(
@@ -92,7 +93,10 @@ impl List<'_> {
             beside(start, ahead),
             number(ahead)
         );
-        let finding = found.issue(Place::attribute_or_node(node, by), text);
+        let parent = node.parent().map(fault_of).unwrap_or_default();
+        let finding = found
+            .issue(Place::attribute_or_node(node, by), text)
+            .fault(format!("order of {name} in {parent}"));
         let finding = match self.from {
             Some(from) => finding.road(self.road, from + start, 0.0),
             None => finding,

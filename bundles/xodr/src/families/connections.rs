@@ -1,5 +1,6 @@
 //! Connections of junctions (OpenDRIVE 1.9, 12.3 and 12.4).
 
+use super::faults::OfFault as _;
 use std::collections::BTreeMap;
 
 use super::on_road::{MAX_PLACES, OnRoad};
@@ -87,7 +88,10 @@ fn report(
         connection.incoming_road().unwrap_or_default()
     );
     let place = Place::attribute_or_node(connection.node(), "contactPoint");
-    let finding = found.issue(place, text).at_end(road, end);
+    let finding = found
+        .issue(place, text)
+        .at_end(road, end)
+        .of_junction(connection.node());
     match road.link_node() {
         Some(link) => finding.at(link, "the link of the connecting road"),
         None => finding,

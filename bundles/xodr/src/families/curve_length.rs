@@ -1,5 +1,6 @@
 //! Checks the length of parametric curves against their geometry (OpenDRIVE 1.9, 9.6).
 
+use super::faults::shape_of;
 use super::on_road::OnRoad;
 use crate::prelude::*;
 
@@ -108,5 +109,6 @@ fn report(mismatch: &Mismatch<'_, '_>, text: String, found: &mut Sink<'_>) {
     let middle = geometry.s().unwrap_or(0.0) + 0.5 * mismatch.length;
     found
         .issue(Place::attribute_or_node(geometry.node(), "length"), text)
-        .on(mismatch.road, middle, 0.0);
+        .on(mismatch.road, middle, 0.0)
+        .fault(shape_of(mismatch.road));
 }

@@ -15,6 +15,7 @@ pub(crate) mod dates;
 pub(crate) mod direct_overlap;
 pub(crate) mod driving;
 pub(crate) mod edges;
+pub(crate) mod faults;
 pub(crate) mod gantries;
 pub(crate) mod gap_levels;
 pub(crate) mod georeference;

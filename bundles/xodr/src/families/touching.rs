@@ -1,5 +1,6 @@
 //! Continuity of linked lanes (OpenDRIVE 1.9, annex D.1).
 
+use super::faults::OfFault as _;
 use std::f64::consts::PI;
 
 use super::driving::is_drivable;
@@ -213,6 +214,7 @@ impl Pair<'_, '_> {
             .at_lane_end(self.from, joint.from.end)
             .at(self.to.node(), "the second lane")
             .at_lane_end(self.to, joint.to.end)
+            .at_joint([(self.from, joint.from.end), (self.to, joint.to.end)])
     }
 }
 

@@ -1,6 +1,7 @@
 use crate::families::ids::{KINDS, Kind, Scope};
 use crate::prelude::*;
 use foldhash::{HashMap, HashSet};
+use qcbus_sdk::fault_of;
 use std::cell::OnceCell;
 
 pub const RULE: Rule<Document> = Rule {
@@ -53,7 +54,8 @@ fn check<'d>(kind: &Kind, document: &Document<'d>, found: &mut Sink<'_>) {
             );
             let finding = found
                 .issue(node, text)
-                .at(*first, format!("the first {} with this id", kind.name));
+                .at(*first, format!("the first {} with this id", kind.name))
+                .fault(format!("id of {}", fault_of(*first)));
             // Readers place each signal and object. Only a reference to it would be ambiguous.
             let beside = ["signal", "object"].contains(&kind.name);
             if beside && !used_ids.get_or_init(|| used(document)).contains(id) {

@@ -195,7 +195,10 @@ fn check(reference: &Reference, node: Node<'_>, defined: &Defined<'_>, found: &m
             Kind::of(class).name,
             of_another_type(reference, node, id, defined)
         );
-        found.issue(Place::attribute_or_node(node, reference.attribute), text);
+        let finding = found.issue(Place::attribute_or_node(node, reference.attribute), text);
+        if within.is_empty() {
+            finding.fault(format!("undefined {} {id}", Kind::of(class).name));
+        }
     }
 }
 

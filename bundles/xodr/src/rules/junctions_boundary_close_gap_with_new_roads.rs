@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use std::collections::BTreeSet;
 
 use crate::families::on_road::OnRoad;
@@ -76,5 +77,6 @@ fn check(
     found
         .issue(segment.node(), text)
         .at(road.node(), "the road")
-        .at_end(road, ContactPoint::Start);
+        .at_end(road, ContactPoint::Start)
+        .in_boundary_of(junction);
 }

@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use crate::families::junction_area::{Stretch, boundary};
 use crate::prelude::*;
 
@@ -44,7 +45,8 @@ fn check(junction: &Junction<'_>, stretches: &[Stretch<'_>], found: &mut Sink<'_
                 .issue(stretch.segment.node(), text)
                 .point(end.x, end.y, 0.0)
                 .at(next.segment.node(), "the next segment")
-                .point(start.x, start.y, 0.0);
+                .point(start.x, start.y, 0.0)
+                .in_boundary_of(junction);
         }
     }
 }

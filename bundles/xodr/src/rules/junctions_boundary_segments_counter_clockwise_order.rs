@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use crate::families::junction_area::{Stretch, boundary, doubled_area, ring};
 use crate::prelude::*;
 
@@ -31,6 +32,9 @@ fn check(junction: &Junction<'_>, stretches: &[Stretch<'_>], found: &mut Sink<'_
             junction.id(),
             -area
         );
-        found.issue(node, text).point(first.x, first.y, 0.0);
+        found
+            .issue(node, text)
+            .point(first.x, first.y, 0.0)
+            .in_boundary_of(junction);
     }
 }

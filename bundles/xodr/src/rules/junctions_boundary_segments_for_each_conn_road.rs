@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use std::collections::{HashMap, HashSet};
 
 use crate::prelude::*;
@@ -37,7 +38,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             );
             found
                 .issue(boundary.node(), text)
-                .at(link.node(), "the link of the road to the junction");
+                .at(link.node(), "the link of the road to the junction")
+                .in_boundary_of(junction);
         }
     }
 }

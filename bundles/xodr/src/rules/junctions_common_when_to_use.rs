@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use crate::families::junction_ends::{Meeting, name};
 use crate::prelude::*;
 
@@ -41,7 +42,9 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 "only {one} and {other} meet at junction `{id}`; two roads should be linked directly, without \
                  a junction"
             );
-            let finding = found.issue(junction.node(), text);
+            let finding = found
+                .issue(junction.node(), text)
+                .of_junction(junction.node());
             if is_new {
                 finding.uid("asam.net:xodr:1.9.0:junctions.common.not_only_two");
             }
@@ -51,7 +54,10 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                  with two or more possible successors",
                 ends.join(", ")
             );
-            found.issue(junction.node(), text).level(Level::Information);
+            found
+                .issue(junction.node(), text)
+                .level(Level::Information)
+                .of_junction(junction.node());
         }
     }
 }

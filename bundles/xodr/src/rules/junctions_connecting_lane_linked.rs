@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use std::cell::LazyCell;
 
 use crate::families::on_road::{OnRoad, lane_name};
@@ -87,11 +88,14 @@ fn check(
         } else {
             Level::Warning
         };
-        found
+        let finding = found
             .issue(lane.node(), text)
             .level(level)
             .at_lane_end(lane, end)
             .at(next.node(), "the lane that continues it");
+        if let Some(junction) = map.junction_of(road) {
+            finding.of_junction(junction.node());
+        }
     }
 }
 

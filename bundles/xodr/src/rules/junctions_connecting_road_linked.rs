@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use crate::families::on_road::OnRoad;
 use crate::families::routes::{NARROW, lanes_at, routes_at};
 use crate::prelude::*;
@@ -33,7 +34,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 found
                     .issue(link.node(), text)
                     .at_end(road, end)
-                    .at(connection.node(), "the connection that uses the road");
+                    .at(connection.node(), "the connection that uses the road")
+                    .of_junction(junction.node());
                 continue;
             }
             let enters = connection.contact_point() == Some(end);
@@ -57,7 +59,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                     .issue(road.link_node().unwrap_or(road.node()), text)
                     .level(level)
                     .at_end(road, end)
-                    .at(connection.node(), "the connection that uses the road");
+                    .at(connection.node(), "the connection that uses the road")
+                    .of_junction(junction.node());
             }
         }
     }

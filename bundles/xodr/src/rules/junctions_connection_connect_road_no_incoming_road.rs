@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use std::collections::BTreeSet;
 
 use crate::families::on_road::OnRoad;
@@ -43,7 +44,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                     text,
                 )
                 .on(road, middle, 0.0)
-                .at(road.node(), "the connecting road");
+                .at(road.node(), "the connecting road")
+                .of_junction(junction.node());
         }
     }
 }

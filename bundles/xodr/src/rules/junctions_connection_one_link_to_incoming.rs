@@ -1,4 +1,5 @@
 use crate::families::connections::{repeated, report_repeated};
+use crate::families::faults::OfFault as _;
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::prelude::*;
 
@@ -55,5 +56,6 @@ fn against_traffic(map: &RoadMap<'_>, joint: &LaneJoint<'_>, found: &mut Sink<'_
     found
         .issue(joint.node, text)
         .at_lane_end(lane, end)
-        .at(lane.node(), "the lane with the wrong direction");
+        .at(lane.node(), "the lane with the wrong direction")
+        .of_junction(joint.node);
 }

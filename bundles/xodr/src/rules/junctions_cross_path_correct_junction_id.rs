@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use std::collections::HashSet;
 
 use crate::prelude::*;
@@ -61,7 +62,8 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             );
             let finding = found
                 .issue(Place::attribute_or_node(road.node(), "junction"), text)
-                .at(user, "the reference of the junction to the road");
+                .at(user, "the reference of the junction to the road")
+                .of_junction(junction.node());
             if role == "connecting" {
                 finding.uid(CONNECTING);
             }
@@ -112,5 +114,8 @@ fn outside_junction<'a>(
             .issue(at_road, text)
             .at(at_connection, "the connection that uses the road")
     };
-    finding.in_every_version(Level::Error).uid(CONNECTING);
+    finding
+        .in_every_version(Level::Error)
+        .uid(CONNECTING)
+        .of_junction(junction.node());
 }

@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use crate::families::junction_ends::{Meeting, name};
 use crate::prelude::*;
 
@@ -38,6 +39,9 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         } else {
             Level::Error
         };
-        found.issue(junction.node(), text).level(level);
+        found
+            .issue(junction.node(), text)
+            .level(level)
+            .of_junction(junction.node());
     }
 }

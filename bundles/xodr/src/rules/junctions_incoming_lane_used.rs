@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use crate::families::junction_lanes::{Used, arms};
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::routes::{NARROW, routes_at};
@@ -42,6 +43,7 @@ fn check(
         found
             .issue(lane.node(), text)
             .at_lane_end(lane, end)
-            .at(junction.node(), "the junction");
+            .at(junction.node(), "the junction")
+            .of_junction(junction.node());
     }
 }

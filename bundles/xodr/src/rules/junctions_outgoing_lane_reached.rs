@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use crate::families::junction_lanes::{Used, arms};
 use crate::families::link_sides::Known;
 use crate::families::on_road::{OnRoad, lane_name};
@@ -47,6 +48,7 @@ fn check(
         found
             .issue(lane.node(), text)
             .at_lane_end(lane, end)
-            .at(junction.node(), "the junction");
+            .at(junction.node(), "the junction")
+            .of_junction(junction.node());
     }
 }

@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use crate::families::gap_levels::{GAP_BROKEN_FROM, GAP_ERROR_FROM, Misfit};
 use crate::families::lane_gaps::{LaneGap, lane_gaps};
 use crate::families::mouths;
@@ -136,7 +137,8 @@ fn report(map: &RoadMap<'_>, gap: &LaneGap<'_, '_>, found: &mut Sink<'_>) {
     }
     finding = finding
         .at_lane_end(gap.from, gap.joint.from.end)
-        .at(gap.to.node(), "the linked lane");
+        .at(gap.to.node(), "the linked lane")
+        .at_joint([(gap.from, gap.joint.from.end), (gap.to, gap.joint.to.end)]);
     for (_, middle) in &gap.edges {
         finding = finding.point(middle.x, middle.y, middle.z);
     }

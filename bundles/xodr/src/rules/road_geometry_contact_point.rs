@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use crate::families::gap_levels::{
     GAP_BROKEN_FROM, GAP_ERROR_FROM, Misfit, STEP_BROKEN_FROM, STEP_ERROR_FROM,
 };
@@ -83,7 +84,8 @@ fn check<'a>(map: &RoadMap<'a>, road: &Road<'a>, end: ContactPoint, found: &mut 
         .put(found.issue(road.node(), text))
         .at_end(road, end)
         .at(contact.node, "the link")
-        .at_end(linked, other);
+        .at_end(linked, other)
+        .at_gap([contact.from, contact.to]);
 }
 
 /// Classifies the distance of two ends. If reference lines lie side by side, the lanes may still

@@ -1,3 +1,4 @@
+use crate::families::faults::shape_of;
 use std::f64::consts::TAU;
 
 use crate::families::on_road::{OnRoad, lane_name};
@@ -160,7 +161,8 @@ fn folds(geometry: &Geometry<'_>, length: f64, road: &Road<'_>, found: &mut Sink
     found
         .issue(shape, text)
         .on(road, fold.s, fold.t)
-        .at(fold.lane.node(), "the lane");
+        .at(fold.lane.node(), "the lane")
+        .follows(shape_of(road));
 }
 
 /// Returns the outermost inner lane for vehicles if it extends beyond the center of the curve.

@@ -1,3 +1,4 @@
+use crate::families::faults::lengths_of;
 use crate::families::shown::number;
 use crate::prelude::*;
 
@@ -72,7 +73,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
         );
         let finding = found
             .issue(Place::attribute_or_node(geometry.node(), "s"), text)
-            .road(road.id(), s, 0.0);
+            .road(road.id(), s, 0.0)
+            .fault(lengths_of(road));
         let finding = if older && greatest <= grave {
             finding.level(Level::Warning)
         } else {

@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::prelude::*;
 
@@ -36,7 +37,8 @@ fn outward(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'_>) {
                 found
                     .issue(Place::attribute_or_node(lane.node(), "level"), text)
                     .in_lane(lane, middle)
-                    .at(inner.node(), "the lane further inside");
+                    .at(inner.node(), "the lane further inside")
+                    .fault(format!("levels of road {}", lane.at.road.index()));
             }
             _ => {}
         }
@@ -62,6 +64,7 @@ fn along(map: &RoadMap<'_>, joint: &LaneJoint<'_>, found: &mut Sink<'_>) {
             .level(Level::Warning)
             .at_lane_end(from, joint.from.end)
             .at(to.node(), "the linked lane")
-            .at(joint.node, "the link");
+            .at(joint.node, "the link")
+            .at_joint([(from, joint.from.end), (to, joint.to.end)]);
     }
 }

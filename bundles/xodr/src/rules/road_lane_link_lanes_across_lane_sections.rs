@@ -1,7 +1,9 @@
 use crate::families::driving::is_drivable;
+use crate::families::faults::OfFault as _;
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::prelude::*;
 use qcbus_opendrive::LaneSpan;
+use qcbus_sdk::fault_of;
 
 const OVERLAP: Param = Param::number(
     "overlap",
@@ -71,7 +73,8 @@ fn not_linked_at_all(section: SectionRef<'_, '_>, side: Side, found: &mut Sink<'
             .level(Level::Warning)
             .uid(ANNEX_F)
             .at_lane_end(from.lane, end)
-            .at(to.lane.node(), "the lane that continues it");
+            .at(to.lane.node(), "the lane that continues it")
+            .follows(fault_of(next.node()));
     }
 }
 
@@ -115,6 +118,7 @@ fn not_returned(part: MapPart<'_, '_>, found: &mut Sink<'_>) {
             .here(&what_it_says(map, joint, from, to))
             .at_lane_end(to, joint.to.end)
             .at(joint.node, "the link that has no link back")
+            .at_joint([(from, joint.from.end), (to, joint.to.end)])
             .readers_level(harm);
     }
 }

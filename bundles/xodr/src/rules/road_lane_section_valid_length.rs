@@ -61,7 +61,8 @@ fn report(
     let finding = found
         .issue(Place::attribute_or_node(section.node(), "s"), text)
         .level(level)
-        .road(section.road.id(), s, 0.0);
+        .road(section.road.id(), s, 0.0)
+        .fault(format!("short sections of road {}", section.road.index()));
     match next {
         Some(next) => finding.at(next.node(), "the next one"),
         None => {

@@ -1,3 +1,4 @@
+use crate::families::faults::lengths_of;
 use crate::families::shown::number;
 use crate::prelude::*;
 
@@ -56,7 +57,9 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             } else {
                 finding
             };
-            finding.road(road.id(), length.min(sum), 0.0);
+            finding
+                .road(road.id(), length.min(sum), 0.0)
+                .follows(lengths_of(road));
         }
     }
 }

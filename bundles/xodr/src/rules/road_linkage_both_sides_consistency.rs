@@ -4,6 +4,7 @@ use crate::families::link_sides::{Known, agrees, in_virtual_junction};
 use crate::families::routes::{is_route, lanes_at};
 use crate::families::unlinked_arms::UnlinkedArms;
 use crate::prelude::*;
+use qcbus_sdk::fault_of;
 
 pub const RULE: Rule<Roads> = Rule {
     versions: "1.9.0..",
@@ -62,7 +63,8 @@ fn direct_junctions(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                     Place::attribute_or_node(connection.node(), "incomingRoad"),
                     text,
                 )
-                .at(road.node(), "the road");
+                .at(road.node(), "the road")
+                .follows(fault_of(junction.node()));
         }
         let linked = connection.linked_road().and_then(|id| map.road(id));
         if let Some((road, end)) = linked.zip(connection.contact_point())
@@ -80,7 +82,8 @@ fn direct_junctions(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                     Place::attribute_or_node(connection.node(), "linkedRoad"),
                     text,
                 )
-                .at(road.node(), "the road");
+                .at(road.node(), "the road")
+                .follows(fault_of(junction.node()));
         }
     }
 }
@@ -167,7 +170,7 @@ fn to_junction<'a>(
     let place = map.junction(id).map(Junction::node);
     let mut finding = found.issue(link.node(), text);
     if let Some(place) = place {
-        finding = finding.at(place, "the junction");
+        finding = finding.at(place, "the junction").follows(fault_of(place));
     }
     // A connecting road leads to a road. A route that comes to another junction here has no way on.
     let connects = map

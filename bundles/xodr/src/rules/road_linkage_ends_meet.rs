@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use std::cell::OnceCell;
 
 use crate::families::gap_levels::GAP_BROKEN_FROM;
@@ -158,7 +159,8 @@ fn check<'m, 'a>(
         .at_end(one, contact.from.end)
         .at(one.node(), "the first road")
         .at(other.node(), "the other road")
-        .at_end(other, contact.to.end);
+        .at_end(other, contact.to.end)
+        .at_gap([contact.from, contact.to]);
 }
 
 /// Rounds a length to micrometres, to remove digits from calculation errors.
@@ -272,7 +274,8 @@ fn junction(
     found
         .issue(link.node(), text)
         .at_end(road, end)
-        .at(junction.node(), "the junction");
+        .at(junction.node(), "the junction")
+        .of_junction(junction.node());
 }
 
 /// Returns the distance of a road end from the nearest end of a junction's roads. It returns `None`

@@ -1,3 +1,4 @@
+use crate::families::faults::shape_of;
 use std::collections::BTreeSet;
 
 use crate::families::overlap::{Limits, Overlap, Slice, overlaps, slices};
@@ -238,7 +239,8 @@ fn report(map: &RoadMap<'_>, overlap: &Overlap<'_>, found: &mut Sink<'_>) {
             .issue(a.node(), text)
             .uid(SELF)
             .road(a.id(), one.from, 0.0)
-            .point(x, y, z);
+            .point(x, y, z)
+            .follows(shape_of(a));
         return;
     }
     let belongs = |road: &Road<'_>| match road.junction() {
@@ -270,5 +272,6 @@ fn report(map: &RoadMap<'_>, overlap: &Overlap<'_>, found: &mut Sink<'_>) {
         .road(a.id(), one.from, 0.0)
         .point(x, y, z)
         .at(b.node(), "the other road")
-        .road(b.id(), other.from, 0.0);
+        .road(b.id(), other.from, 0.0)
+        .fault(format!("overlap of roads {} and {}", a.index(), b.index()));
 }

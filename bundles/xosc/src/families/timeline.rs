@@ -3,6 +3,7 @@
 use crate::families::triggers::called;
 use crate::prelude::*;
 use qcbus_openscenario::{At, Cause, Logic, Plan, Start, StoryKind, Strictness, Takes, Timeline};
+use qcbus_sdk::fault_of;
 
 /// A trigger that is never true.
 pub(crate) struct Never<'m, 'd> {
@@ -86,6 +87,28 @@ pub(crate) fn never_ended<'m, 'd>(
         causes,
         is_certain: timeline.tolerant().ends.is_never(),
     })
+}
+
+/// Returns the name of the fault that an act or event never starts. `element` is the act or event,
+/// or lies in its trigger. It is `None` in the stop trigger of the run.
+pub(crate) fn start_of(element: Element<'_, '_>) -> Option<String> {
+    let mut around = std::iter::successors(Some(element), |it| it.parent());
+    let owner = around.find(|it| it.is("Event") || it.is("Act"))?;
+    Some(format!("start of {}", fault_of(owner.node())))
+}
+
+/// Returns the name of the fault that keeps an element from its start or end: another one within
+/// it never starts.
+pub(crate) fn start_within(
+    scenario: &Scenario<'_>,
+    timeline: &Timeline,
+    of: usize,
+) -> Option<String> {
+    let element = scenario
+        .storyboard()
+        .elements()
+        .get(idle_in(timeline, of)?)?;
+    start_of(element.element(scenario))
 }
 
 /// Checks whether the run never ends because of a condition. Then only this is reported.
@@ -186,18 +209,23 @@ fn endless(scenario: &Scenario<'_>, plan: &Plan, at: usize, it: usize) -> Option
 
 /// Describes an element that keeps another one from its end because it never starts.
 fn idle(scenario: &Scenario<'_>, timeline: &Timeline, of: usize) -> Option<String> {
+    let at = idle_in(timeline, of)?;
+    let name = match at == of {
+        true => "it".to_owned(),
+        false => called(scenario.storyboard().elements().get(at)?.element(scenario)),
+    };
+    Some(format!("{name} never starts"))
+}
+
+/// Returns the first element in another one, or that one, that never starts.
+fn idle_in(timeline: &Timeline, of: usize) -> Option<usize> {
     let parent = |at: &usize| timeline.plan.parts.get(*at)?.parent;
     let is_idle = |at: &usize| {
         let span = timeline.standard.get(*at);
         span.is_some_and(|span| span.start.is_never())
             && std::iter::successors(Some(*at), parent).any(|around| around == of)
     };
-    let at = (0..timeline.plan.parts.len()).find(is_idle)?;
-    let name = match at == of {
-        true => "it".to_owned(),
-        false => called(scenario.storyboard().elements().get(at)?.element(scenario)),
-    };
-    Some(format!("{name} never starts"))
+    (0..timeline.plan.parts.len()).find(is_idle)
 }
 
 /// Checks whether an element waits for itself or for an element around it, which other findings

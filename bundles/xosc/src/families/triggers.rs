@@ -1,5 +1,6 @@
 //! Triggers: start and stop conditions, and their earliest time.
 
+use crate::families::timeline;
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::hash::BuildHasher as _;
@@ -28,7 +29,9 @@ pub(crate) fn empty_starts<'d>(
                  not start, but some simulators start it at once; {remedy}",
                 called(element)
             );
-            found.about(trigger, "", text);
+            found
+                .about(trigger, "", text)
+                .maybe_fault(timeline::start_of(element));
         }
     }
 }

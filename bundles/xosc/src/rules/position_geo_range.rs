@@ -14,7 +14,7 @@ const OWN: [&str; 1] = ["qcbus.dev:xosc:1.0.0:position.geo_range"];
 const UIDS: [&str; OWN.len() + GEO.len()] = ranges::uids(&OWN, GEO);
 
 fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
-    ranges::report_as_own(scenario, GEO, found);
+    ranges::report_by_element(scenario, GEO, found);
     // Before 1.2 the schema requires both.
     if scenario.version() >= (1, 2) {
         both_given(scenario, found);

@@ -206,7 +206,8 @@ fn not_looked_for(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         "the road {}{more} not checked, because the map could not be read",
         quoted(first, "roadId", &road)
     );
-    found.about(first, "roadId", text).level(Level::Warning);
+    // The missing map is reported for itself.
+    found.about(first, "roadId", text).level(Level::Information);
 }
 
 fn no_road(

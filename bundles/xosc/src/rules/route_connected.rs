@@ -2,6 +2,7 @@ use crate::families::positions::metres;
 use crate::families::routes::{is_for_vehicles, routes, stop, waypoints};
 use crate::prelude::*;
 use qcbus_openscenario::Way;
+use qcbus_sdk::fault_of;
 
 pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,
@@ -64,7 +65,8 @@ fn say(
     };
     found
         .about(waypoint, "", text)
-        .at(from.node(), "the waypoint before it");
+        .at(from.node(), "the waypoint before it")
+        .maybe_fault(waypoint.parent().map(|route| fault_of(route.node())));
 }
 
 fn place(position: Element<'_, '_>) -> String {

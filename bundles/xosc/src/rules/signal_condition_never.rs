@@ -1,3 +1,4 @@
+use crate::families::timeline;
 use std::collections::BTreeSet;
 
 use crate::families::positions::listed;
@@ -31,7 +32,9 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             quoted(condition, "state", &state),
             listed(shown.iter().map(String::as_str))
         );
-        found.about(condition, "state", text);
+        found
+            .about(condition, "state", text)
+            .maybe_fault(timeline::start_of(condition));
     }
 }
 

@@ -34,7 +34,9 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             never.so,
             differs(&never)
         );
-        let finding = found.about(event, "priority", text);
+        let finding = found
+            .about(event, "priority", text)
+            .maybe_fault(timeline::start_of(event));
         if let Some(other) = other {
             finding.at(other.node(), "the event that runs");
         }

@@ -42,7 +42,10 @@ fn report(
             let Some(state) = state else { return };
             let text = timeline::state_never_comes(scenario, timeline, state, of);
             let text = format!("{text}; {}{}", never.so, differs(never));
-            found.about(state, "state", text).level(level);
+            found
+                .about(state, "state", text)
+                .level(level)
+                .maybe_follows(timeline::start_within(scenario, timeline, of));
             return;
         }
         Cause::Impossible { at } => {

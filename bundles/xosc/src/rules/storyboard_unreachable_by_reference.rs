@@ -1,4 +1,5 @@
 use crate::families::states::Waiting;
+use crate::families::timeline;
 use crate::families::triggers::called;
 use crate::prelude::*;
 
@@ -40,7 +41,9 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                 chain(rest)
             ),
         };
-        let mut finding = found.about(*condition, "storyboardElementRef", text);
+        let mut finding = found
+            .about(*condition, "storyboardElementRef", text)
+            .maybe_fault(timeline::start_of(*condition));
         for (_, further) in others.iter().take(4) {
             finding = finding.at(further.node(), "the next element that waits");
         }

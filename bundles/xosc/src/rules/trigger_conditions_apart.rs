@@ -30,6 +30,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         );
         found
             .about(one, "", text)
-            .at(other.node(), "the other condition");
+            .at(other.node(), "the other condition")
+            .maybe_fault(timeline::start_of(one));
     });
 }

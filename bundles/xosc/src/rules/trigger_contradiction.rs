@@ -41,7 +41,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                         );
                         found
                             .about(element, claim.attribute(), text)
-                            .at(against.element.node(), "the condition that it contradicts");
+                            .at(against.element.node(), "the condition that it contradicts")
+                            .maybe_fault(timeline::start_of(element));
                     }
                     other.narrow(claim);
                 }

@@ -26,6 +26,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             edge => format!("the `{edge}` edge comes before the condition is first looked at"),
         };
         let text = format!("{what}; {}{}", never.so, differs(never));
-        found.about(condition, "conditionEdge", text);
+        found
+            .about(condition, "conditionEdge", text)
+            .maybe_fault(timeline::start_of(condition));
     });
 }

@@ -28,6 +28,8 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             _ => "it is never true",
         };
         let text = format!("{}; {so}", described(&impossible));
-        found.about(element, impossible.attribute, text);
+        found
+            .about(element, impossible.attribute, text)
+            .maybe_fault(timeline::start_of(condition));
     }
 }

@@ -26,6 +26,9 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
             never.so,
             differs(never)
         );
-        found.about(state, "state", text);
+        found
+            .about(state, "state", text)
+            .maybe_fault(timeline::start_of(state))
+            .maybe_follows(timeline::start_within(scenario, timeline, of));
     });
 }

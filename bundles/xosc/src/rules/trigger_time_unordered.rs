@@ -85,7 +85,9 @@ fn others(scenario: &Scenario<'_>, said: &[Node<'_>], found: &mut Sink<'_>) {
             differs(&never)
         );
         let condition = never.condition((0, 0)).unwrap_or(owner);
-        found.about(condition, "", text);
+        found
+            .about(condition, "", text)
+            .maybe_fault(timeline::start_of(condition));
     }
 }
 
@@ -136,7 +138,8 @@ fn too_late(
     found
         .about(condition, attribute, text)
         .level(level)
-        .at(by.node(), "the condition that ends it");
+        .at(by.node(), "the condition that ends it")
+        .maybe_fault(timeline::start_of(condition));
     true
 }
 

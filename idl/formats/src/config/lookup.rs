@@ -172,6 +172,11 @@ impl Config {
             .any(|it| it.name == LEVELS_PARAM && it.value.trim() == LEVELS_OF_ASAM)
     }
 
+    /// Checks whether results list findings as ASAM's framework does: each is an issue of its own.
+    pub fn lists_as_asam(&self) -> bool {
+        self.is_of_asam() || self.selects_levels_of_asam()
+    }
+
     /// Returns the global parameters and those of all bundles and checkers.
     fn all_params(&self) -> impl Iterator<Item = &ConfigParam> {
         let in_bundles = self.bundles.iter().flat_map(|bundle| {

@@ -1,6 +1,7 @@
 //! The steps of pooling, in order.
 
 mod checker;
+mod same_fault;
 mod summary;
 
 use super::places::Completer;
@@ -21,6 +22,7 @@ pub(super) fn pool(input: PoolInput<'_>, resolver: &mut dyn Resolver) -> Pooled 
         bundles,
         remarks,
         scope,
+        separate,
         version,
         build_date,
     } = input;
@@ -28,6 +30,7 @@ pub(super) fn pool(input: PoolInput<'_>, resolver: &mut dyn Resolver) -> Pooled 
         input_file,
         config,
         places: Completer::new(resolver),
+        separate,
         removals: Vec::new(),
         pooled: Pooled::default(),
     };
@@ -128,6 +131,7 @@ struct Pool<'a, 'r> {
     input_file: &'a str,
     config: Option<&'a Config>,
     places: Completer<'r>,
+    separate: bool,
     removals: Vec<Removal>,
     pooled: Pooled,
 }
@@ -158,10 +162,14 @@ impl<'a> Pool<'a, '_> {
             Some(bundle) if !bundle.checkers.is_empty() => self.configured(bundle, &name, checkers),
             _ => checkers,
         };
-        let checkers: Vec<Checker> = checkers
+        let mut checkers: Vec<Checker> = checkers
             .into_iter()
             .map(|outcome| self.checker(entry, &name, outcome))
             .collect();
+        if !self.separate {
+            same_fault::join(&mut checkers);
+        }
+        same_fault::forget_causes(&mut checkers);
         self.pooled.results.bundles.push(CheckerBundle {
             summary: summary::of_bundle(&checkers),
             params: self.params(entry, params, asked),

@@ -7,6 +7,7 @@
 mod absent;
 mod asked;
 mod assemble;
+mod cause;
 mod outcome;
 mod places;
 mod remarks;
@@ -17,6 +18,7 @@ use crate::xqar::{Issue, Results};
 use crate::{Text, Verdict};
 
 pub use asked::NotAsked;
+pub use cause::{ALSO, ALSO_HERE, CAUSE_INFO, Cause, RULE_INFO, rule_info};
 pub use outcome::{
     Asked, BundleOutcome, CheckerOutcome, Ending, in_the_answer, state_levels_of_asam,
 };
@@ -32,10 +34,6 @@ pub const NOT_LISTED: &str = "qcbus.not_listed";
 
 /// Checker of [`OWN_BUNDLE`] that reports which checkers the command line left out.
 pub const CHOICE_CHECKER: &str = "qcbus_choice";
-
-/// Name of the information about a further rule that the same fact violates. The format has room
-/// for only one rule per issue.
-pub const RULE_INFO: &str = "qcbus.rule";
 
 /// Metadata key of a blocked checker. ASAM's format calls it `skipped`, like a checker that does
 /// not apply.
@@ -54,6 +52,8 @@ pub struct PoolInput<'a> {
     pub remarks: Vec<Remark>,
     /// Whether configured bundles that are not among [`Self::bundles`] are missing.
     pub scope: Scope,
+    /// Whether findings about one fault stay separate issues.
+    pub separate: bool,
     /// Version of the caller's program, written for the bundle `qcbus`.
     pub version: &'a str,
     /// Date of the caller's build, `YYYY-MM-DD`.

@@ -11,5 +11,6 @@ mod manifest;
 mod pool;
 mod python;
 mod round_trip;
+mod same_fault;
 mod seeded_fuzz;
 mod xqar;

@@ -73,6 +73,7 @@ impl InForce {
         };
         InForce::new(loaded.config.clone(), search)
             .and_then(|in_force| in_force.with_levels_of_asam(sources.strict))
+            .map(|in_force| in_force.with_separate_findings(sources.all))
             .map(|in_force| in_force.beside(&loaded.children))
             .map(|in_force| in_force.narrowed(sources.choice.clone()))
             .map(|in_force| in_force.with_own_verdicts(sources.own_verdicts))
@@ -91,10 +92,16 @@ impl InForce {
             self.config = Some(Arc::new(config));
             self.judging = self.config.clone();
         }
-        let mut hash = Sha256::new_with_prefix(self.digest.0);
-        hash.update("levels of ASAM");
-        self.digest = Digest(hash.finalize().into());
+        self.digest = extended(self.digest, "levels of ASAM");
         Ok(self)
+    }
+
+    /// Returns the configuration in force. Results with separate findings differ from others.
+    fn with_separate_findings(mut self, all: bool) -> InForce {
+        if all {
+            self.digest = extended(self.digest, "separate findings");
+        }
+        self
     }
 
     /// Returns the configuration in force for these children, which may contain shadows.
@@ -263,4 +270,11 @@ fn select(
         }
     }
     selected
+}
+
+/// Returns the digest of a configuration and a setting of the command line.
+fn extended(digest: Digest, setting: &str) -> Digest {
+    let mut hash = Sha256::new_with_prefix(digest.0);
+    hash.update(setting);
+    Digest(hash.finalize().into())
 }

@@ -47,6 +47,8 @@ pub struct Sources {
     pub choice: Choice,
     /// Whether findings have the levels of ASAM, whatever the configuration says.
     pub strict: bool,
+    /// Whether findings about one fault stay separate issues.
+    pub all: bool,
     /// Whether the verdict on a file is independent of the verdicts on the files that it depends on.
     pub own_verdicts: bool,
     /// The children that come with the program.

@@ -12,6 +12,7 @@ fn sources(directory: &Path) -> Sources {
         own_verdicts: false,
         choice: Default::default(),
         strict: false,
+        all: false,
         standard: vec![child("xodrBundle")],
         reporters: vec![child("qc-report-text")],
         known: Known::default(),

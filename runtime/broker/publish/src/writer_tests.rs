@@ -33,6 +33,7 @@ fn store_in(dir: &Path) -> Store {
         places: ResultPaths::of_watched(dir.join("out"), vec![dir.join("farm")]),
         choice: Default::default(),
         strict: false,
+        all: false,
         dialect: Dialect::default(),
         durable: false,
         verdict_files: true,

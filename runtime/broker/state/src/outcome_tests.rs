@@ -106,6 +106,7 @@ fn in_the_result(ending: Ending, issues: Vec<Issue>) -> (Status, String, Vec<Str
         bundles: vec![outcome.said()],
         remarks: Vec::new(),
         scope: Scope::Alone,
+        separate: true,
         version: "1",
         build_date: "",
     };

@@ -31,6 +31,7 @@ fn load(file: &Path, bundles_d: Option<&Path>) -> Result<Loaded, String> {
         own_verdicts: false,
         choice: Default::default(),
         strict: false,
+        all: false,
         standard: Vec::new(),
         reporters: Vec::new(),
         known: standard::known(),

@@ -221,6 +221,7 @@ fn options(args: &ServeArgs) -> Result<Options, String> {
         retention: args.retention,
         choice: Default::default(),
         strict: args.strict,
+        all: args.all,
         dialect: dialect(args.output.xqar_dialect),
         durable: true,
         verdict_files: true,

@@ -3,6 +3,7 @@
 //! The schema only says `Double`. The ranges are in the standard's class descriptions. Ranges that
 //! are plainly wrong are left out (a clothoid with falling curvature, a road below sea level).
 
+use qcbus_sdk::fault_of;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use qcbus_openscenario::{Element, Reading, Scenario};
@@ -303,6 +304,13 @@ pub(crate) fn report(scenario: &Scenario<'_>, rows: &[Row], found: &mut Sink<'_>
 pub(crate) fn report_as_own(scenario: &Scenario<'_>, rows: &[Row], found: &mut Sink<'_>) {
     for (row, element, value) in out_of_range(scenario, rows) {
         say(row, element, value, found);
+    }
+}
+
+/// Like [`report_as_own`], for attributes of one element that are mostly wrong in the same way.
+pub(crate) fn report_by_element(scenario: &Scenario<'_>, rows: &[Row], found: &mut Sink<'_>) {
+    for (row, element, value) in out_of_range(scenario, rows) {
+        say(row, element, value, found).fault(fault_of(element.node()));
     }
 }
 

@@ -68,6 +68,7 @@ pub fn input(bundles: Vec<BundleOutcome>) -> PoolInput<'static> {
         bundles,
         remarks: Vec::new(),
         scope: Scope::Whole,
+        separate: false,
         version: "0.1.0",
         build_date: "2025-01-31",
     }

@@ -228,6 +228,7 @@ fn sources_of(options: &Options) -> Sources {
         bundles_d: options.bundles_d.clone(),
         choice: options.choice.clone(),
         strict: options.strict,
+        all: options.all,
         own_verdicts: options.settings.own_verdicts,
         standard: options.standard.clone(),
         reporters: options.reporters.clone(),

@@ -109,6 +109,7 @@ pub(super) fn store(
         places,
         choice: options.choice.clone(),
         strict: options.strict,
+        all: options.all,
         dialect: options.dialect,
         durable: options.durable,
         verdict_files: options.verdict_files,

@@ -112,6 +112,7 @@ fn options(dir: &Path) -> Options {
         retention: Duration::from_secs(3600),
         choice: Default::default(),
         strict: false,
+        all: false,
         dialect: qcbus_formats::xqar::Dialect::default(),
         durable: false,
         verdict_files: true,

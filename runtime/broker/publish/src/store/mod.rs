@@ -51,6 +51,8 @@ pub struct Store {
     pub choice: Choice,
     /// Whether findings have the levels of ASAM, whatever the configuration says.
     pub strict: bool,
+    /// Whether findings about one fault stay separate issues.
+    pub all: bool,
     /// Dialect of the results.
     pub dialect: Dialect,
     /// Whether results are flushed to the disk before they are announced.

@@ -41,6 +41,7 @@ impl Store {
             bundles,
             remarks,
             scope,
+            separate: self.all || self.strict || config.is_some_and(Config::lists_as_asam),
             version: env!("CARGO_PKG_VERSION"),
             build_date: BUILD_DATE,
         };

@@ -163,6 +163,7 @@ fn prepare(args: &CheckArgs) -> Result<Prepared, Refusal> {
         out,
         choice: choice(args)?,
         strict: args.strict,
+        all: args.all,
         state: None,
         retention: Duration::MAX,
         dialect: dialect(args.output.xqar_dialect),

@@ -186,6 +186,7 @@ fn may_ask(args: &CheckArgs, options: &Options) -> bool {
         && args.schema_dir.is_none()
         && options.choice.is_everything()
         && !options.strict
+        && !options.all
 }
 
 /// Returns the check context of a file for a check in this process.
