@@ -202,7 +202,7 @@ fn hosted_modules_agree_with_their_standalone_runs() {
     for some in inputs.chunks(IN_ONE_RUN) {
         let mut command = Command::new(env!("CARGO_BIN_EXE_qcbus"));
         command
-            .args(["check", "--bundles-d", "bundles.d", "--out", "out"])
+            .args(["check", "--all", "--bundles-d", "bundles.d", "--out", "out"])
             .args(some);
         cli.run(&mut command);
         for input in some {

@@ -22,5 +22,6 @@ mod output;
 mod own_schemas;
 mod pages;
 mod references;
+mod same_fault;
 mod timeline;
 mod warm;

@@ -10,7 +10,7 @@ const SPEED: &str = "<SpeedActionDynamics dynamicsShape=\"linear\" dynamicsDimen
     <SpeedActionTarget><AbsoluteTargetSpeed value=\"4\"/></SpeedActionTarget>";
 
 /// Returns a scenario of one car with the given stories and stop trigger.
-fn scenario(stories: &str, stop: &str) -> String {
+pub(crate) fn scenario(stories: &str, stop: &str) -> String {
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>
 <OpenSCENARIO>
@@ -55,7 +55,7 @@ fn scenario(stories: &str, stop: &str) -> String {
 }
 
 /// Returns a story with one maneuver.
-fn story(events: &str) -> String {
+pub(crate) fn story(events: &str) -> String {
     group(&format!("<Maneuver name=\"swerve\">{events}</Maneuver>"))
 }
 
@@ -74,7 +74,7 @@ fn group(maneuvers: &str) -> String {
 }
 
 /// Returns an event with one action.
-fn event(name: &str, condition: &str, action: &str) -> String {
+pub(crate) fn event(name: &str, condition: &str, action: &str) -> String {
     format!(
         "<Event name=\"{name}\" priority=\"parallel\"><Action name=\"{name} now\"><PrivateAction>\
          {action}</PrivateAction></Action><StartTrigger>{}</StartTrigger></Event>\n",
@@ -82,7 +82,7 @@ fn event(name: &str, condition: &str, action: &str) -> String {
     )
 }
 
-fn brake() -> String {
+pub(crate) fn brake() -> String {
     format!("<LongitudinalAction><SpeedAction>{SPEED}</SpeedAction></LongitudinalAction>")
 }
 
@@ -94,14 +94,14 @@ fn when(name: &str, condition: &str) -> String {
     )
 }
 
-fn time(rule: &str, seconds: f64) -> String {
+pub(crate) fn time(rule: &str, seconds: f64) -> String {
     format!(
         "<ByValueCondition><SimulationTimeCondition value=\"{seconds}\" rule=\"{rule}\"/>\
          </ByValueCondition>"
     )
 }
 
-fn complete(kind: &str, name: &str) -> String {
+pub(crate) fn complete(kind: &str, name: &str) -> String {
     format!(
         "<ByValueCondition><StoryboardElementStateCondition storyboardElementType=\"{kind}\" \
          storyboardElementRef=\"{name}\" state=\"completeState\"/></ByValueCondition>"
@@ -135,7 +135,7 @@ fn swerving() -> String {
 }
 
 /// Creates a cli with a map and this scenario as `a.xosc`.
-fn cli(scenario: &str) -> Cli {
+pub(crate) fn cli(scenario: &str) -> Cli {
     let cli = Cli::new();
     let map = std::fs::read(sample_farm().join("maps/quay_straight.xodr")).unwrap();
     cli.write("quay.xodr", map);

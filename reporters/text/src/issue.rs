@@ -132,42 +132,46 @@ impl View<'_> {
         }
     }
 
-    /// Returns the texts of joined findings. Those that differ only in numbers are shown once.
+    /// Returns the texts of joined findings. When merged, those that differ only in numbers are shown
+    /// once, and without what is allowed.
     fn joined(&self, main: &str, joined: &[&IssueLocation]) -> Vec<String> {
-        let text_of = |place: &IssueLocation| {
-            let text = place.description.strip_prefix(ALSO);
-            text.unwrap_or_default().to_owned()
-        };
-        let whole = |place: &&IssueLocation| format!("{}{}", text_of(place), self.reference(place));
         if !self.merges {
-            return joined.iter().map(whole).collect();
+            let text = |place: &&IssueLocation| {
+                let text = place.description.strip_prefix(ALSO).unwrap_or_default();
+                format!("{text}{}", self.reference(place))
+            };
+            return joined.iter().map(text).collect();
         }
-        let mut groups: Vec<(String, Vec<&IssueLocation>)> = Vec::new();
-        for place in joined {
-            let shape = shape(&text_of(place));
-            match groups.iter_mut().find(|(other, _)| *other == shape) {
-                Some((_, members)) => members.push(place),
-                None => groups.push((shape, vec![place])),
-            }
-        }
-        let is_like_main = |of: &str| {
-            let words = of.rsplit_once(" [").map_or(of, |(words, _)| words);
-            words == shape(main.trim())
+        let groups = by_shape(joined);
+        let shown = match groups.len() > MOST_JOINED + 1 {
+            true => MOST_JOINED,
+            false => groups.len(),
         };
-        let text = |(shape, members): &(String, Vec<&IssueLocation>)| match members.as_slice() {
-            all if is_like_main(shape) => format!("similar findings: {}", self.rows(all)),
-            [one, others @ ..] if !others.is_empty() => {
-                let others = self.rows(others);
-                format!("{}; similar findings: {others}", whole(one))
-            }
-            members => members.iter().map(whole).collect(),
-        };
-        let mut texts: Vec<String> = groups.iter().take(MOST_JOINED).map(text).collect();
-        let hidden: usize = groups.iter().skip(MOST_JOINED).map(|it| it.1.len()).sum();
+        let (shown, hidden) = groups.split_at(shown);
+        let main = shape(words(main));
+        let mut texts: Vec<String> = shown
+            .iter()
+            .map(|(of, members)| self.group(*of == main, members))
+            .collect();
+        let hidden: usize = hidden.iter().map(|(_, members)| members.len()).sum();
         if hidden > 0 {
             texts.push(format!("{hidden} more; `--verbose` prints them all"));
         }
         texts
+    }
+
+    /// Returns the text of findings that differ only in numbers.
+    fn group(&self, is_like_main: bool, members: &[&IssueLocation]) -> String {
+        let (Some(first), false) = (members.first(), is_like_main) else {
+            return format!("similar findings: {}", self.rows(members));
+        };
+        let text = first.description.strip_prefix(ALSO).unwrap_or_default();
+        let rule = text.rfind(" [").map_or("", |at| &text[at..]);
+        let similar = match &members[1..] {
+            [] => String::new(),
+            others => format!("; similar findings: {}", self.rows(others)),
+        };
+        format!("{}{rule}{}{similar}", words(text), self.reference(first))
     }
 
     /// Returns the positions of further places: `rows 7, 9, 12`.
@@ -262,6 +266,28 @@ impl View<'_> {
 fn gutter(places: &[IssueLocation]) -> usize {
     let rows = places.iter().filter_map(|place| place.row);
     rows.max().map_or(1, |row| row.to_string().len().min(8))
+}
+
+/// Groups joined findings that differ only in numbers, in their order.
+fn by_shape<'p>(joined: &[&'p IssueLocation]) -> Vec<(String, Vec<&'p IssueLocation>)> {
+    let mut groups: Vec<(String, Vec<&IssueLocation>)> = Vec::new();
+    for place in joined {
+        let text = place.description.strip_prefix(ALSO).unwrap_or_default();
+        let shape = shape(words(text));
+        match groups.iter_mut().find(|(other, _)| *other == shape) {
+            Some((_, members)) => members.push(place),
+            None => groups.push((shape, vec![place])),
+        }
+    }
+    groups
+}
+
+/// Returns what is wrong, without what is allowed and without the rule.
+fn words(text: &str) -> &str {
+    let text = text.rsplit_once(" [").map_or(text, |(words, _)| words);
+    text.split_once("; ")
+        .map_or(text, |(words, _)| words)
+        .trim()
 }
 
 /// Checks whether a place stands for another finding about the same fault.
