@@ -2,6 +2,7 @@ use crate::families::dates::{digits, is_day, is_iso_8601, is_other_iso_8601};
 use crate::families::shown::{beside, number};
 use crate::prelude::*;
 use qcbus_document::ValueError;
+use qcbus_sdk::fault_of;
 
 pub const RULE: Rule<Document> = Rule {
     after: &["check_asam_xodr_xml_fileheader_is_present"],
@@ -21,7 +22,10 @@ fn run(document: &Document<'_>, found: &mut Sink<'_>) {
     let Some(header) = headers.next() else { return };
     for second in headers {
         let text = "there is a second `header`; a file must have exactly one";
-        found.issue(second, text).at(header, "the first one");
+        found
+            .issue(second, text)
+            .at(header, "the first one")
+            .fault(fault_of(second));
     }
     if let Some(before) = root.children().next().filter(|first| *first != header) {
         let text = format!(

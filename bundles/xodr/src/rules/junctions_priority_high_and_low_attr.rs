@@ -1,4 +1,5 @@
 use crate::prelude::*;
+use qcbus_sdk::fault_of;
 
 pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
@@ -18,7 +19,9 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                         "the `priority` does not say which road has {name} priority; it must have both `high` \
                          and `low`"
                     );
-                    found.issue(Place::attribute_or_node(node, name), text);
+                    found
+                        .issue(Place::attribute_or_node(node, name), text)
+                        .fault(fault_of(node));
                 }
             }
             if named(priority.high()) && priority.high() == priority.low() {

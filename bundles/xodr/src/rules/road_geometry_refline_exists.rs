@@ -1,4 +1,5 @@
 use crate::prelude::*;
+use qcbus_sdk::fault_of;
 
 pub const RULE: Rule<Roads> = Rule {
     versions: "1.1.0..",
@@ -19,6 +20,6 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             "road `{}` has {what}; each road must have a reference line of at least one `geometry`",
             road.id()
         );
-        found.issue(place, text);
+        found.issue(place, text).fault(fault_of(place));
     }
 }

@@ -1,4 +1,5 @@
 use crate::prelude::*;
+use qcbus_sdk::fault_of;
 
 pub const RULE: Rule<Roads> = Rule {
     uids: &[
@@ -19,7 +20,10 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 "road `{}` has no `lanes`; each road must have at least one lane section",
                 road.id()
             );
-            found.issue(road.node(), text).uid(PER_ROAD);
+            found
+                .issue(road.node(), text)
+                .uid(PER_ROAD)
+                .fault(fault_of(road.node()));
         }
         for layer in road
             .layers()
@@ -30,7 +34,9 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
                 "these `lanes` of road `{}` contain no `laneSection`; there must be at least one",
                 road.id()
             );
-            found.issue(layer.node(), text);
+            found
+                .issue(layer.node(), text)
+                .fault(fault_of(layer.node()));
         }
     }
 }

@@ -1,5 +1,6 @@
 use crate::families::object_parts::{Stands, below, owner};
 use crate::prelude::*;
+use qcbus_sdk::fault_of;
 
 pub const RULE: Rule<Roads> = Rule {
     uids: &[COMPLETE, PARTIAL],
@@ -40,7 +41,11 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             _ => continue,
         };
         let place = Place::attribute_or_node(border, "useCompleteOutline");
-        let finding = found.issue(place, text).stands(map, owner(border)).uid(uid);
+        let finding = found
+            .issue(place, text)
+            .stands(map, owner(border))
+            .uid(uid)
+            .fault(fault_of(border));
         if said.is_none() {
             // A part of the outline was clearly intended.
             finding.level(Level::Warning);

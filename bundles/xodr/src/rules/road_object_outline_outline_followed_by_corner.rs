@@ -1,5 +1,6 @@
 use crate::families::object_parts::{CORNERS, Stands, is_before, objects, outlines};
 use crate::prelude::*;
+use qcbus_sdk::fault_of;
 
 pub const RULE: Rule<Roads> = Rule {
     uids: &[OUTLINE, LOCAL, ROAD, CURVE],
@@ -67,5 +68,9 @@ fn check<'a>(map: &RoadMap<'a>, object: Node<'a>, outline: Node<'a>, found: &mut
             (OUTLINE, text)
         }
     };
-    found.issue(outline, text).stands(map, object).uid(uid);
+    found
+        .issue(outline, text)
+        .stands(map, object)
+        .uid(uid)
+        .fault(fault_of(outline));
 }

@@ -3,6 +3,7 @@ use crate::families::on_road::OnRoad;
 use crate::families::roadside::{place, stands_itself};
 use crate::families::strips::{area, common};
 use crate::prelude::*;
+use qcbus_sdk::fault_of;
 
 pub const RULE: Rule<Roads> = Rule {
     level: Level::Warning,
@@ -110,7 +111,9 @@ fn report(road: &Road<'_>, one: &Boxed<'_>, other: &Boxed<'_>, found: &mut Sink<
     found
         .issue(Place::attribute_or_node(other.node, "s"), text)
         .on(road, other.s, other.t)
-        .at(one.node, "the other one");
+        .at(one.node, "the other one")
+        .fault(format!("space of {}", fault_of(one.node)))
+        .fault(format!("space of {}", fault_of(other.node)));
 }
 
 /// Reports copies of an object that cover each other.

@@ -1,6 +1,7 @@
 use crate::families::object_parts::{Stands, owner, polylines};
 use crate::families::vertices::Vertices;
 use crate::prelude::*;
+use qcbus_sdk::fault_of;
 
 pub const RULE: Rule<Roads> = Rule {
     uids: &[POLYLINE, ROAD, LOCAL],
@@ -38,6 +39,7 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
         found
             .issue(polyline, text)
             .stands(map, owner(polyline))
-            .uid(uid);
+            .uid(uid)
+            .fault(fault_of(polyline));
     }
 }

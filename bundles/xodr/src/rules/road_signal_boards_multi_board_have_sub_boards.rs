@@ -1,6 +1,7 @@
 use crate::families::boards::carriers;
 use crate::families::object_parts::{Stands, named};
 use crate::prelude::*;
+use qcbus_sdk::fault_of;
 
 pub const RULE: Rule<Roads> = Rule {
     versions: "1.8.0..",
@@ -20,6 +21,9 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             "{} is a `multiBoard`, but has {missing}; it must have at least one of each",
             named(carrier.node)
         );
-        found.issue(carrier.node, text).stands(map, carrier.node);
+        found
+            .issue(carrier.node, text)
+            .stands(map, carrier.node)
+            .fault(fault_of(carrier.node));
     }
 }
