@@ -10,7 +10,7 @@ mod storyboards;
 
 use player::{Run, play};
 use proptest::prelude::*;
-use qcbus_openscenario::{Moment, Plan, Spans, Strictness};
+use qcbus_openscenario::{Condition, Logic, Moment, Plan, Spans, Start, Strictness};
 
 /// Tolerance for comparisons of times, in seconds.
 const CLOSE: f64 = 1e-3;
@@ -64,6 +64,51 @@ proptest! {
     fn bounds_hold_in_every_run(plan in storyboards::random(), seed in any::<u64>()) {
         check(&plan.0, &play(&plan.0, seed));
     }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(), ..ProptestConfig::default() })]
+
+    /// With less knowledge, no bound becomes narrower.
+    #[test]
+    fn unknown_condition_never_narrows_bounds(plan in storyboards::random(), which in any::<prop::sample::Index>()) {
+        let known = plan.0;
+        let mut unknown = known.clone();
+        let mut conditions = conditions_of(&mut unknown);
+        if conditions.is_empty() {
+            return Ok(());
+        }
+        let condition = conditions.swap_remove(which.index(conditions.len()));
+        condition.logic = Logic::Unknown;
+        for strictness in [Strictness::Standard, Strictness::Tolerant] {
+            let (narrow, wide) = (Spans::of(&known, strictness), Spans::of(&unknown, strictness));
+            for place in 0..known.parts.len() {
+                let (narrow, wide) = (narrow.get(place).unwrap(), wide.get(place).unwrap());
+                includes("start", place, wide.start, narrow.start);
+                includes("end", place, wide.end, narrow.end);
+            }
+            includes("end of the run", 0, wide.ends, narrow.ends);
+        }
+    }
+}
+
+fn conditions_of(plan: &mut Plan) -> Vec<&mut Condition> {
+    let starts = plan
+        .parts
+        .iter_mut()
+        .filter_map(|part| match &mut part.start {
+            Start::By(trigger) => Some(trigger),
+            Start::WithParent | Start::Unknown => None,
+        });
+    let triggers = starts.chain(&mut plan.stop);
+    triggers.flat_map(|it| &mut it.groups).flatten().collect()
+}
+
+fn includes(what: &str, place: usize, wide: Moment, narrow: Moment) {
+    assert!(
+        wide.earliest <= narrow.earliest + CLOSE && wide.latest >= narrow.latest - CLOSE,
+        "{what} of {place}: {wide:?} does not include {narrow:?}"
+    );
 }
 
 fn cases() -> u32 {
