@@ -15,7 +15,7 @@ pub use model::Validated;
 use model::{SCHEMA_DIR, SCHEMAS};
 use qcbus_document::{Attribute, Document, Node};
 use qcbus_schema::{Checked, Code, Later, Outcome, Rest, Severity, Version, Violation};
-use qcbus_sdk::{Level, Place, Rule, Sink, Subject, fault_of};
+use qcbus_sdk::{Level, Place, Rule, Sink, Subject, fault_of, fault_of_attribute};
 
 /// Common fields of the schema rules of all bundles, for struct update syntax (`..`).
 pub const RULE: Rule<Validated> = Rule {
@@ -62,11 +62,7 @@ pub fn run_with(checked: &Checked<'_>, found: &mut Sink<'_>, harm: &Harm) {
         let severity = checked.severity(violation);
         // A rule about the same attribute says more, so it is reported first.
         let fault = match violation.attribute {
-            Some(attribute) => format!(
-                "attribute {} of {}",
-                attribute.name(),
-                fault_of(violation.node)
-            ),
+            Some(attribute) => fault_of_attribute(violation.node, attribute.name()),
             None => fault_of(violation.node),
         };
         let finding = found

@@ -39,6 +39,6 @@ pub use resource::{Resource, ResourceError, ResourceFile, ResourceValue, UserFil
 pub use rule::Built;
 pub use rule::{AnyRule, Backport, Each, Facts, Model, Readers, Rule, Unbuilt};
 pub use run::{Exit, Mode, Timings, examine, examine_timed, findings, main, run};
-pub use sink::{Finding, Sink, UNKNOWN_VERSION, fault_of};
+pub use sink::{Finding, Sink, UNKNOWN_VERSION, fault_of, fault_of_attribute};
 pub use subject::{Linked, Subject};
 pub use version::{Version, VersionError, VersionRange};

@@ -551,6 +551,11 @@ pub fn fault_of(node: Node<'_>) -> String {
     format!("element {} of {}", node.offset(), node.document().path())
 }
 
+/// Returns the name of a fault of an attribute, which need not be given. The schema rule uses it.
+pub fn fault_of_attribute(node: Node<'_>, name: &str) -> String {
+    format!("attribute {name} of {}", fault_of(node))
+}
+
 /// Returns the next lower severity. Information stays information.
 fn lower(level: Level) -> Level {
     match level {

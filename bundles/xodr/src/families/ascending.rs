@@ -93,10 +93,9 @@ impl List<'_> {
             beside(start, ahead),
             number(ahead)
         );
-        let parent = node.parent().map(fault_of).unwrap_or_default();
         let finding = found
             .issue(Place::attribute_or_node(node, by), text)
-            .fault(format!("order of {name} in {parent}"));
+            .fault(order_of(node));
         let finding = match self.from {
             Some(from) => finding.road(self.road, from + start, 0.0),
             None => finding,
@@ -122,7 +121,8 @@ impl List<'_> {
         );
         let finding = found
             .issue(Place::attribute_or_node(node, by), text)
-            .level(level);
+            .level(level)
+            .fault(order_of(node));
         let finding = match self.from {
             Some(from) => finding.road(self.road, from + start, 0.0),
             None => finding,
@@ -132,6 +132,12 @@ impl List<'_> {
             finding.uid(uid);
         }
     }
+}
+
+/// Returns the name of the fault that the elements of one name in a parent are in a wrong order.
+fn order_of(node: Node<'_>) -> String {
+    let parent = node.parent().map(fault_of).unwrap_or_default();
+    format!("order of {} in {parent}", node.name())
 }
 
 /// Returns the list of a road's own records, which start at `@s`.

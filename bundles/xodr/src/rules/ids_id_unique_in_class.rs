@@ -1,7 +1,7 @@
 use crate::families::ids::{KINDS, Kind, Scope};
 use crate::prelude::*;
 use foldhash::{HashMap, HashSet};
-use qcbus_sdk::fault_of;
+use qcbus_sdk::{fault_of, fault_of_attribute};
 use std::cell::OnceCell;
 
 pub const RULE: Rule<Document> = Rule {
@@ -55,7 +55,8 @@ fn check<'d>(kind: &Kind, document: &Document<'d>, found: &mut Sink<'_>) {
             let finding = found
                 .issue(node, text)
                 .at(*first, format!("the first {} with this id", kind.name))
-                .fault(format!("id of {}", fault_of(*first)));
+                .fault(format!("id of {}", fault_of(*first)))
+                .fault(fault_of_attribute(node, "id"));
             // Readers place each signal and object. Only a reference to it would be ambiguous.
             let beside = ["signal", "object"].contains(&kind.name);
             if beside && !used_ids.get_or_init(|| used(document)).contains(id) {

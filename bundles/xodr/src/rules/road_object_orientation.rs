@@ -16,7 +16,10 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
             named(object)
         );
         let place = Place::attribute_or_node(object, "orientation");
-        let finding = found.issue(place, text).stands(map, object);
+        let finding = found
+            .issue(place, text)
+            .stands(map, object)
+            .fault("objects without orientation");
         if let Some(validity) = object.child("validity") {
             finding
                 .level(Level::Error)

@@ -26,7 +26,10 @@ fn run(map: &RoadMap<'_>, found: &mut Sink<'_>) {
                 both => format!("{} are", listed(both)),
             }
         );
-        let finding = found.issue(node, text).stands(map, owner(node));
+        let finding = found
+            .issue(node, text)
+            .stands(map, owner(node))
+            .fault("signals without type");
         // Without any type it is not a sign. Some tools write an empty type for their own objects.
         if node.is("signal") && node.attribute("type").is_none() {
             finding.in_every_version(Level::Error);

@@ -87,7 +87,8 @@ fn unit<'a>(map: &RoadMap<'a>, signal: Node<'a>, found: &mut Sink<'_>) {
     );
     let finding = found
         .issue(Place::attribute_or_node(signal, "unit"), text)
-        .uid(UNIT);
+        .uid(UNIT)
+        .fault("values without unit");
     let finding = finding.stands(map, signal);
     if is_limit(signal) {
         finding.level(Level::Error);
@@ -129,6 +130,7 @@ fn unit_like_others<'a>(
     found
         .issue(Place::attribute_or_node(signal, "unit"), text)
         .uid(UNIT)
+        .fault("values without unit")
         .stands(map, signal);
 }
 

@@ -28,7 +28,9 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
                  for a transition of this length use `linear`, `cubic` or `sinusoidal`",
                 stated(dynamics, "value", value)
             );
-            found.about(dynamics, "value", text);
+            found
+                .about(dynamics, "value", text)
+                .fault("steps with a value");
         }
     }
 }

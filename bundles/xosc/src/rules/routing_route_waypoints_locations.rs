@@ -29,7 +29,8 @@ fn look(scenario: &Scenario<'_>, map: &RoadMap<'_>, found: &mut Sink<'_>) {
             );
             found
                 .about(position, "roadId", text)
-                .at(road.node(), "the road");
+                .at(road.node(), "the road")
+                .fault("waypoints in junctions");
         }
     }
 }
