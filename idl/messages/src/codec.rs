@@ -86,7 +86,7 @@ mod tests {
         let drain = encode(&ToPeer::Drain).unwrap();
         let leaving = encode(&FromPeer::Leaving).unwrap();
         let numbers = (drain.first().copied(), leaving.first().copied());
-        assert_eq!((PROTOCOL_VERSION, numbers), (6, (Some(6), Some(8))));
+        assert_eq!((PROTOCOL_VERSION, numbers), (7, (Some(6), Some(8))));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Version of the messages in this crate. Peers of another version are refused by name. Raise it
 /// with every change of a message, because old messages would be decoded as different ones, and with
 /// every change of the format in which services on the bus are described.
-pub const PROTOCOL_VERSION: u32 = 6;
+pub const PROTOCOL_VERSION: u32 = 7;
 
 /// One check of one file's bytes under one configuration; unique within a broker generation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -68,6 +68,8 @@ pub enum DocumentRole {
     /// The root after modular expansion. Its text consists of the files it was made from, so all
     /// positions in it are in these files.
     Expanded,
+    /// A file that only has to exist, such as the grid of a road surface. It is never read.
+    Attachment,
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
+use qcbus_disk::foreign;
 use qcbus_document::{Document, FaultGroup, FileKind};
 use qcbus_formats::xqar::Level;
 use qcbus_messages::path_text::{from_text, name_of, to_text};
@@ -53,6 +54,19 @@ pub trait Source {
     /// Returns the image of a stored document. `index` is the number of documents stored before it.
     fn kept(&self, index: usize) -> &[u8];
 
+    /// Checks that a file exists without reading it.
+    ///
+    /// # Errors
+    /// The reason why it cannot be used.
+    fn find(&self, path: &Path) -> Result<(), Absence> {
+        match foreign::metadata(path) {
+            Ok(data) if data.is_file() => Ok(()),
+            Ok(data) if data.is_dir() => Err(Absence::Directory),
+            Ok(_) => Err(Absence::NotAFile),
+            Err(_) => Err(Absence::NotThere),
+        }
+    }
+
     /// Receives the other paths that the walk examined, so that a caller can watch them.
     fn looked(&mut self, look: Look<'_>) {
         let _ = look;
@@ -64,7 +78,7 @@ pub trait Source {
 pub enum Look<'p> {
     /// A file that is missing or could not be read.
     NotHad(&'p Path),
-    /// A file that was not read because there are too many.
+    /// A file that was not read because there are too many, or because it only has to exist.
     NotRead(&'p Path),
     /// A directory from which all files count.
     Listed(&'p Path),
@@ -208,6 +222,10 @@ impl<S: Source> Walk<'_, S> {
             let catalogs = reference.catalogs.clone().filter(|_| whole);
             self.miss(from, reference, path, why.clone(), catalogs);
         }
+        if reference.role == DocumentRole::Attachment {
+            self.attach(from, reference);
+            return Ok(());
+        }
         let mut first: Option<(&Path, Absence)> = None;
         for path in &reference.candidates {
             let Err(why) = self.candidate(from, reference, path)? else {
@@ -236,6 +254,23 @@ impl<S: Source> Walk<'_, S> {
             self.miss(from, reference, path, why, None);
         }
         Ok(())
+    }
+
+    /// Looks for a file that only has to exist.
+    fn attach(&mut self, from: usize, reference: &Reference) {
+        let mut missing = None;
+        for path in &reference.candidates {
+            match self.source.find(path) {
+                Ok(()) => return self.source.looked(Look::NotRead(path)),
+                Err(why) => {
+                    self.source.looked(Look::NotHad(path));
+                    missing.get_or_insert((path, why));
+                }
+            }
+        }
+        if let Some((path, why)) = missing {
+            self.miss(from, reference, path, why, None);
+        }
     }
 
     /// Fetches one referenced file, unless it has already been fetched.
@@ -505,6 +540,7 @@ fn level(role: DocumentRole, path: &Path, why: &Absence) -> Level {
     let needed = role != DocumentRole::Catalog;
     match why {
         Absence::SimulatorMap => Level::Information,
+        Absence::NotAFile if role == DocumentRole::Attachment => Level::Error,
         Absence::NotThere
         | Absence::Directory
         | Absence::Escapes

@@ -1,5 +1,5 @@
-//! Finds the other files that a scenario refers to: its map, its catalogs and the scenarios that it
-//! is built from.
+//! Finds the other files that a file refers to: the map and the catalogs of a scenario, the scenarios
+//! that it is built from, and the surface grids of a map.
 
 use std::collections::HashMap;
 use std::fs::DirEntry;
@@ -19,7 +19,7 @@ use crate::prepare::{absolute, names_directory, split_members};
 pub struct Reference {
     /// Role of the file. `RoadNetwork/LogicFile` names the map, and `CatalogLocations/…/Directory`
     /// names a folder whose `.xosc` files are catalogs. `ScenarioReference` and
-    /// `ParameterValueDistribution/ScenarioFile` name scenarios.
+    /// `ParameterValueDistribution/ScenarioFile` name scenarios. `surface/CRG` names a grid.
     pub role: DocumentRole,
     /// Kind of catalogs in a catalog directory, such as `VehicleCatalog`.
     pub catalogs: Option<String>,
@@ -69,7 +69,10 @@ fn targets<'d>(document: &Document<'d>) -> Vec<(DocumentRole, Node<'d>, &'d str)
             .elements(element)
             .filter(|node| node.parent().is_some_and(parent))
         {
-            if let Some(text) = node.attr(attribute) {
+            if let Some(text) = node
+                .attr(attribute)
+                .filter(|text| reaches_a_file(role, text))
+            {
                 found.push((role, node, text));
             }
         }
@@ -85,6 +88,10 @@ fn targets<'d>(document: &Document<'d>) -> Vec<(DocumentRole, Node<'d>, &'d str)
         });
     }
     gather(DocumentRole::Catalog, "Directory", "path", &in_catalogs);
+    // Grids of road surfaces (OpenDRIVE 1.9, 10.6 and 13.12).
+    gather(DocumentRole::Attachment, "CRG", "file", &|parent| {
+        parent.is("surface")
+    });
     gather(
         DocumentRole::Scenario,
         "ScenarioFile",
@@ -92,6 +99,12 @@ fn targets<'d>(document: &Document<'d>) -> Vec<(DocumentRole, Node<'d>, &'d str)
         &|parent| parent.is("ParameterValueDistribution"),
     );
     found
+}
+
+/// Checks whether it is worth looking for a file. The rules about maps report the other surfaces.
+fn reaches_a_file(role: DocumentRole, text: &str) -> bool {
+    let has_drive = text.as_bytes().get(1) == Some(&b':');
+    role != DocumentRole::Attachment || !(text.trim().is_empty() || has_drive)
 }
 
 fn resolve(

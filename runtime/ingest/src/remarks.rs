@@ -90,6 +90,7 @@ fn missing_reference(root: &Document<'_>, missing: &MissingDocument) -> Remark {
     let what = match missing.role {
         DocumentRole::Map => "the map",
         DocumentRole::Catalog => "the catalog location",
+        DocumentRole::Attachment => "the file",
         _ => "the scenario",
     };
     let MissingDocument {

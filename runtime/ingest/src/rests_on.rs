@@ -21,7 +21,10 @@ pub(crate) fn rests_on(set: &[Member<'_>]) -> Vec<bool> {
     let counts = |(index, (role, _)): (usize, &Member<'_>)| match role {
         DocumentRole::Map | DocumentRole::Scenario => true,
         DocumentRole::Catalog => used.contains(&index),
-        DocumentRole::Root | DocumentRole::Listing | DocumentRole::Expanded => false,
+        DocumentRole::Root
+        | DocumentRole::Listing
+        | DocumentRole::Expanded
+        | DocumentRole::Attachment => false,
     };
     set.iter().enumerate().map(counts).collect()
 }

@@ -55,6 +55,11 @@ impl Source for Files {
         self.images.push(image);
     }
 
+    fn find(&self, path: &Path) -> Result<(), Absence> {
+        let found = self.files.contains_key(path);
+        found.then_some(()).ok_or(Absence::NotThere)
+    }
+
     fn looked(&mut self, look: Look<'_>) {
         let (Look::NotHad(path) | Look::NotRead(path) | Look::Listed(path)) = look;
         self.looked.push(path.to_owned());
@@ -66,7 +71,16 @@ fn gathered(
     files: &[(&str, &'static str)],
     most: usize,
 ) -> (Files, Vec<MissingDocument>) {
-    let path = Path::new("/farm/s/x.xosc");
+    gathered_from("/farm/s/x.xosc", text, files, most)
+}
+
+fn gathered_from(
+    path: &str,
+    text: &str,
+    files: &[(&str, &'static str)],
+    most: usize,
+) -> (Files, Vec<MissingDocument>) {
+    let path = Path::new(path);
     let image = prepare_bytes(path, text.into(), &Limits::default()).build();
     let mut store = Files::default();
     store.files.extend(
@@ -103,6 +117,32 @@ fn first_existing_spelling_of_a_reference_is_used() {
     assert_eq!(
         store.looked, looked,
         "the watcher knows where a missing file may appear"
+    );
+}
+
+#[test]
+fn surface_grids_must_exist_and_are_not_read() {
+    let map = "<OpenDRIVE><road><surface><CRG file='a.crg'/><CRG file='dir\\b.crg'/><CRG file=''/>\
+               <CRG file='C:\\c.crg'/><CRG file='gone.crg'/></surface></road></OpenDRIVE>";
+    let there = [("/farm/m/a.crg", "no XML"), ("/farm/m/dir/b.crg", "")];
+    let (store, missing) = gathered_from("/farm/m/x.xodr", map, &there, 10);
+    assert_eq!(store.kept, []);
+    let missing: Vec<_> = missing
+        .iter()
+        .map(|it| (it.reference.as_str(), it.role, &it.why, it.level))
+        .collect();
+    let gone = (
+        "gone.crg",
+        DocumentRole::Attachment,
+        &Absence::NotThere,
+        Level::Error,
+    );
+    assert_eq!(missing, [gone], "rules report the empty path and the drive");
+    let looked = ["a.crg", "dir\\b.crg", "dir/b.crg", "gone.crg"];
+    let looked = looked.map(|name| PathBuf::from(format!("/farm/m/{name}")));
+    assert_eq!(
+        store.looked, looked,
+        "all places where a grid is or may appear"
     );
 }
 
