@@ -110,6 +110,27 @@ fn old_map_is_judged_again_when_its_include_changes() {
     verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
 }
 
+#[test]
+fn map_is_judged_again_when_its_surface_grid_comes_or_goes() {
+    let farm = farm_with_gate();
+    let surface = "<surface>\n<CRG file=\"quay.crg\" sStart=\"0\" sEnd=\"10\" orientation=\"same\" \
+                   mode=\"attached\"/>\n</surface>\n</road>";
+    let map = String::from_utf8(Content::Good(1).bytes()).unwrap();
+    assert!(map.contains("</road>"), "{map}");
+    put_old(
+        &farm,
+        "a.xodr",
+        map.replacen("</road>", surface, 1).as_bytes(),
+    );
+    let _broker = farm.serve_ready();
+    farm.settle(1);
+    verdict_becomes(&farm, "a.xodr", Verdict::Rejected);
+    put_old(&farm, "quay.crg", b"$CRG 1.0\n");
+    verdict_becomes(&farm, "a.xodr", Verdict::Accepted);
+    std::fs::remove_file(farm.root().join("quay.crg")).unwrap();
+    verdict_becomes(&farm, "a.xodr", Verdict::Rejected);
+}
+
 fn sha256(bytes: &[u8]) -> String {
     let digest = Sha256::digest(bytes);
     digest.iter().map(|byte| format!("{byte:02x}")).collect()

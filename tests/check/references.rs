@@ -454,3 +454,40 @@ fn only_used_catalogs_affect_the_verdict() {
     let line = "rejected: scenarios/on_it.xosc: ";
     assert!(said.stdout.contains(line), "{}", said.whole(&cli));
 }
+
+/// The map with a surface grid on its road.
+fn map_with_grid(path: &str) -> String {
+    let map = std::fs::read_to_string(sample_farm().join("maps/quay_straight.xodr")).unwrap();
+    let surface = format!(
+        "</lanes>\n<surface>\n<CRG file=\"{path}\" sStart=\"0\" sEnd=\"120\" orientation=\"same\" mode=\"attached\" \
+         sOffset=\"0\" tOffset=\"0\" zOffset=\"0\" zScale=\"1\"/>\n</surface>"
+    );
+    map.replace("</lanes>", &surface)
+}
+
+#[test]
+fn map_without_its_surface_grid_is_rejected() {
+    let cli = cli();
+    cli.write("maps/grids/quay.crg", "$CRG 1.0\n");
+    let cases = [
+        ("grids/quay.crg", 0, ""),
+        (
+            "grids/pier.crg",
+            1,
+            "the file `grids/pier.crg` does not exist",
+        ),
+        ("grids", 1, "the file `grids` is a directory, not a file"),
+    ];
+    for (path, code, said) in cases {
+        cli.write("maps/quay.xodr", map_with_grid(path));
+        let out = cli.qcbus(&["check", "maps/quay.xodr", "--out", "out"]);
+        assert_eq!(out.code, Some(code), "{path}: {}", out.whole(&cli));
+        let results = cli.result("out/maps/quay.xodr.xqar");
+        let remarks = remarks(&results);
+        let found = remarks.iter().find(|(text, _)| text.starts_with(said));
+        match said {
+            "" => assert_eq!(remarks, []),
+            _ => assert_eq!(found.map(|(_, place)| *place), Some((34, 6)), "{remarks:?}"),
+        }
+    }
+}

@@ -78,8 +78,10 @@ pub trait Source {
 pub enum Look<'p> {
     /// A file that is missing or could not be read.
     NotHad(&'p Path),
-    /// A file that was not read because there are too many, or because it only has to exist.
+    /// A file that was not read because there are too many, or because it is no file.
     NotRead(&'p Path),
+    /// A file that only has to exist. It is no document, but a copy of the root needs it.
+    Attached(&'p Path),
     /// A directory from which all files count.
     Listed(&'p Path),
 }
@@ -261,9 +263,12 @@ impl<S: Source> Walk<'_, S> {
         let mut missing = None;
         for path in &reference.candidates {
             match self.source.find(path) {
-                Ok(()) => return self.source.looked(Look::NotRead(path)),
+                Ok(()) => return self.source.looked(Look::Attached(path)),
                 Err(why) => {
-                    self.source.looked(Look::NotHad(path));
+                    self.source.looked(match why {
+                        Absence::NotThere => Look::NotHad(path),
+                        _ => Look::NotRead(path),
+                    });
                     missing.get_or_insert((path, why));
                 }
             }

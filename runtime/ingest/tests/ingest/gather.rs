@@ -61,7 +61,8 @@ impl Source for Files {
     }
 
     fn looked(&mut self, look: Look<'_>) {
-        let (Look::NotHad(path) | Look::NotRead(path) | Look::Listed(path)) = look;
+        let (Look::NotHad(path) | Look::NotRead(path) | Look::Attached(path) | Look::Listed(path)) =
+            look;
         self.looked.push(path.to_owned());
     }
 }

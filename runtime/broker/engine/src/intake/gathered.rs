@@ -10,7 +10,7 @@ use qcbus_ingest::modular::ExpandedImage;
 use qcbus_ingest::{Found, Limits, Look, Prepared, Source};
 use qcbus_messages::path_text::{from_text, to_text};
 use qcbus_messages::{Absence, Digest, DocId, DocumentRole, JobDocument, MissingDocument};
-use qcbus_types::{Input, PrepareFailure, PreparedJob, Reading, Referenced, Stamp};
+use qcbus_types::{Input, PrepareFailure, PreparedJob, Reading, Referenced, Stamp, digest_of};
 use qcbus_watch::stamp::{from_content, is_racy, stamp_through_links};
 use sha2::{Digest as _, Sha256};
 
@@ -82,6 +82,23 @@ impl Gathered {
                     content: Reading::Unread(stamp),
                 });
         }
+    }
+
+    /// Records a file that is no document, with the digest of its bytes. A file of more than `most` bytes counts as
+    /// unread.
+    fn attached(&mut self, path: &Path, most: u64) {
+        let Some(stamp) = stamp_through_links(path) else {
+            return self.absent(path);
+        };
+        let Ok(bytes) = foreign::read(path, most) else {
+            return self.unread(path, Some(stamp));
+        };
+        let content = Reading::Read(stamp, digest_of(&bytes));
+        let path = path.to_path_buf();
+        self.inputs.entry(path).or_insert_with_key(|path| Input {
+            path: path.as_path().into(),
+            content,
+        });
     }
 
     /// Records a file that was not found. When it appears, the verdict becomes invalid.
@@ -256,6 +273,7 @@ impl Source for Links<'_> {
                 self.gathered.unread(path, stamp_through_links(path));
                 self.gathered.absent(path);
             }
+            Look::Attached(path) => self.gathered.attached(path, self.intake.limits.max_file),
             Look::Listed(directory) => self.gathered.listing(directory),
         }
     }
