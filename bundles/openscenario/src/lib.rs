@@ -8,6 +8,7 @@
 //! `docs/openscenario-model.md` is the guide.
 
 pub mod expr;
+pub mod places;
 
 mod queries;
 mod timeline;

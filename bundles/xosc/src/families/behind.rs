@@ -6,11 +6,11 @@ use crate::families::actions::acting;
 use crate::families::deletions::added;
 use crate::families::init;
 use crate::families::motion::{Speeds, may_drive_itself};
-use crate::families::origins::Origins;
 use crate::families::positions::{road_of, station};
 use crate::families::relative::Reach;
 use crate::prelude::*;
 use foldhash::{HashSet, HashSetExt as _};
+use qcbus_openscenario::places::Origins;
 
 /// Entities with a known start on a road, and the ways that lead back.
 pub(crate) struct Behind<'m, 'd, 'w, 'r> {

@@ -17,7 +17,6 @@ pub(crate) mod init;
 pub(crate) mod minsubset;
 pub(crate) mod motion;
 pub(crate) mod names;
-pub(crate) mod origins;
 pub(crate) mod placement;
 pub(crate) mod positions;
 pub(crate) mod profiles;

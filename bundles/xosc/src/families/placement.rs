@@ -3,39 +3,7 @@
 use crate::prelude::*;
 use foldhash::HashSet;
 
-/// A `TeleportAction` of `Init` for one entity.
-pub(crate) struct Start<'m, 'd> {
-    /// The entity.
-    pub(crate) name: String,
-    /// `WorldPosition` or a similar element.
-    pub(crate) position: Element<'m, 'd>,
-}
-
-/// Returns the teleports of `Init` in document order. A selection gives one for each member.
-pub(crate) fn starts<'m, 'd>(scenario: &'m Scenario<'d>) -> Vec<Start<'m, 'd>> {
-    let mut starts = Vec::new();
-    let actions = scenario.root().path(&["Storyboard", "Init", "Actions"]);
-    let privates = actions
-        .into_iter()
-        .flat_map(|actions| actions.children_named("Private"));
-    for private in privates {
-        let name = private.text("entityRef");
-        let Some(entities) = name.and_then(|name| scenario.entities().expand(&name)) else {
-            continue;
-        };
-        for action in private.children_named("PrivateAction") {
-            let position = action.path(&["TeleportAction", "Position"]);
-            let Some(position) = position.and_then(|position| position.children().next()) else {
-                continue;
-            };
-            starts.extend(entities.iter().map(|entity| Start {
-                name: entity.name().to_owned(),
-                position,
-            }));
-        }
-    }
-    starts
-}
+pub(crate) use qcbus_openscenario::places::{Start, starts};
 
 /// Returns the names of all entities that are placed at some time. Returns `None` if this is
 /// unknown.

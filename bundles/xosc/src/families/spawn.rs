@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::families::origins::{Origins, or};
 use crate::families::placement::{self, Start};
 use crate::prelude::*;
 use foldhash::{HashMap, HashSet};
+use qcbus_openscenario::places::{Origins, or};
 
 /// A vehicle or pedestrian at the last place that `Init` gives it.
 pub(crate) struct Body<'m, 'd> {

@@ -4,11 +4,11 @@ use crate::families::actions::acting;
 use crate::families::deletions::added;
 use crate::families::init;
 use crate::families::motion::{Speeds, may_drive_itself};
-use crate::families::origins::Origins;
 use crate::families::relative::OnRoad;
 use crate::prelude::*;
 use qcbus_opendrive::ContactPoint;
 use qcbus_openscenario::StoryKind;
+use qcbus_openscenario::places::Origins;
 
 /// A moment of the run.
 #[derive(Debug, Clone, Copy)]

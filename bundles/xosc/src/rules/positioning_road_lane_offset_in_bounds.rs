@@ -1,10 +1,10 @@
-use crate::families::origins::Origins;
 use crate::families::positions::{ON_ROAD, lane_of, metres, road_of, section_of, shown, station};
 use crate::families::relative::OnRoad;
 use crate::families::relative::{self, Reach};
 use crate::prelude::*;
 use foldhash::HashSet;
 use qcbus_opendrive::LaneRef;
+use qcbus_openscenario::places::Origins;
 
 pub const RULE: Rule<Scene> = Rule {
     uids: &[

@@ -1,6 +1,5 @@
 use std::cell::LazyCell;
 
-use crate::families::origins::{self, Origins};
 use crate::families::positions::{self, ON_ROAD, find_lane, lane_id, listed, metres, sorted};
 use crate::families::references::quoted;
 use crate::families::relative;
@@ -9,6 +8,7 @@ use crate::prelude::*;
 use foldhash::HashSet;
 use qcbus_opendrive::SectionRef;
 use qcbus_openscenario::RoadNetwork;
+use qcbus_openscenario::places::{self, Origins};
 
 pub const RULE: Rule<Scene> = Rule {
     run,
@@ -144,7 +144,7 @@ fn beside<'m, 'd>(
     };
     let mut nowhere = None;
     for ds in ways {
-        let Some(s) = origins::within(on.road, on.s + ds) else {
+        let Some(s) = places::within(on.road, on.s + ds) else {
             return;
         };
         for id in &lanes {

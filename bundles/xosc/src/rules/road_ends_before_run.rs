@@ -1,10 +1,10 @@
 use crate::families::actions::{acting, short};
 use crate::families::init;
 use crate::families::motion::{Speeds, may_drive_itself};
-use crate::families::origins::Origins;
 use crate::families::relative::Reach;
 use crate::prelude::*;
 use foldhash::{HashSet, HashSetExt as _};
+use qcbus_openscenario::places::Origins;
 
 pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,

@@ -1,8 +1,8 @@
-use crate::families::origins::Origins;
 use crate::families::positions::{find_lane, lane_of, metres, moved, owner, road_of};
 use crate::prelude::*;
 use foldhash::HashSet;
 use qcbus_opendrive::LaneRef;
+use qcbus_openscenario::places::Origins;
 
 pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,

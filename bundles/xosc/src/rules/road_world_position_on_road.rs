@@ -1,8 +1,8 @@
-use crate::families::origins::Origins;
 use crate::families::positions::{metres, moved, owner};
 use crate::prelude::*;
 use qcbus_openscenario::RoadNetwork;
 use qcbus_openscenario::RoadsNearby;
+use qcbus_openscenario::places::Origins;
 
 pub const RULE: Rule<Scene> = Rule {
     level: Level::Information,

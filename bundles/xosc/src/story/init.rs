@@ -3,9 +3,9 @@
 use super::inner;
 use crate::families::actions::short;
 use crate::families::init::{self, InitAction};
-use crate::families::origins::Origins;
 use crate::prelude::*;
 use qcbus_opendrive::geometry::wrap_angle;
+use qcbus_openscenario::places::Origins;
 
 /// Start of an entity.
 #[derive(Debug)]

@@ -2,26 +2,30 @@
 
 use std::cell::RefCell;
 
-use crate::families::placement::{self, Start};
-use crate::families::positions::{AT_END, find_lane, lane_of, road_of, section_of, station};
-use crate::families::relative::{self, OnRoad};
-use crate::prelude::*;
 use foldhash::{HashMap, HashMapExt as _};
-use qcbus_opendrive::TrafficRule;
-use qcbus_openscenario::RoadNetwork;
+use qcbus_opendrive::{LaneRef, Road, RoadMap, Side, TrafficRule};
+
+use super::positions::{AT_END, find_lane, lane_of, road_of, section_of, station};
+use super::relative::{self, OnRoad};
+use super::starts::{Start, starts};
+use crate::queries::element::Element;
+use crate::queries::scenario::Scenario;
+use crate::types::road_network::{LaneAt, RoadNetwork};
 
 /// Position in the world, and on the road if the road is known.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Whereabouts<'w, 'r> {
-    pub(crate) x: f64,
-    pub(crate) y: f64,
+pub struct Whereabouts<'w, 'r> {
+    /// In metres.
+    pub x: f64,
+    /// In metres.
+    pub y: f64,
     /// Height, or `None` if it is unknown.
-    pub(crate) z: Option<f64>,
+    pub z: Option<f64>,
     /// Direction in which it faces.
-    pub(crate) heading: f64,
+    pub heading: f64,
     /// Whether all simulators agree on the heading. On the left of a road, some let an entity face
     /// along the road and some against it.
-    pub(crate) is_sure: bool,
+    pub is_sure: bool,
     /// Position on a road, if it was placed on one. Otherwise [`Origins::on`] searches for it.
     on: Option<OnRoad<'w, 'r>>,
 }
@@ -34,8 +38,9 @@ enum Memo<'w, 'r> {
 }
 
 /// The places of all entities that are teleported in `Init`.
-pub(crate) struct Origins<'m, 'd, 'w, 'r> {
-    pub(crate) starts: Vec<Start<'m, 'd>>,
+pub struct Origins<'m, 'd, 'w, 'r> {
+    /// The teleports of `Init`.
+    pub starts: Vec<Start<'m, 'd>>,
     /// Index of the start, or `None` if an entity is teleported more than once.
     by_name: HashMap<String, Option<usize>>,
     memo: RefCell<Vec<Memo<'w, 'r>>>,
@@ -53,11 +58,8 @@ const RELATIVE: &[&str] = &[
 
 impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
     /// Creates the origins. `map` is the scenario's map, if it is known.
-    pub(crate) fn of(
-        scenario: &'m Scenario<'d>,
-        map: Option<&'w RoadMap<'r>>,
-    ) -> Origins<'m, 'd, 'w, 'r> {
-        let starts = placement::starts(scenario);
+    pub fn of(scenario: &'m Scenario<'d>, map: Option<&'w RoadMap<'r>>) -> Origins<'m, 'd, 'w, 'r> {
+        let starts = starts(scenario);
         let mut by_name = HashMap::new();
         for (at, start) in starts.iter().enumerate() {
             by_name
@@ -75,14 +77,14 @@ impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
     }
 
     /// Returns the entity that a position is relative to, and its place.
-    pub(crate) fn base(&self, position: Element<'m, 'd>) -> Option<(String, Whereabouts<'w, 'r>)> {
+    pub fn base(&self, position: Element<'m, 'd>) -> Option<(String, Whereabouts<'w, 'r>)> {
         let name = relative_to(position)?;
         let at = (*self.by_name.get(&name)?)?;
         Some((name, self.place(at)?))
     }
 
     /// Returns the place of the entity of a start.
-    pub(crate) fn place(&self, at: usize) -> Option<Whereabouts<'w, 'r>> {
+    pub fn place(&self, at: usize) -> Option<Whereabouts<'w, 'r>> {
         let mut way = Vec::new();
         let mut next = Some(at);
         while let Some(here) = next {
@@ -163,7 +165,7 @@ impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
     }
 
     /// Returns the position of a place on a road, if there is only one road.
-    pub(crate) fn on(&self, place: &Whereabouts<'w, 'r>) -> Option<OnRoad<'w, 'r>> {
+    pub fn on(&self, place: &Whereabouts<'w, 'r>) -> Option<OnRoad<'w, 'r>> {
         if place.on.is_some() {
             return place.on;
         }
@@ -209,7 +211,7 @@ fn relative_to(position: Element<'_, '_>) -> Option<String> {
 }
 
 /// Returns an optional number. Returns `None` if it exists but is unknown.
-pub(crate) fn or(element: Element<'_, '_>, name: &str, otherwise: f64) -> Option<f64> {
+pub fn or(element: Element<'_, '_>, name: &str, otherwise: f64) -> Option<f64> {
     if element.has(name) {
         element.number(name)
     } else {
@@ -218,13 +220,13 @@ pub(crate) fn or(element: Element<'_, '_>, name: &str, otherwise: f64) -> Option
 }
 
 /// Returns the middle of a lane.
-fn middle(lane: qcbus_opendrive::LaneRef<'_, '_>, s: f64) -> Option<f64> {
+fn middle(lane: LaneRef<'_, '_>, s: f64) -> Option<f64> {
     let ds = s - lane.at.s()?;
     Some(f64::midpoint(lane.inner_t(ds)?, lane.outer_t(ds)?))
 }
 
 /// Returns a station if it is on the road.
-pub(crate) fn within(road: &Road<'_>, s: f64) -> Option<f64> {
+pub fn within(road: &Road<'_>, s: f64) -> Option<f64> {
     let length = road.length()?;
     (s >= -AT_END && s <= length + AT_END).then(|| s.clamp(0.0, length))
 }
