@@ -9,6 +9,7 @@
 
 pub mod expr;
 pub mod places;
+pub mod wording;
 
 mod queries;
 mod timeline;

@@ -2,6 +2,8 @@
 
 use crate::prelude::*;
 
+pub(crate) use qcbus_openscenario::wording::{short, stated};
+
 /// Returns the scenario objects that an action moves, including members of selections. Returns
 /// `None` if not all of them are known.
 pub(crate) fn acting<'m, 'd>(action: Element<'m, 'd>) -> Option<Vec<&'m Entity<'d>>> {
@@ -72,21 +74,5 @@ pub(crate) fn domains(private: Element<'_, '_>) -> Vec<Domain> {
     domains
 }
 
-/// Formats a number with at most three decimals.
-pub fn short(value: f64) -> String {
-    let rounded = (value * 1000.0).round() / 1000.0;
-    format!("{}", if rounded == 0.0 { 0.0 } else { rounded })
-}
-
 /// Elements of type `TransitionDynamics`.
 pub(crate) const TRANSITIONS: &[&str] = &["SpeedActionDynamics", "LaneChangeActionDynamics"];
-
-/// Formats a number as it is written. If the text contains a parameter or an expression, the result
-/// comes first and the text follows.
-pub(crate) fn stated(element: Element<'_, '_>, attribute: &str, value: f64) -> String {
-    match element.written(attribute) {
-        Some(written) if written.contains('$') => format!("`{}` (`{written}`)", short(value)),
-        Some(written) => format!("`{}`", written.trim()),
-        None => format!("`{}`", short(value)),
-    }
-}

@@ -12,7 +12,6 @@ pub(crate) mod demands;
 pub(crate) mod deprecation;
 pub(crate) mod distributions;
 pub(crate) mod finite;
-pub(crate) mod impossible;
 pub(crate) mod init;
 pub(crate) mod minsubset;
 pub(crate) mod motion;

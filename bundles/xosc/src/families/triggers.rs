@@ -5,11 +5,13 @@ use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::hash::BuildHasher as _;
 
-use crate::families::actions::stated;
 use crate::prelude::*;
 use foldhash::HashMap;
 use qcbus_openscenario::Reading;
 use qcbus_openscenario::parse_double;
+use qcbus_openscenario::wording::stated;
+
+pub(crate) use qcbus_openscenario::wording::called;
 
 /// Reports the elements of a name that matter and have a `StartTrigger` without any condition.
 pub(crate) fn empty_starts<'d>(
@@ -33,24 +35,6 @@ pub(crate) fn empty_starts<'d>(
                 .about(trigger, "", text)
                 .maybe_fault(timeline::start_of(element));
         }
-    }
-}
-
-/// Formats an element with its name for messages: "the act `Drive`".
-pub(crate) fn called(element: Element<'_, '_>) -> String {
-    let own = format!("`{}`", element.name());
-    let kind = match element.name() {
-        "Story" => "story",
-        "Act" => "act",
-        "ManeuverGroup" => "maneuver group",
-        "Maneuver" => "maneuver",
-        "Event" => "event",
-        "Action" => "action",
-        _ => &own,
-    };
-    match element.text("name") {
-        Some(name) => format!("the {kind} `{name}`"),
-        None => format!("this {kind}"),
     }
 }
 

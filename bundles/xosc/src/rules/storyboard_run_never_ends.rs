@@ -1,7 +1,7 @@
-use crate::families::impossible::described;
 use crate::families::timeline::{self, Never, differs};
 use crate::families::triggers::edge_of_time;
 use crate::prelude::*;
+use qcbus_openscenario::wording::described;
 use qcbus_openscenario::{Cause, Timeline};
 
 pub const RULE: Rule<Scene> = Rule {

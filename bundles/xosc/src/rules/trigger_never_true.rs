@@ -1,6 +1,7 @@
-use crate::families::{impossible::described, timeline};
+use crate::families::timeline;
 use crate::prelude::*;
 use qcbus_openscenario::ImpossibleReason;
+use qcbus_openscenario::wording::described;
 
 pub const RULE: Rule<Scene> = Rule {
     level: Level::Warning,

@@ -12,9 +12,9 @@ use qcbus_sdk::{Model as _, Subject, Unbuilt};
 
 use crate::model::Scene;
 
-pub use crate::families::actions::short;
 pub use gaps::Gap;
 pub use init::{Opening, StartPosition};
+pub use qcbus_openscenario::wording::short;
 pub use qcbus_openscenario::{Moment, StoryKind};
 
 /// What a scenario does in a run.

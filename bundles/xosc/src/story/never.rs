@@ -2,10 +2,10 @@
 
 use super::waits;
 use crate::families::actions::short;
-use crate::families::impossible::described;
 use crate::families::timeline::{ends_never, state_never_comes};
 use crate::families::triggers::{called, edge_of_time};
 use crate::prelude::*;
+use qcbus_openscenario::wording::described;
 use qcbus_openscenario::{At, Cause, Strictness, Timeline};
 
 /// Returns why an element never starts.
