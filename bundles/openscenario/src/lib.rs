@@ -9,6 +9,7 @@
 
 pub mod expr;
 pub mod places;
+pub mod story;
 pub mod wording;
 
 mod queries;
@@ -18,6 +19,7 @@ mod types;
 pub use qcbus_schema::closest;
 pub use queries::actors::Actors;
 pub use queries::element::Element;
+pub use queries::init::{InitAction, init_actions};
 pub use queries::network::Network;
 pub use queries::scenario::Scenario;
 pub use timeline::{

@@ -8,10 +8,12 @@ mod families;
 mod model;
 mod prelude;
 mod rules;
-pub mod story;
+mod story;
 
 use qcbus_document::FileKind;
 use qcbus_sdk::{Bundle, Version, basic};
+
+pub use story::story;
 
 /// The bundle.
 pub static BUNDLE: Bundle = Bundle {

@@ -5,6 +5,7 @@ pub(crate) mod element;
 pub(crate) mod entities;
 pub(crate) mod expressions;
 pub(crate) mod faults;
+pub(crate) mod init;
 pub(crate) mod network;
 pub(crate) mod references;
 pub(crate) mod scenario;

@@ -2,8 +2,11 @@
 
 use crate::families::triggers::called;
 use crate::prelude::*;
-use qcbus_openscenario::{At, Cause, Logic, Plan, Start, StoryKind, Strictness, Takes, Timeline};
+use qcbus_openscenario::story::never_starts_within;
+use qcbus_openscenario::{At, Cause, Logic, Start, Strictness, Timeline};
 use qcbus_sdk::fault_of;
+
+pub(crate) use qcbus_openscenario::story::state_never_comes;
 
 /// A trigger that is never true.
 pub(crate) struct Never<'m, 'd> {
@@ -107,7 +110,7 @@ pub(crate) fn start_within(
     let element = scenario
         .storyboard()
         .elements()
-        .get(idle_in(timeline, of)?)?;
+        .get(never_starts_within(timeline, of)?)?;
     start_of(element.element(scenario))
 }
 
@@ -128,104 +131,6 @@ pub(crate) fn keeps_running<'d>(scenario: &Scenario<'d>, condition: Element<'_, 
             _ => false,
         })
     })
-}
-
-/// Describes why the state of an element never comes: "`endTransition` of the event `Brake` never
-/// comes, because …". `condition` is the `StoryboardElementStateCondition`.
-pub(crate) fn state_never_comes(
-    scenario: &Scenario<'_>,
-    timeline: &Timeline,
-    condition: Element<'_, '_>,
-    of: usize,
-) -> String {
-    let word = condition.word("state").unwrap_or_default().into_owned();
-    let element = scenario.storyboard().elements().get(of);
-    let name = element.map_or_else(
-        || "the element".to_owned(),
-        |one| called(one.element(scenario)),
-    );
-    let why = match why(scenario, timeline, &word, of) {
-        Some(why) => format!(", because {why}"),
-        None => String::new(),
-    };
-    format!("`{word}` of {name} never comes{why}")
-}
-
-/// Describes why an element never ends: "the action `Follow` has `continuous="true"` and does not
-/// end by itself".
-pub(crate) fn ends_never(
-    scenario: &Scenario<'_>,
-    timeline: &Timeline,
-    of: usize,
-) -> Option<String> {
-    why(scenario, timeline, "completeState", of)
-}
-
-fn why(scenario: &Scenario<'_>, timeline: &Timeline, word: &str, of: usize) -> Option<String> {
-    let plan = &timeline.plan;
-    let part = plan.parts.get(of)?;
-    match word {
-        "skipTransition" => {
-            let is_event = part.kind == StoryKind::Event;
-            Some(match is_event {
-                true => "only events with the priority `skip` are skipped, while another event of \
-                         their maneuver runs"
-                    .to_owned(),
-                false => "only events are skipped".to_owned(),
-            })
-        }
-        "stopTransition" => Some("nothing stops it".to_owned()),
-        _ => {
-            let within = |at: &usize| {
-                let mut around = std::iter::successors(Some(*at), |at| plan.parts.get(*at)?.parent);
-                around.any(|it| it == of)
-            };
-            let mut places = (0..plan.parts.len()).filter(within);
-            places
-                .find_map(|at| endless(scenario, plan, at, of))
-                .or_else(|| idle(scenario, timeline, of))
-        }
-    }
-}
-
-/// Describes an element that does not end. It is `it` if it is the element of the sentence.
-fn endless(scenario: &Scenario<'_>, plan: &Plan, at: usize, it: usize) -> Option<String> {
-    let part = plan.parts.get(at)?;
-    let element = scenario.storyboard().elements().get(at)?;
-    let name = match at == it {
-        true => "it".to_owned(),
-        false => called(element.element(scenario)),
-    };
-    match (part.takes, part.executions) {
-        (Takes::Forever | Takes::ForeverInTheory, _) => Some(format!(
-            "{name} has `continuous=\"true\"` and does not end by itself"
-        )),
-        (_, Some(count)) if count > 1 && part.kind == StoryKind::Event => Some(format!(
-            "{name} has `maximumExecutionCount=\"{count}\"`, but is triggered less often"
-        )),
-        _ => None,
-    }
-}
-
-/// Describes an element that keeps another one from its end because it never starts.
-fn idle(scenario: &Scenario<'_>, timeline: &Timeline, of: usize) -> Option<String> {
-    let at = idle_in(timeline, of)?;
-    let name = match at == of {
-        true => "it".to_owned(),
-        false => called(scenario.storyboard().elements().get(at)?.element(scenario)),
-    };
-    Some(format!("{name} never starts"))
-}
-
-/// Returns the first element in another one, or that one, that never starts.
-fn idle_in(timeline: &Timeline, of: usize) -> Option<usize> {
-    let parent = |at: &usize| timeline.plan.parts.get(*at)?.parent;
-    let is_idle = |at: &usize| {
-        let span = timeline.standard.get(*at);
-        span.is_some_and(|span| span.start.is_never())
-            && std::iter::successors(Some(*at), parent).any(|around| around == of)
-    };
-    (0..timeline.plan.parts.len()).find(is_idle)
 }
 
 /// Checks whether an element waits for itself or for an element around it, which other findings

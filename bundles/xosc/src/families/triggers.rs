@@ -9,8 +9,8 @@ use crate::prelude::*;
 use foldhash::HashMap;
 use qcbus_openscenario::Reading;
 use qcbus_openscenario::parse_double;
-use qcbus_openscenario::wording::stated;
 
+pub(crate) use qcbus_openscenario::story::{edge_of_time, time};
 pub(crate) use qcbus_openscenario::wording::called;
 
 /// Reports the elements of a name that matter and have a `StartTrigger` without any condition.
@@ -45,11 +45,6 @@ pub(crate) fn groups<'m, 'd>(
     trigger
         .children_named("ConditionGroup")
         .map(|group| group.children_named("Condition").collect())
-}
-
-/// Returns the `SimulationTimeCondition` of a condition.
-pub(crate) fn time<'m, 'd>(condition: Element<'m, 'd>) -> Option<Element<'m, 'd>> {
-    condition.path(&["ByValueCondition", "SimulationTimeCondition"])
 }
 
 /// Returns the `SimulationTimeCondition` or the `TimeOfDayCondition` of a condition.
@@ -94,45 +89,6 @@ pub(crate) fn holds_at_once(condition: Element<'_, '_>) -> bool {
         Some(holds && delay <= 0.0)
     };
     holds().unwrap_or(false)
-}
-
-/// Returns why the edge of a condition about the simulation time never occurs, and how certain that
-/// is. The time starts at 0 and only increases.
-pub(crate) fn edge_of_time(condition: Element<'_, '_>) -> Option<(Level, String)> {
-    let edge = condition.word("conditionEdge")?;
-    let time = time(condition)?;
-    let value = time.number("value")?;
-    let rule = time.word("rule")?;
-    let wanted = stated(time, "value", value);
-    match (&*edge, &*rule) {
-        ("falling", "greaterThan" | "greaterOrEqual") => Some((
-            Level::Warning,
-            format!(
-                "the time becomes greater than {wanted} s and stays so; a `falling` edge never occurs, only a \
-                 `rising` one does"
-            ),
-        )),
-        // The rule `trigger_never_true` reports smaller values.
-        ("rising", "lessThan" | "lessOrEqual")
-            if value > 0.0 || (value == 0.0 && &*rule == "lessOrEqual") =>
-        {
-            Some((
-                Level::Warning,
-                format!(
-                    "the time is less than {wanted} s from the beginning; a `rising` edge never occurs, only a \
-                     `falling` one does"
-                ),
-            ))
-        }
-        ("rising", "equalTo" | "greaterOrEqual") if value == 0.0 => Some((
-            Level::Information,
-            format!(
-                "at {wanted} s the condition is true in the very first step, and there is no earlier step to \
-                 rise from; strictly, the edge never occurs; use `conditionEdge=\"none\"`"
-            ),
-        )),
-        _ => None,
-    }
 }
 
 /// Returns an element with all its significant content as one text. Elements with the same text

@@ -61,7 +61,7 @@ fn report(
         }
         Cause::Over { at } => {
             let edge = never.condition(at).and_then(edge_of_time);
-            let why = edge.map(|(_, why)| why);
+            let why = edge.map(|no| no.why);
             (
                 at,
                 why.unwrap_or_else(|| "this condition is over when the run begins".to_owned()),

@@ -21,7 +21,10 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         if keeps_running(scenario, condition) {
             continue;
         }
-        let time = edge_of_time(condition);
+        let time = edge_of_time(condition).map(|no| match no.is_disputed {
+            true => (Level::Information, no.why),
+            false => (Level::Warning, no.why),
+        });
         let states = condition.path(&["ByValueCondition", "StoryboardElementStateCondition"]);
         let Some((level, text)) = time.or_else(|| of_state(states?, &edge)) else {
             continue;

@@ -1,6 +1,7 @@
 //! A story for programs.
 
-use qcbus_xosc::story::{Moment, Opening, StoryboardElement};
+use qcbus_openscenario::Moment;
+use qcbus_openscenario::story::{Opening, StoryboardElement};
 use serde_json::{Value, json};
 
 use super::{Told, Warning};
@@ -9,10 +10,13 @@ use super::{Told, Warning};
 pub(super) fn of(told: &Told) -> Value {
     let story = &told.story;
     let end = &story.end;
-    let noted = |text: &str, place: &str| json!({"text": text, "place": place});
+    let noted = |text: &str, place: String| json!({"text": text, "place": place});
     let warnings = told.warnings.iter();
-    let warnings = warnings.map(|Warning { text, place }| noted(text, place));
-    let gaps = story.gaps.iter().map(|gap| noted(&gap.text, &gap.place));
+    let warnings = warnings.map(|Warning { text, place }| noted(text, place.clone()));
+    let gaps = story
+        .gaps
+        .iter()
+        .map(|gap| noted(&gap.text, gap.place.to_string()));
     json!({
         "schema": 1,
         "file": told.file,
@@ -53,7 +57,7 @@ fn element(element: &StoryboardElement) -> Value {
         "action": element.action,
         "actors": element.actors,
         "triggeringActors": element.are_triggering_actors,
-        "place": element.place,
+        "place": element.place.to_string(),
         "start": moment(element.standard.start),
         "end": moment(element.standard.end),
         "tolerant": {

@@ -8,8 +8,8 @@ use std::path::Path;
 use qcbus_formats::xqar::{Issue, Level, Location};
 use qcbus_messages::Exit;
 use qcbus_messages::path_text::to_text;
+use qcbus_openscenario::story::Story;
 use qcbus_sdk::{LoadError, Subject};
-use qcbus_xosc::story::Story;
 
 use super::expand::{Failed, in_the_way, load};
 use crate::args::TimelineArgs;
@@ -74,7 +74,7 @@ fn told(path: &Path) -> Result<Told, Failed> {
         );
         return Err((Exit::Usage, text));
     }
-    let story = Story::of(&subject).map_err(|why| {
+    let story = qcbus_xosc::story(&subject).map_err(|why| {
         let text = format!("the story of {} is unknown: {why}", to_text(path));
         (Exit::Rejected, text)
     })?;

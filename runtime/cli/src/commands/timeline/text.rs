@@ -1,9 +1,9 @@
 //! A story for people.
 
 use qcbus_messages::shown;
-use qcbus_xosc::story::{
-    End, Moment, Opening, StartPosition, Story, StoryKind, StoryboardElement, short,
-};
+use qcbus_openscenario::story::{End, Opening, StartPosition, Story, StoryboardElement};
+use qcbus_openscenario::wording::short;
+use qcbus_openscenario::{Moment, StoryKind};
 
 use crate::talk;
 

@@ -1,17 +1,18 @@
 //! Unknown parts of the storyboard. With any of them, no times are known.
 
-use super::place_of;
-use crate::families::triggers::called;
-use crate::prelude::*;
-use qcbus_openscenario::StoryKind;
+use super::Place;
+use crate::queries::element::Element;
+use crate::queries::scenario::Scenario;
+use crate::types::storyboard::StoryKind;
+use crate::wording::called;
 
 /// An unknown part of the storyboard.
 #[derive(Debug)]
 pub struct Gap {
     /// The reason, such as "the maneuver `Cut in` of the catalog `Maneuvers` is not found".
     pub text: String,
-    /// File, row and column.
-    pub place: String,
+    /// Its place.
+    pub place: Place,
 }
 
 /// Returns all unknown parts of the storyboard.
@@ -30,7 +31,7 @@ pub(super) fn all(scenario: &Scenario<'_>) -> Vec<Gap> {
             };
             gaps.push(Gap {
                 text,
-                place: place_of(element),
+                place: Place::of(element),
             });
         }
         if one.kind() != StoryKind::Action {
@@ -58,7 +59,7 @@ fn within(around: Element<'_, '_>) -> Vec<Gap> {
         };
         Some(Gap {
             text,
-            place: place_of(child),
+            place: Place::of(child),
         })
     });
     gaps.collect()

@@ -1,12 +1,11 @@
 //! Reasons why elements never start or end.
 
+use super::reasons::{edge_of_time, ends_never, state_never_comes};
 use super::waits;
-use crate::families::actions::short;
-use crate::families::timeline::{ends_never, state_never_comes};
-use crate::families::triggers::{called, edge_of_time};
-use crate::prelude::*;
-use qcbus_openscenario::wording::described;
-use qcbus_openscenario::{At, Cause, Strictness, Timeline};
+use crate::queries::element::Element;
+use crate::queries::scenario::Scenario;
+use crate::timeline::{At, Cause, Strictness, Timeline};
+use crate::wording::{called, described, short};
 
 /// Returns why an element never starts.
 pub(super) fn starts(scenario: &Scenario<'_>, timeline: &Timeline, place: usize) -> Option<String> {
@@ -97,7 +96,7 @@ fn reason<'d>(
 fn over(condition: Element<'_, '_>) -> String {
     let text = waits::condition(condition);
     match (edge_of_time(condition), condition.word("conditionEdge")) {
-        (Some((_, why)), _) => why,
+        (Some(no), _) => no.why,
         (None, Some(edge)) if edge != "none" => {
             format!("the `{edge}` edge of {text} comes before it is first looked at")
         }

@@ -5,17 +5,20 @@
 mod gaps;
 mod init;
 mod never;
+mod reasons;
 mod waits;
 
-use qcbus_openscenario::{Actors, Element, Scenario, Span, StoryElement, Strictness, Timeline};
-use qcbus_sdk::{Model as _, Subject, Unbuilt};
+use std::fmt;
 
-use crate::model::Scene;
+use crate::queries::actors::Actors;
+use crate::queries::element::Element;
+use crate::queries::scenario::Scenario;
+use crate::timeline::{Moment, Span, Strictness, Timeline};
+use crate::types::storyboard::{StoryElement, StoryKind};
 
 pub use gaps::Gap;
 pub use init::{Opening, StartPosition};
-pub use qcbus_openscenario::wording::short;
-pub use qcbus_openscenario::{Moment, StoryKind};
+pub use reasons::{NoEdge, edge_of_time, never_starts_within, state_never_comes, time};
 
 /// What a scenario does in a run.
 #[derive(Debug)]
@@ -51,8 +54,8 @@ pub struct StoryboardElement {
     pub actors: Vec<String>,
     /// Whether the entities that trigger the act are actors of the maneuver group, too.
     pub are_triggering_actors: bool,
-    /// File, row and column.
-    pub place: String,
+    /// Its place.
+    pub place: Place,
     /// Times by the standard.
     pub standard: Times,
     /// Times that hold in every known simulator.
@@ -74,6 +77,34 @@ pub struct Times {
     pub end: Moment,
 }
 
+/// A place in a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// Path of the file.
+    pub path: String,
+    /// Row, from 1.
+    pub row: u32,
+    /// Column, from 1.
+    pub column: u32,
+}
+
+impl Place {
+    fn of(element: Element<'_, '_>) -> Place {
+        let at = element.node().position();
+        Place {
+            path: at.path.to_owned(),
+            row: at.row,
+            column: at.column,
+        }
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}", self.path, self.row, self.column)
+    }
+}
+
 /// End of the run.
 #[derive(Debug)]
 pub struct End {
@@ -88,15 +119,8 @@ pub struct End {
 }
 
 impl Story {
-    /// Returns the story of a scenario. A subject that is a catalog or a distribution has an empty
-    /// story.
-    ///
-    /// # Errors
-    /// The reason if the scenario has no root element or an unsupported version.
-    pub fn of(subject: &Subject<'_>) -> Result<Story, String> {
-        let scenario = Scene::build(subject).map_err(|why| match why {
-            Unbuilt::NotApplicable(why) | Unbuilt::Broken(why) | Unbuilt::Failed(why) => why,
-        })?;
+    /// Returns the story of a scenario. A catalog or a distribution has an empty story.
+    pub fn of(scenario: &Scenario<'_>) -> Story {
         let timeline = scenario.timeline();
         let elements = scenario.storyboard().elements();
         let mut depths: Vec<usize> = Vec::with_capacity(elements.len());
@@ -105,17 +129,17 @@ impl Story {
             let above = one.parent().and_then(|parent| depths.get(parent));
             depths.push(above.map_or(0, |depth| depth + 1));
             let depth = depths.last().copied().unwrap_or(0);
-            parts.push(told(&scenario, timeline, place, one, depth));
+            parts.push(told(scenario, timeline, place, one, depth));
         }
-        let (openings, globals) = init::read(&scenario);
-        Ok(Story {
+        let (openings, globals) = init::read(scenario);
+        Story {
             openings,
             globals,
             is_timed: timeline.is_some(),
-            gaps: gaps::all(&scenario),
+            gaps: gaps::all(scenario),
             elements: parts,
-            end: end(&scenario, timeline),
-        })
+            end: end(scenario, timeline),
+        }
     }
 }
 
@@ -146,7 +170,7 @@ fn told<'d>(
         action: action_of(element),
         actors,
         are_triggering_actors,
-        place: place_of(element),
+        place: Place::of(element),
         standard: times(Strictness::Standard),
         tolerant: times(Strictness::Tolerant),
         waits: trigger.map(waits::trigger),
@@ -215,9 +239,4 @@ fn actors(group: Element<'_, '_>) -> (Vec<String>, bool) {
         .filter_map(|one| one.text("entityRef"))
         .map(std::borrow::Cow::into_owned);
     (names.collect(), actors.triggering)
-}
-
-fn place_of(element: Element<'_, '_>) -> String {
-    let node = element.node();
-    node.document().position(node.offset()).to_string()
 }

@@ -1,11 +1,14 @@
 //! The actions of `Init`, by entity.
 
-use super::inner;
-use crate::families::actions::short;
-use crate::families::init::{self, InitAction};
-use crate::prelude::*;
+use qcbus_opendrive::RoadMap;
 use qcbus_opendrive::geometry::wrap_angle;
-use qcbus_openscenario::places::Origins;
+
+use super::inner;
+use crate::places::Origins;
+use crate::queries::element::Element;
+use crate::queries::init::{InitAction, init_actions};
+use crate::queries::scenario::Scenario;
+use crate::wording::short;
 
 /// Start of an entity.
 #[derive(Debug)]
@@ -42,7 +45,7 @@ pub(super) fn read(scenario: &Scenario<'_>) -> (Vec<Opening>, Vec<String>) {
 
 fn openings(scenario: &Scenario<'_>, map: Option<&RoadMap<'_>>) -> Vec<Opening> {
     let origins = Origins::of(scenario, map);
-    let actions = init::actions(scenario);
+    let actions = init_actions(scenario);
     let entities = scenario.entities().objects().iter();
     let openings = entities.map(|entity| {
         let own = actions.iter();

@@ -1,7 +1,7 @@
 //! Conditions in short form: "simulation time > 3 s".
 
-use crate::families::actions::short;
-use crate::prelude::*;
+use crate::queries::element::Element;
+use crate::wording::short;
 
 /// Maximum number of conditions of a trigger that are described.
 const MOST: usize = 4;
