@@ -6,6 +6,7 @@ mod gaps;
 mod init;
 mod never;
 mod reasons;
+mod text;
 mod waits;
 
 use std::fmt;
@@ -19,6 +20,7 @@ use crate::types::storyboard::{StoryElement, StoryKind};
 pub use gaps::Gap;
 pub use init::{Opening, StartPosition};
 pub use reasons::{NoEdge, edge_of_time, never_starts_within, state_never_comes, time};
+pub use text::Sentence;
 
 /// What a scenario does in a run.
 #[derive(Debug)]
