@@ -9,6 +9,7 @@
 
 pub mod expr;
 pub mod places;
+pub mod stage;
 pub mod story;
 pub mod wording;
 

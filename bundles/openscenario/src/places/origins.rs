@@ -114,6 +114,17 @@ impl<'m, 'd, 'w, 'r> Origins<'m, 'd, 'w, 'r> {
         }
     }
 
+    /// Returns the place of a position, such as `WorldPosition`. Positions relative to an entity
+    /// are known in `Init` only, because the entity moves afterwards.
+    pub fn locate(&self, position: Element<'m, 'd>, is_start: bool) -> Option<Whereabouts<'w, 'r>> {
+        let base = match relative_to(position) {
+            Some(_) if !is_start => return None,
+            Some(_) => Some(self.base(position).map(|(_, base)| base)),
+            None => None,
+        };
+        self.compute(position, base)
+    }
+
     /// Returns the place of an entity, if it is already computed.
     fn known(&self, name: &str) -> Option<Whereabouts<'w, 'r>> {
         let at = (*self.by_name.get(name)?)?;

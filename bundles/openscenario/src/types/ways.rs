@@ -181,14 +181,14 @@ fn reaches(
 }
 
 /// Lane types that no route uses.
-const ASIDE: &[&str] = &[
+pub(crate) const ASIDE: &[&str] = &[
     "biking", "border", "curb", "median", "none", "parking", "rail", "shoulder", "sidewalk",
     "tram", "walking",
 ];
 
 /// Checks whether traffic may run on a lane along the road or against it. If this is unknown, the
 /// answer is yes.
-fn may_run(lane: LaneRef<'_, '_>, along: bool) -> bool {
+pub(crate) fn may_run(lane: LaneRef<'_, '_>, along: bool) -> bool {
     let towards = if along {
         ContactPoint::End
     } else {
