@@ -142,8 +142,13 @@ const FOR_TESTS: &[&str] = &[
 /// Prefix of the crate name of a reporter. A further reporter needs no row in [`MAY_KNOW`].
 const A_REPORTER: &str = "qcbus-report-";
 
-/// Crates that a reporter may link: its sdk, the model of road networks, and their drawing.
-const REPORTER: &[&str] = &["qcbus-reporter-sdk", "qcbus-plan", "qcbus-opendrive"];
+/// Crates that a reporter may link: its sdk, the models, and the drawing of road networks.
+const REPORTER: &[&str] = &[
+    "qcbus-reporter-sdk",
+    "qcbus-plan",
+    "qcbus-opendrive",
+    "qcbus-openscenario",
+];
 
 /// Allowed dependencies among the crates of [`IDL`]: the lowest crate has none.
 const INSIDE_IDL: &[(&str, &[&str])] = &[

@@ -35,7 +35,7 @@ pub use types::declaration::{Declaration, Declared, Declares};
 pub use types::entities::{Entities, Entity, EntityKind, Selection};
 pub use types::faults::{Dialect, ValueFault, ValueFaultKind};
 pub use types::form::Form;
-pub use types::inputs::{Inputs, LinkedCatalog, LinkedMap};
+pub use types::inputs::{Inputs, Linked, LinkedCatalog, LinkedMap};
 pub use types::reading::Reading;
 pub use types::road_network::{LaneAt, RoadNetwork};
 pub use types::roads_nearby::RoadsNearby;
@@ -45,3 +45,10 @@ pub use types::ways::{Stop, Way, Ways};
 
 /// The version in a file header: major and minor.
 pub type Version = (u16, u16);
+
+/// Returns the version in the file header of a document.
+pub fn version_of(document: &qcbus_document::Document<'_>) -> Option<Version> {
+    let stated = qcbus_schema::version_of(document, qcbus_document::FileKind::Xosc)?;
+    let part = |number: u32| u16::try_from(number).ok();
+    Some((part(stated.major)?, part(stated.minor)?))
+}

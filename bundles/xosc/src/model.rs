@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use qcbus_document::Image;
-use qcbus_messages::{Absence, DocumentRole};
-use qcbus_openscenario::{Element, Inputs, LinkedCatalog, LinkedMap, RoadNetwork, Scenario};
+use qcbus_openscenario::{Element, Inputs, Linked, RoadNetwork, Scenario};
 use qcbus_sdk::{Finding, LinkedModel, Model, Place, Sink, Subject, Unbuilt};
 
 /// A scenario, catalog or distribution with everything that it refers to. It is read once per
@@ -21,16 +20,24 @@ impl Model for Scene {
             let why = format!("OpenSCENARIO {version} is not supported, only 1.0 to 1.4 are");
             return Err(Unbuilt::Broken(why));
         }
-        let inputs = Inputs {
-            document: subject.root(),
-            kind: subject.kind(),
-            version: subject
-                .version()
-                .map(|version| (version.major, version.minor)),
-            map: map(subject),
-            catalogs: catalogs(subject),
-            incomplete: incomplete(subject),
+        let version = subject.version();
+        let linked = subject.linked().iter().map(|it| Linked {
+            document: it.document,
+            role: it.role,
+            referred_at: it.referred_at,
+        });
+        let roads = |place: usize| {
+            let kept = subject.linked().get(place)?.cached::<KeptRoads>()?;
+            Some(kept.0.clone())
         };
+        let inputs = Inputs::of(
+            subject.root(),
+            subject.kind(),
+            version.map(|it| (it.major, it.minor)),
+            &linked.collect::<Vec<_>>(),
+            subject.missing(),
+            roads,
+        );
         Scenario::new(&inputs).ok_or_else(|| Unbuilt::Broken("there is no root element".to_owned()))
     }
 
@@ -48,56 +55,6 @@ impl LinkedModel for KeptRoads {
             .ok()
             .map(|roads| KeptRoads(Arc::new(roads)))
     }
-}
-
-fn map(subject: &Subject<'_>) -> LinkedMap {
-    if let Some(linked) = subject.with_role(DocumentRole::Map).next() {
-        let broken = subject.missing().iter().any(|missing| {
-            missing.role == DocumentRole::Map && matches!(missing.why, Absence::Broken { .. })
-        });
-        // The missing part of a truncated map is unknown, so a broken map is not used.
-        let is_map = linked
-            .document
-            .root()
-            .is_some_and(|root| root.is("OpenDRIVE"));
-        return match is_map {
-            _ if broken => LinkedMap::NotHad,
-            false => LinkedMap::Foreign,
-            true => linked
-                .cached::<KeptRoads>()
-                .map_or(LinkedMap::NotHad, |kept| LinkedMap::Roads(kept.0.clone())),
-        };
-    }
-    let mut missing = subject
-        .missing()
-        .iter()
-        .filter(|missing| missing.role == DocumentRole::Map);
-    match missing.next().map(|missing| &missing.why) {
-        None => LinkedMap::Unnamed,
-        Some(Absence::EmptyPath) => LinkedMap::Unnamed,
-        Some(Absence::SimulatorMap) => LinkedMap::Simulator,
-        Some(_) => LinkedMap::NotHad,
-    }
-}
-
-fn catalogs<'d>(subject: &'d Subject<'d>) -> Vec<LinkedCatalog<'d>> {
-    let linked = subject.with_role(DocumentRole::Catalog);
-    linked
-        .map(|linked| LinkedCatalog {
-            document: linked.document,
-            referred_at: linked.referred_at,
-        })
-        .collect()
-}
-
-/// Returns the directories with a file that could not be read. A missing directory is left out
-/// because it cannot contain anything.
-fn incomplete(subject: &Subject<'_>) -> Vec<u32> {
-    let doubtful = subject.missing().iter().filter(|missing| {
-        missing.role == DocumentRole::Catalog
-            && !matches!(missing.why, Absence::NotThere | Absence::EmptyPath)
-    });
-    doubtful.map(|missing| missing.referred_at).collect()
 }
 
 /// Reports findings about elements that may be in a catalog.

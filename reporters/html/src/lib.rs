@@ -13,6 +13,8 @@ mod placing;
 mod reporter;
 mod result_data;
 mod run_data;
+mod scene;
+mod story_data;
 
 pub use page::Page;
 pub use reporter::HtmlReporter;

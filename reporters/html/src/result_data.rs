@@ -12,6 +12,8 @@ use qcbus_reporter_sdk::{
 use serde::Serialize;
 
 use crate::placing::{Drawn, draw};
+use crate::scene::Scene;
+use crate::story_data::StoryData;
 
 /// Maximum number of findings on a page: more than a person reads, but fine for a browser.
 pub(crate) const MOST_FINDINGS: usize = 20_000;
@@ -30,6 +32,7 @@ pub(crate) struct ResultData<'r> {
     pub(crate) rules: Vec<RuleData>,
     pub(crate) findings: Vec<FindingData>,
     map: Option<MapData>,
+    story: Option<StoryData>,
     cuts: Vec<String>,
 }
 
@@ -149,11 +152,13 @@ impl<'r> ResultData<'r> {
             ..
         } = collected;
         let shown = |path: &str| shown(result, path);
+        let scene = Scene::of(result, sources);
         let drawn = {
             let data = findings.iter_mut().flat_map(|it| &mut it.places);
             let mut places: Vec<_> = locations.into_iter().zip(data).collect();
-            draw(result, sources, &shown, &mut places)
+            draw(result, sources, scene.as_ref(), &shown, &mut places)
         };
+        let story = scene.and_then(|scene| scene.story(&result.input, &shown));
         let mut cuts = Vec::new();
         if total > MOST_FINDINGS {
             let left_out = total - MOST_FINDINGS;
@@ -181,6 +186,7 @@ impl<'r> ResultData<'r> {
             rules,
             findings,
             map,
+            story,
             cuts,
         };
         (data, plan)

@@ -1,6 +1,6 @@
 //! Unknown parts of the storyboard. With any of them, no times are known.
 
-use super::Place;
+use super::FilePlace;
 use crate::queries::element::Element;
 use crate::queries::scenario::Scenario;
 use crate::types::storyboard::StoryKind;
@@ -12,7 +12,7 @@ pub struct Gap {
     /// The reason, such as "the maneuver `Cut in` of the catalog `Maneuvers` is not found".
     pub text: String,
     /// Its place.
-    pub place: Place,
+    pub place: FilePlace,
 }
 
 /// Returns all unknown parts of the storyboard.
@@ -31,7 +31,7 @@ pub(super) fn all(scenario: &Scenario<'_>) -> Vec<Gap> {
             };
             gaps.push(Gap {
                 text,
-                place: Place::of(element),
+                place: FilePlace::of(element),
             });
         }
         if one.kind() != StoryKind::Action {
@@ -59,7 +59,7 @@ fn within(around: Element<'_, '_>) -> Vec<Gap> {
         };
         Some(Gap {
             text,
-            place: Place::of(child),
+            place: FilePlace::of(child),
         })
     });
     gaps.collect()

@@ -57,7 +57,7 @@ pub struct StoryboardElement {
     /// Whether the entities that trigger the act are actors of the maneuver group, too.
     pub are_triggering_actors: bool,
     /// Its place.
-    pub place: Place,
+    pub place: FilePlace,
     /// Times by the standard.
     pub standard: Times,
     /// Times that hold in every known simulator.
@@ -81,27 +81,32 @@ pub struct Times {
 
 /// A place in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Place {
+pub struct FilePlace {
     /// Path of the file.
     pub path: String,
     /// Row, from 1.
     pub row: u32,
     /// Column, from 1.
     pub column: u32,
+    /// Row in which the element ends.
+    pub last_row: u32,
 }
 
-impl Place {
-    fn of(element: Element<'_, '_>) -> Place {
-        let at = element.node().position();
-        Place {
+impl FilePlace {
+    fn of(element: Element<'_, '_>) -> FilePlace {
+        let node = element.node();
+        let at = node.position();
+        let end = node.document().position(node.end_offset());
+        FilePlace {
             path: at.path.to_owned(),
             row: at.row,
             column: at.column,
+            last_row: end.row,
         }
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for FilePlace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}:{}:{}", self.path, self.row, self.column)
     }
@@ -172,7 +177,7 @@ fn told<'d>(
         action: action_of(element),
         actors,
         are_triggering_actors,
-        place: Place::of(element),
+        place: FilePlace::of(element),
         standard: times(Strictness::Standard),
         tolerant: times(Strictness::Tolerant),
         waits: trigger.map(waits::trigger),
