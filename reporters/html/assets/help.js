@@ -6,10 +6,12 @@ const KEYS = [
   ['j  k  ↓  ↑', 'next, previous finding'],
   ['Enter', 'fly to the finding'],
   ['Esc', 'close, then clear'],
-  ['f', 'all roads'],
+  ['f', 'all roads; the scenario, if it is one'],
+  ['a', 'all roads of a scenario'],
   ['+  −', 'zoom'],
   ['Shift + arrows', 'move the map'],
   ['t', 'table or map'],
+  ['↑ ↓ ← → Enter', 'in the timeline: move, close, open, choose'],
   ['d', 'dark or light'],
   ['?', 'this list'],
 ];

@@ -79,6 +79,10 @@ const MAP_THEMES = {
     grid: '#e6e8e4',
     white: '#ffffff',
     markEdge: '#9aa0a8',
+    label: '#fffffff0',
+    bodyEdge: '#1c2026',
+    bodyMark: '#ffffffe6',
+    entities: ['#00857c', '#7b4fc9', '#c2257f', '#3a7d1c', '#8a5527', '#3d4fc0', '#7a7400', '#47708f'],
   },
   dark: {
     ground: '#15181b',
@@ -100,6 +104,10 @@ const MAP_THEMES = {
     grid: '#1d2125',
     white: '#f2f2f2',
     markEdge: '#8b929b',
+    label: '#22272df0',
+    bodyEdge: '#05070a',
+    bodyMark: '#101316d8',
+    entities: ['#35c9bd', '#b497f2', '#f27dbb', '#8fd16a', '#d9a273', '#93a4ff', '#d3cb57', '#8fc0e3'],
   },
 };
 

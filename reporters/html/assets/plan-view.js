@@ -6,6 +6,8 @@
  * @property {(members: number[], x: number, y: number) => void} several called for several markers at one place
  * @property {(road: number, x: number) => void} road
  * @property {() => void} nothing
+ * @property {(entity: number) => void} [actor] called for a clicked entity
+ * @property {(course: number) => void} [course] called for a clicked route or trajectory
  */
 
 const DOUBLE_CLICK_MILLISECONDS = 220;
@@ -48,6 +50,10 @@ class PlanView {
     this.targets = [];
     /** Further places of the selected finding. @type {{x: number, y: number}[]} */
     this.further = [];
+    /** Entities of a scenario. @type {ActorLayer|null} */
+    this.actors = null;
+    /** Part that is shown first; null: all roads. @type {Box|null} */
+    this.home = null;
     /** @type {number} */
     this.road = -1;
     /** Station on the selected road at the pointer's position in its profile. @type {number|null} */
@@ -114,8 +120,9 @@ class PlanView {
     this.tiles.clear();
     if (!this.sized) {
       this.sized = true;
-      if (this.plan.roadBox) {
-        const [x0, y0, x1, y1] = this.plan.roadBox;
+      const box = this.home ?? this.plan.roadBox;
+      if (box) {
+        const [x0, y0, x1, y1] = box;
         Object.assign(this.camera, {
           x: (x0 + x1) / 2,
           y: (y0 + y1) / 2,
@@ -190,6 +197,7 @@ class PlanView {
       const [px, py] = onFrame(frame, x, y);
       ring(context, px, py, 7, colors);
     }
+    this.actors?.draw(context, frame, colors);
     this.markers.draw(context, frame, colors, this.selected);
     const road = this.plan.roads[this.road];
     if (road && this.station !== null) {
@@ -261,8 +269,11 @@ class PlanView {
 
   /** @param {number} px @param {number} py @param {boolean} inside */
   hover(px, py, inside) {
-    this.canvas.classList.toggle('on-marker', inside && this.markers.pick(this.camera.frame(), px, py) !== null);
+    const marker = inside && this.markers.pick(this.camera.frame(), px, py) !== null;
+    const actor = inside && !marker ? this.hoverActor(px, py) : '';
+    this.canvas.classList.toggle('on-marker', marker || actor !== '');
     if (!inside) {
+      this.hoverActor(NaN, NaN);
       this.readout.textContent = '';
       return;
     }
@@ -274,7 +285,32 @@ class PlanView {
       spot && road
         ? `road ${plain(road.id, 40)}   lane ${spot.lane}   s ${fixed(spot.s / 100)}   t ${fixed(spot.t / 100)}`
         : '';
-    this.readout.textContent = `x ${fixed(origin.x + x / 100)}   y ${fixed(origin.y + y / 100)}${where ? `   ${where}` : ''}`;
+    this.readout.textContent = `${actor}x ${fixed(origin.x + x / 100)}   y ${fixed(origin.y + y / 100)}${where ? `   ${where}` : ''}`;
+  }
+
+  /** Emphasizes the entity at a pixel. Returns its name for the readout. @param {number} px @param {number} py */
+  hoverActor(px, py) {
+    const { actors } = this;
+    if (!actors) return '';
+    const frame = this.camera.frame();
+    const entity = Number.isFinite(px) ? actors.pick(frame, px, py) : -1;
+    if (entity !== actors.hovered) {
+      actors.hovered = entity;
+      this.refresh();
+    }
+    const course = entity < 0 && Number.isFinite(px) ? actors.pickCourse(frame, px, py) : -1;
+    const name = actors.story.entities[entity]?.name ?? courseName(actors.story.courses[course]);
+    return name ? `${plain(name, 60)}   ` : '';
+  }
+
+  /** Handles a click on the scenario. Returns whether something is there. @param {number} px @param {number} py */
+  clickActor(px, py) {
+    const frame = this.camera.frame();
+    const entity = this.actors?.pick(frame, px, py) ?? -1;
+    const course = entity < 0 ? (this.actors?.pickCourse(frame, px, py) ?? -1) : -1;
+    if (entity >= 0) this.events.actor?.(entity);
+    else if (course >= 0) this.events.course?.(course);
+    return entity >= 0 || course >= 0;
   }
 
   /** @param {number} px @param {number} py */
@@ -292,6 +328,7 @@ class PlanView {
       this.events.finding(first);
       return;
     }
+    if (this.clickActor(px, py)) return;
     const [x, y] = this.toPlan(px, py);
     const spot = spotAt(this.indexed, x, y);
     this.events.nothing();
@@ -299,9 +336,15 @@ class PlanView {
     if (spot) this.roadTimer = setTimeout(() => this.events.road(spot.road, px), DOUBLE_CLICK_MILLISECONDS);
   }
 
-  /** Shows all roads. @returns {Promise<void>} */
+  /** Shows the scenario, or all roads of a map. @returns {Promise<void>} */
   fit() {
-    return this.plan.roadBox ? this.camera.fit(this.plan.roadBox) : Promise.resolve();
+    return this.home ? this.camera.fit(this.home) : this.fitRoads();
+  }
+
+  /** Shows all roads. @returns {Promise<void>} */
+  fitRoads() {
+    const box = this.plan.roadBox ?? this.home;
+    return box ? this.camera.fit(box) : Promise.resolve();
   }
 
   /** Flies to a finding. @param {Finding} finding @returns {Promise<void>} */
@@ -320,6 +363,11 @@ class PlanView {
     }
     return this.camera.fly(anchor.x, anchor.y, this.camera.scaleFor(half[0] ?? 2500, half[1] ?? 2500));
   }
+}
+
+/** @param {StoryCourse|undefined} course */
+function courseName(course) {
+  return course ? `${course.kind} ${course.name}`.trim() : '';
 }
 
 /** Returns the legend of the kinds of lanes on the map. @param {PlanView} view @param {Theme} theme */

@@ -42,9 +42,15 @@
       );
       this.view = plan ? this.mapView(plan) : null;
       this.panel = this.view ? this.roadPanel(this.view) : null;
+      this.scene = data.story
+        ? new Scene(new StoryModel(data, this.findings), this.findings, this.view, theme, {
+            finding: (index) => this.choose(index, true),
+          })
+        : null;
       this.stage = make('section', 'stage', this.view?.element, this.panel?.element, this.chooser, this.table.element);
-      if (!this.view) this.stage.append(make('div', 'no-map muted', planFault || noPlanSentence(data)));
-      if (this.view) this.stage.append(legend(this.view, theme));
+      if (!this.view || this.view.plan.roads.length === 0)
+        this.stage.append(make('div', 'no-map muted', planFault || noPlanSentence(data)));
+      if (this.view) this.stage.append(this.legends(this.view));
       if (this.view && data.map?.own === false)
         this.stage.append(make('div', 'map-name muted', plain(`map: ${textOf(data.map.path)}`, 200)));
       this.side = make('aside', 'side', this.filters.element, this.empty, this.list.element);
@@ -65,6 +71,12 @@
       };
     }
 
+    /** @param {PlanView} view */
+    legends(view) {
+      const lanes = view.plan.roads.length > 0 ? legend(view, this.theme) : null;
+      return make('div', 'legends', this.scene ? sceneLegend(this.scene.story) : null, lanes);
+    }
+
     /** @param {Plan} plan */
     mapView(plan) {
       return new PlanView(plan, this.theme, {
@@ -79,7 +91,10 @@
         },
         nothing: () => {
           this.chooser.hidden = true;
+          this.scene?.select(null, 'map');
         },
+        actor: (index) => this.scene?.select({ kind: 'entity', index }, 'map'),
+        course: (index) => this.scene?.selectCourse(index),
       });
     }
 
@@ -109,7 +124,8 @@
         cutsNote('Left out of this report', this.data.cuts),
         cutsNote('Left out of the map', this.data.map?.cuts, this.plan?.cuts),
       );
-      app.replaceChildren(this.head(notes), make('div', 'body', this.side, this.stage), this.help);
+      const stage = this.scene ? this.scene.around(this.stage) : this.stage;
+      app.replaceChildren(this.head(notes), make('div', 'body', this.side, stage), this.help);
       this.setTable(false);
       this.view?.resize();
       this.filtered();
@@ -143,7 +159,7 @@
       const tools = make(
         'div',
         'tools',
-        this.view ? makeButton('tool', 'Fit', () => void this.view?.fit(), 'All roads (f)') : null,
+        ...this.fitButtons(),
         this.modeButton,
         this.theme.button(),
         withAttributes(
@@ -164,6 +180,16 @@
         make('span', 'muted generator', plain(this.data.generator, 80)),
       );
       return make('header', 'head', top, second);
+    }
+
+    fitButtons() {
+      const { view } = this;
+      if (!view) return [];
+      const roads = (/** @type {string} */ label, /** @type {string} */ hint) =>
+        makeButton('tool', label, () => void view.fitRoads(), hint);
+      if (!view.home) return [roads('Fit', 'All roads (f)')];
+      const scenario = makeButton('tool', 'Scenario', () => void view.fit(), 'Entities, routes and trajectories (f)');
+      return view.plan.roadBox ? [scenario, roads('All roads', 'The whole map (a)')] : [scenario];
     }
 
     /** @param {number} position */
@@ -206,6 +232,7 @@
       this.chooser.hidden = true;
       this.selected = index;
       const finding = this.findings[index];
+      this.scene?.point(finding ? index : -1);
       if (finding && !this.filters.shown.includes(index)) {
         this.filters.clear();
       } else {
@@ -327,6 +354,7 @@
       else if (event.key === '/') this.filters.search.focus();
       else if (event.key === 'Escape') this.escape();
       else if (event.key === 'f') void this.view?.fit();
+      else if (event.key === 'a' && this.scene) void this.view?.fitRoads();
       else if (event.key === '+' || event.key === '=') camera?.zoom(1.5);
       else if (event.key === '-') camera?.zoom(1 / 1.5);
       else if (event.key === 't') this.setTable(!this.tableShown);
@@ -351,6 +379,7 @@
     escape() {
       if (!this.chooser.hidden) this.chooser.hidden = true;
       else if (this.panel && !this.panel.element.hidden) this.hideRoad();
+      else if (this.scene?.selected) this.scene.select(null, 'map');
       else if (this.selected >= 0) void this.choose(-1);
       else if (this.filters.active) this.filters.clear();
     }
@@ -384,6 +413,7 @@
 
   /** @param {Record<string, any>} data */
   function noPlanSentence(data) {
+    if (data.story && !data.map) return 'There is no readable map; places are in world coordinates.';
     return data.map
       ? 'The map of this report is missing from the file.'
       : 'There is no road network to show; see the findings in the list and in the table.';
@@ -402,6 +432,12 @@
     }
   }
 
+  /** Returns a plan without roads for a scenario whose map cannot be read. @param {Record<string, any>} data @returns {Plan|null} */
+  function planOfPlaces(data) {
+    const [first] = data.story ? new StoryModel(data, []).places() : [];
+    return first ? decodePlan(emptyPlan(...first)) : null;
+  }
+
   const times = { decodeMs: 0, firstPaintMs: 0 };
   /** @type {ReportPage|null} */
   let page = null;
@@ -413,7 +449,7 @@
       const data = await readData();
       const { plan, fault } = await readPlan();
       times.decodeMs = performance.now() - began;
-      page = new ReportPage(data, plan, fault, theme);
+      page = new ReportPage(data, plan ?? planOfPlaces(data), fault, theme);
       page.mount();
       await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
     }),
@@ -444,6 +480,21 @@
         const [px, py] = onFrame(view.camera.frame(), (x - view.plan.origin.x) * 100, (y - view.plan.origin.y) * 100);
         const { left, top } = view.canvas.getBoundingClientRect();
         return { x: left + px, y: top + py };
+      },
+      /** Entities and selection of a scenario, for tests. */
+      story: () => {
+        const scene = page?.scene;
+        const actors = page?.view?.actors;
+        return scene
+          ? {
+              rows: scene.timeline.rows.length,
+              selected: scene.selected,
+              range: [scene.timeline.range.from, scene.timeline.range.to],
+              emphasized: actors?.focus ? [...actors.focus.entities] : [],
+              courses: actors?.focus ? [...actors.focus.courses] : [],
+              labels: actors?.labels.map(({ entity }) => entity) ?? [],
+            }
+          : null;
       },
       stats: () => {
         const frames = page?.view?.frames;

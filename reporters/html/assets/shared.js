@@ -3,8 +3,9 @@
 // (they are plain declarations; the last file starts the page):
 //
 //   result  shared.js markdown.js list.js plan-data.js plan-grid.js plan-pick.js plan-theme.js plan-paint.js
-//           plan-detail.js plan-tile.js plan-camera.js plan-markers.js plan-view.js model.js filters.js detail.js
-//           table.js profile.js road-panel.js help.js report.js
+//           plan-detail.js plan-tile.js plan-camera.js plan-markers.js plan-actors.js plan-view.js model.js
+//           story-model.js story-bars.js timeline-rows.js timeline.js scene.js filters.js detail.js table.js
+//           profile.js road-panel.js help.js report.js
 //   run     shared.js markdown.js list.js filters.js run-files.js run.js
 //
 // All data in a report come from untrusted files. `make` adds text to the page only through `textContent`. `plain`

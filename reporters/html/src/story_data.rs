@@ -60,6 +60,7 @@ struct ElementData {
     kind: &'static str,
     name: Option<String>,
     parent: Option<usize>,
+    action: Option<String>,
     actors: Vec<usize>,
     file: Option<String>,
     rows: [u32; 2],
@@ -110,7 +111,7 @@ impl StoryData {
             .map(|(at, opening)| (opening.entity.as_str(), at))
             .collect();
         let (run_head, run_rest) = story.end.sentence();
-        let sentences = story.sentences();
+        let sentences = story.complete_sentences();
         let elements = story.elements.iter().zip(&sentences).take(MOST_ELEMENTS);
         let elements = elements.map(|(element, sentence)| {
             let actors = actors(scenario, element, &names);
@@ -187,6 +188,7 @@ impl ElementData {
             kind: element.kind.word(),
             name: element.name.as_deref().map(name),
             parent: element.parent,
+            action: element.action.as_deref().map(name),
             actors,
             file,
             rows: [element.place.row, element.place.last_row],

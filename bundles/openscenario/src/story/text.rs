@@ -32,13 +32,22 @@ impl Story {
     /// Returns the storyboard elements in words. A fact that the parent of an element shares is
     /// left out.
     pub fn sentences(&self) -> Vec<Sentence> {
+        self.in_words(false)
+    }
+
+    /// Returns the storyboard elements in words, each with all its facts.
+    pub fn complete_sentences(&self) -> Vec<Sentence> {
+        self.in_words(true)
+    }
+
+    fn in_words(&self, is_complete: bool) -> Vec<Sentence> {
         let elements = self.elements.iter();
         let sentences = elements.map(|element| {
             let above = element.parent.and_then(|parent| self.elements.get(parent));
             let facts = match above {
                 _ if !self.is_timed => untimed(element),
-                Some(above) if above.standard.start.is_never() => untimed(element),
-                above => own_facts(self, element, above),
+                Some(above) if above.standard.start.is_never() && !is_complete => untimed(element),
+                above => own_facts(self, element, above, is_complete),
             };
             let waits = facts.waits.map(|waits| format!("waits until {waits}"));
             Sentence {
@@ -150,6 +159,7 @@ fn own_facts(
     story: &Story,
     element: &StoryboardElement,
     above: Option<&StoryboardElement>,
+    is_complete: bool,
 ) -> Facts {
     if element.standard.start.is_never() {
         // The reason of an element that never starts already names its conditions.
@@ -164,8 +174,9 @@ fn own_facts(
     let is_own = |above: &StoryboardElement| {
         element.waits.is_some() || start(above, 0.0) != start(element, 0.0)
     };
-    let start = above.is_none_or(is_own).then(|| start(element, known));
-    let end_above = above.map(|above| end(story, above));
+    let start = (is_complete || above.is_none_or(is_own)).then(|| start(element, known));
+    let end_above = above.filter(|_| !is_complete);
+    let end_above = end_above.map(|above| end(story, above));
     let end = Some(end(story, element)).filter(|end| end_above.as_ref() != Some(end));
     let waits = element.waits.clone();
     match start.as_deref().zip(end.as_deref()).and_then(at_once) {
