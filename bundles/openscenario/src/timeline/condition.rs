@@ -17,6 +17,8 @@ pub(super) struct Truth {
     pub(super) must: Times,
     /// It is true at least once in this interval.
     pub(super) once: Option<(f64, f64)>,
+    /// Whether that is certainly seen, even if the interval begins before the first look.
+    pub(super) is_seen: bool,
 }
 
 impl Truth {
@@ -25,6 +27,7 @@ impl Truth {
             may,
             must,
             once: None,
+            is_seen: false,
         }
     }
 
@@ -33,6 +36,7 @@ impl Truth {
             may,
             must: Times::none(),
             once: once.is_certain().then_some((once.earliest, once.latest)),
+            is_seen: false,
         }
     }
 
@@ -50,6 +54,8 @@ pub(super) struct Known<'p> {
     pub(super) tree: &'p Tree<'p>,
     pub(super) spans: &'p Spans,
     pub(super) strictness: Strictness,
+    /// The element whose trigger is evaluated; `None` for the run.
+    pub(super) waits: Option<usize>,
 }
 
 impl Known<'_> {
@@ -65,7 +71,10 @@ impl Known<'_> {
             earliest: (since.earliest - condition.delay.unwrap_or(since.earliest)).max(0.0),
             latest: since.latest,
         };
-        let edged = self.edge(plain, condition.edge, earlier);
+        let edged = match self.is_own_start(&condition.logic) {
+            true => self.own_start(plain, condition.edge, since),
+            false => self.edge(plain, condition.edge, earlier),
+        };
         let Some(delay) = condition.delay else {
             // Not before the expression itself is true.
             let first = edged.may.first();
@@ -78,8 +87,47 @@ impl Known<'_> {
             must: must.later(delay),
             once: edged
                 .once
-                .filter(|(from, _)| *from > since.latest)
+                .filter(|(from, _)| edged.is_seen || *from > since.latest)
                 .map(|(from, to)| (from + delay, to + delay)),
+            is_seen: edged.is_seen,
+        }
+    }
+
+    /// Checks whether an expression is about the start of an element around the one that waits.
+    /// That element waits from this very start on (8.4).
+    fn is_own_start(&self, logic: &Logic) -> bool {
+        let (Logic::State(of, State::StartTransition), Some(waits)) = (logic, self.waits) else {
+            return false;
+        };
+        let mut around = self.tree.plan.around(waits).skip(1);
+        let parent = self.tree.plan.parent(waits);
+        let start = |place: usize| self.spans.get(place).map(|span| span.start);
+        // An act waits for its story, but not for the start of the act before.
+        around.any(|at| at == *of)
+            && parent.and_then(start) == start(*of)
+            && !self.tree.plan.is_looped(*of)
+    }
+
+    /// Returns when a condition about the start of an element around the one that waits is true.
+    /// The first look sees the transition, and every later look comes after it. At the first look
+    /// there is no earlier value, so nothing rises (7.6).
+    fn own_start(&self, truth: Truth, edge: Edge, since: Moment) -> Truth {
+        let (may, later) = match (edge, self.strictness) {
+            (Edge::None, _) => (truth.may, STEP),
+            (Edge::Rising, Strictness::Standard) => return Truth::never(),
+            (Edge::Falling | Edge::RisingOrFalling, Strictness::Standard) => {
+                (truth.may.longer(STEP), 2.0 * STEP)
+            }
+            _ => return self.edge(truth, edge, since),
+        };
+        let once = since
+            .is_certain()
+            .then_some((since.earliest, since.latest + later));
+        Truth {
+            may,
+            must: Times::none(),
+            once,
+            is_seen: once.is_some(),
         }
     }
 
@@ -103,6 +151,7 @@ impl Known<'_> {
                     may: truth.may.longer(STEP),
                     must: truth.must.shorter(STEP),
                     once: truth.once.map(|(from, to)| (from, to + STEP)),
+                    is_seen: false,
                 }
             }
             Logic::Never => Truth::never(),
@@ -195,14 +244,16 @@ impl Known<'_> {
     }
 
     fn edge(&self, truth: Truth, edge: Edge, since: Moment) -> Truth {
-        let Truth { may, must, once } = truth;
         let (begins, ends) = match edge {
-            Edge::None => return Truth { may, must, once },
+            Edge::None => return truth,
             Edge::Rising => (true, false),
             Edge::Falling => (false, true),
             Edge::RisingOrFalling => (true, true),
-            Edge::Unknown => return Truth::level(may, Times::none()),
+            Edge::Unknown => return Truth::level(truth.may, Times::none()),
         };
+        let Truth {
+            may, must, once, ..
+        } = truth;
         // What lasts for one step falls in the next one.
         let may = if ends { may.longer(STEP) } else { may };
         let changes = may.without(&must, begins, ends);
@@ -227,6 +278,7 @@ impl Known<'_> {
             may: changes,
             must: Times::none(),
             once: rise.filter(|(from, _)| *from > since.latest),
+            is_seen: false,
         }
     }
 
@@ -247,7 +299,8 @@ impl Known<'_> {
         // A step may miss what is true for less than a step.
         let mut by = must.first_lasting(STEP);
         for (at, truth) in truths.iter().enumerate() {
-            let Some((from, to)) = truth.once.filter(|(from, _)| *from > since.latest) else {
+            let is_seen = |from: f64| truth.is_seen || from > since.latest;
+            let Some((from, to)) = truth.once.filter(|(from, _)| is_seen(*from)) else {
                 continue;
             };
             let mut others = truths.iter().enumerate().filter(|(other, _)| *other != at);

@@ -148,15 +148,23 @@ impl Spans {
         let Some(stop) = &tree.plan.stop else {
             return false;
         };
-        let ends = self.known(tree, strictness).moment(stop, Moment::BEGIN);
+        let ends = self
+            .known(tree, strictness, None)
+            .moment(stop, Moment::BEGIN);
         bound.set(&mut self.ends, ends)
     }
 
-    fn known<'s>(&'s self, tree: &'s Tree<'s>, strictness: Strictness) -> Known<'s> {
+    fn known<'s>(
+        &'s self,
+        tree: &'s Tree<'s>,
+        strictness: Strictness,
+        waits: Option<usize>,
+    ) -> Known<'s> {
         Known {
             tree,
             spans: self,
             strictness,
+            waits,
         }
     }
 
@@ -181,7 +189,7 @@ impl Spans {
                 ..Moment::UNKNOWN
             },
             Start::By(trigger) => {
-                let known = self.known(tree, strictness);
+                let known = self.known(tree, strictness, Some(place));
                 let (may, by) =
                     match strictness == Strictness::Standard && part.priority == Priority::Skip {
                         true => known.trigger(&known.untied(place, trigger), parent),
@@ -234,7 +242,7 @@ impl Spans {
             earliest: parent.map_or(0.0, |parent| parent.start.earliest),
             latest: started.latest,
         };
-        let stops = self.known(tree, strictness).moment(trigger, since);
+        let stops = self.known(tree, strictness, None).moment(trigger, since);
         match self.stops.get_mut(place) {
             Some(stop) => bound.set(stop, stops),
             None => false,
@@ -269,7 +277,7 @@ impl Spans {
         let regular = self.complete(tree, strictness, place, part, by_itself);
         let mut stop = self.enclosing_stop(tree, place);
         let event = part.parent.filter(|_| part.kind == StoryKind::Action);
-        let known = self.known(tree, strictness);
+        let known = self.known(tree, strictness, None);
         let is_skipped = event.is_some_and(|event| {
             let event_part = tree.plan.parts.get(event);
             event_part.is_some_and(|it| known.may_be_skipped(event, it))
@@ -347,7 +355,7 @@ impl Spans {
         part: &StoryPart,
         by_itself: Moment,
     ) -> Moment {
-        let known = self.known(tree, strictness);
+        let known = self.known(tree, strictness, None);
         let repeated = match part.executions {
             Some(1) => by_itself,
             _ => Moment {

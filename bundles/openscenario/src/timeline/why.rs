@@ -73,6 +73,7 @@ pub(super) fn never_starts(
         tree: &tree,
         spans,
         strictness,
+        waits: Some(place),
     };
     let until = spans.stop_of(&tree, place).latest;
     let groups = trigger.groups.iter().enumerate();
@@ -94,6 +95,7 @@ pub(super) fn never_ends(plan: &Plan, spans: &Spans, strictness: Strictness) -> 
         tree: &tree,
         spans,
         strictness,
+        waits: None,
     };
     let groups = groups.iter().enumerate();
     groups

@@ -6,5 +6,6 @@ mod catalogs;
 mod expressions;
 mod expressions_hostile;
 mod expressions_oracle;
+mod own_start;
 mod played;
 mod values;
