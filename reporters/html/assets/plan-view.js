@@ -54,6 +54,8 @@ class PlanView {
     this.actors = null;
     /** Part that is shown first; null: all roads. @type {Box|null} */
     this.home = null;
+    /** Camera that showed it. @type {{x: number, y: number, k: number}|null} */
+    this.first = null;
     /** @type {number} */
     this.road = -1;
     /** Station on the selected road at the pointer's position in its profile. @type {number|null} */
@@ -118,20 +120,32 @@ class PlanView {
     this.camera.width = clientWidth;
     this.camera.height = clientHeight;
     this.tiles.clear();
-    if (!this.sized) {
+    // The scenario stays in sight until somebody moves the map.
+    if (!this.sized || (this.home && this.isAtHome())) {
       this.sized = true;
-      const box = this.home ?? this.plan.roadBox;
-      if (box) {
-        const [x0, y0, x1, y1] = box;
-        Object.assign(this.camera, {
-          x: (x0 + x1) / 2,
-          y: (y0 + y1) / 2,
-          k: this.camera.scaleFor((x1 - x0) / 2, (y1 - y0) / 2),
-        });
-      }
+      this.goHome();
     }
     this.paint(performance.now(), 40);
     this.refresh();
+  }
+
+  /** Shows the first part of the map at once. */
+  goHome() {
+    const box = this.home ?? this.plan.roadBox;
+    if (!box) return;
+    const [x0, y0, x1, y1] = box;
+    const { camera } = this;
+    this.first = {
+      x: (x0 + x1) / 2,
+      y: (y0 + y1) / 2,
+      k: camera.scaleFor((x1 - x0) / 2, (y1 - y0) / 2),
+    };
+    Object.assign(camera, this.first);
+  }
+
+  isAtHome() {
+    const { camera, first } = this;
+    return first !== null && camera.x === first.x && camera.y === first.y && camera.k === first.k;
   }
 
   refresh() {

@@ -52,7 +52,7 @@
         this.stage.append(make('div', 'no-map muted', planFault || noPlanSentence(data)));
       if (this.view) this.stage.append(this.legends(this.view));
       if (this.view && data.map?.own === false)
-        this.stage.append(make('div', 'map-name muted', plain(`map: ${textOf(data.map.path)}`, 200)));
+        this.stage.append(make('div', 'map-name muted', 'map: ', whereElement(textOf(data.map.path))));
       this.side = make('aside', 'side', this.filters.element, this.empty, this.list.element);
       this.modeButton = makeButton('tool mode', 'Table', () => this.setTable(!this.tableShown), 'Table or map (t)');
       this.tableShown = false;
@@ -126,6 +126,7 @@
       );
       const stage = this.scene ? this.scene.around(this.stage) : this.stage;
       app.replaceChildren(this.head(notes), make('div', 'body', this.side, stage), this.help);
+      this.scene?.arrange();
       this.setTable(false);
       this.view?.resize();
       this.filtered();

@@ -144,10 +144,16 @@ class Scene {
 
 /** Explains the signs of the scenario on the map. @param {StoryModel} story */
 function sceneLegend(story) {
-  const kinds = new Set(story.courses.map(({ kind, exact }) => (kind === 'route' && !exact ? 'straight' : kind)));
+  const placed = story.courses.filter(({ points, stops }) => points.length >= 4 || stops.length > 0);
+  const kinds = new Set(placed.map(({ kind, exact }) => (exact ? kind : `${kind} about`)));
+  const lost = story.courses.length - placed.length;
   const entry = (/** @type {string} */ sign, /** @type {string} */ text) =>
     make('li', '', make('span', `sign ${sign}`), text);
   const unplaced = story.entities.filter(({ at }) => at === null).length;
+  const missing = [
+    unplaced > 0 ? counted(unplaced, 'entity', 'entities') : '',
+    lost > 0 ? counted(lost, 'line') : '',
+  ].filter((text) => text !== '');
   const list = make(
     'ul',
     '',
@@ -155,9 +161,10 @@ function sceneLegend(story) {
     story.entities.some(({ sized, at }) => at !== null && !sized) ? entry('body guessed', 'entity of unknown size') : null,
     kinds.has('trajectory') ? entry('line', 'trajectory') : null,
     kinds.has('route') ? entry('line thick', 'route along the lanes') : null,
-    kinds.has('straight') ? entry('line dashed', 'route, straight between its waypoints') : null,
+    kinds.has('route about') ? entry('line dashed', 'route, straight between its waypoints') : null,
+    kinds.has('trajectory about') ? entry('line dashed', 'trajectory, partly known') : null,
     kinds.has('target') ? entry('target', 'target position') : null,
-    unplaced > 0 ? make('li', 'muted', `${counted(unplaced, 'entity', 'entities')} without a known place`) : null,
+    unplaced + lost > 0 ? make('li', 'muted', `place unknown: ${missing.join(', ')}`) : null,
   );
   return withAttributes(make('details', 'legend scene-legend', make('summary', '', 'Scenario'), list), { open: true });
 }

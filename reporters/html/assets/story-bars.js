@@ -1,7 +1,7 @@
 // Bars of the timeline: the parts of an element's bar in seconds, and the time axis.
 
-/** Range in seconds that is shown as one time, because simulators need some steps for a transition. */
-const ONE_TIME = 0.45;
+/** Range in seconds that is shown as one time, because several transitions follow each other. */
+const ONE_TIME = 1;
 
 /**
  * A part of a bar. `solid`: it certainly runs; `maybe`: it may run; `unknown`: nothing is known; `start`: it starts
@@ -80,22 +80,23 @@ class TimeRange {
 }
 
 /**
- * Returns the range of the whole story: until the end of the run if that is known, otherwise until the last known time.
- * A few times far after all others do not count.
+ * Returns the range of the whole story: until the end of the run if that is known well, otherwise until the last known
+ * time. A few times far after all others do not count.
  *
  * @param {StoryModel} story
  */
 function wholeRange(story) {
   const { end } = story.run;
-  if (end.latest < Infinity && end.latest > 0) return new TimeRange(0, end.latest * 1.06);
+  if (end.latest < Infinity && end.latest > 0 && end.latest <= Math.max(2, end.earliest * 2))
+    return new TimeRange(0, end.latest * 1.06);
   const times = story.elements
     .flatMap(({ start, end: last }) => [start.earliest, start.latest, last.earliest, last.latest])
-    .concat(end.earliest)
-    .filter((time) => Number.isFinite(time) && time > 0)
+    .filter((time) => Number.isFinite(time) && time > 0 && time < end.latest)
     .sort((a, b) => a - b);
   const usual = times[Math.floor((times.length - 1) * 0.9)] ?? 0;
   const most = times.filter((time) => time <= 10 * usual).at(-1) ?? 0;
-  return new TimeRange(0, Math.max(1, most) * 1.3);
+  const run = end.earliest < Math.max(100, 10 * most) ? end.earliest : 0;
+  return new TimeRange(0, Math.max(5, most * 1.3, run * 1.3));
 }
 
 /** Formats a time with as many decimals as the step needs. @param {number} time @param {number} step */

@@ -60,7 +60,7 @@ function rowLabel(story, row) {
   const twist = make('span', `tl-twist${row.parent ? (row.open ? ' open' : ' closed') : ''}`);
   withAttributes(twist, { 'aria-hidden': 'true' });
   label.append(twist);
-  label.style.paddingLeft = `${6 + Math.min(row.depth, 12) * 13}px`;
+  label.style.paddingLeft = `${6 + Math.min(row.depth, 12) * 11}px`;
   if (row.kind === 'init') {
     label.append(make('span', 'tl-name', 'Init'), make('span', 'tl-kind', counted(story.entities.length, 'entity', 'entities')));
     return label;
@@ -78,7 +78,7 @@ function rowLabel(story, row) {
   const element = story.elements[row.index];
   if (!element) return label;
   label.append(
-    make('span', 'tl-kind', KIND_WORDS[element.kind] ?? element.kind),
+    make('span', 'tl-kind first', KIND_WORDS[element.kind] ?? element.kind),
     make('span', 'tl-name', plain(element.name, 120) || 'without a name'),
   );
   if (element.action) label.append(make('span', 'tl-kind', plain(element.action, 60)));

@@ -8,6 +8,9 @@ const TIMELINE_SPARE = 6;
 /** A storyboard with more elements than this is shown with its events closed. */
 const MANY_ELEMENTS = 400;
 
+/** With more entities, their rows are closed at first. */
+const MANY_ENTITIES = 10;
+
 /** @typedef {{kind: 'entity'|'element', index: number}|null} StorySelection */
 
 /**
@@ -33,6 +36,7 @@ class TimelineView {
     /** @type {Set<string>} */
     this.closed = new Set();
     if (story.elements.length > MANY_ELEMENTS) this.closeKinds(['event', 'maneuver']);
+    if (story.entities.length > MANY_ENTITIES) this.closed.add('init');
     this.rows = shownRows(story, this.closed);
     /** @type {Map<number, HTMLElement>} */
     this.drawn = new Map();
@@ -128,6 +132,8 @@ class TimelineView {
   }
 
   resize() {
+    // The axis has the width of the rows, without the scroll bar.
+    this.element.style.setProperty('--tl-gap', `${this.tree.offsetWidth - this.tree.clientWidth + 4}px`);
     this.drawAxis();
     this.redraw();
   }

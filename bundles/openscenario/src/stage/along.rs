@@ -76,8 +76,10 @@ impl<'w, 'r> Lanes<'w, 'r> {
             // The next lane of the same section is reached by a lane change.
             let changes = following.is_some_and(|(next, _)| is_beside(*key, *next));
             if changes {
-                let most = (leaves - begin).abs() / 2.0;
-                let by = CHANGE_LENGTH.min(most);
+                let rest = way.get(number..).unwrap_or_default();
+                let is_last = rest.iter().all(|(next, _)| is_section(*key, *next));
+                let until = if is_last { to.s } else { leaves };
+                let by = CHANGE_LENGTH.min((until - begin).abs() / 2.0);
                 at = Some(if *along { begin + by } else { begin - by });
                 continue;
             }
