@@ -183,17 +183,37 @@ impl Plan {
 pub(super) struct Tree<'p> {
     pub(super) plan: &'p Plan,
     children: Vec<Vec<usize>>,
+    /// Children of each element that stop others of it. They are few, also in a large storyboard.
+    overriding: Vec<Vec<usize>>,
 }
 
 impl<'p> Tree<'p> {
     pub(super) fn of(plan: &'p Plan) -> Tree<'p> {
         let mut children = vec![Vec::new(); plan.parts.len()];
+        let mut overriding = children.clone();
         for (at, part) in plan.parts.iter().enumerate() {
-            if let Some(of) = part.parent.and_then(|parent| children.get_mut(parent)) {
+            let Some(parent) = part.parent else { continue };
+            if let Some(of) = children.get_mut(parent) {
+                of.push(at);
+            }
+            let overrides = matches!(part.priority, Priority::Override | Priority::Unknown);
+            if let Some(of) = overriding.get_mut(parent).filter(|_| overrides) {
                 of.push(at);
             }
         }
-        Tree { plan, children }
+        Tree {
+            plan,
+            children,
+            overriding,
+        }
+    }
+
+    /// Returns the other elements with the same parent that stop an element, or may.
+    pub(super) fn overriding(&self, place: usize) -> impl Iterator<Item = usize> + '_ {
+        let parent = self.plan.parent(place);
+        let all = parent.and_then(|parent| self.overriding.get(parent));
+        let all = all.into_iter().flatten().copied();
+        all.filter(move |at| *at != place)
     }
 
     pub(super) fn children(&self, place: usize) -> &[usize] {

@@ -316,14 +316,9 @@ impl Spans {
             StoryKind::Action => part.parent,
             _ => None,
         };
-        for other in event.into_iter().flat_map(|event| tree.siblings(event)) {
-            let overrides =
-                tree.plan.parts.get(other).is_some_and(|it| {
-                    matches!(it.priority, Priority::Override | Priority::Unknown)
-                });
-            if let Some(moment) = may_start(other).filter(|_| overrides) {
-                first = first.or(moment);
-            }
+        let overriding = event.into_iter().flat_map(|event| tree.overriding(event));
+        for moment in overriding.filter_map(may_start) {
+            first = first.or(moment);
         }
         if part.is_open {
             first.earliest = first.earliest.min(started);
