@@ -14,6 +14,8 @@ mod reporter;
 mod result_data;
 mod run_data;
 mod scene;
+#[cfg(test)]
+mod scene_tests;
 mod story_data;
 
 pub use page::Page;
