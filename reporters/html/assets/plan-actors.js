@@ -171,12 +171,13 @@ class ActorLayer {
     canvas.textAlign = 'left';
     canvas.textBaseline = 'middle';
     this.labels = [];
+    const middles = shown.slice(0, 300).map((index) => this.middle(frame, index));
     for (const index of shown.slice(0, 300)) {
       const entity = this.story.entities[index];
       if (!entity) continue;
       const text = plain(entity.name, 28);
       const width = canvas.measureText(text).width + 15;
-      const spot = this.freeSpot(frame, index, width);
+      const spot = this.freeSpot(frame, index, width, middles);
       if (!spot) continue;
       this.labels.push({ ...spot, width, height: 17, entity: index });
       canvas.globalAlpha = this.focus && !this.isEmphasized(index) ? 0.4 : 1;
@@ -195,8 +196,13 @@ class ActorLayer {
     canvas.globalAlpha = 1;
   }
 
-  /** @param {Frame} frame @param {number} index @param {number} width @returns {{x: number, y: number}|null} */
-  freeSpot(frame, index, width) {
+  /**
+   * Returns a place for a name that covers neither another name nor the middle of a box.
+   *
+   * @param {Frame} frame @param {number} index @param {number} width @param {[number, number][]} middles of the boxes
+   * @returns {{x: number, y: number}|null}
+   */
+  freeSpot(frame, index, width, middles) {
     const [x, y] = this.middle(frame, index);
     const [length, wide] = this.story.entities[index]?.size ?? [1, 1];
     const heading = this.places[index]?.heading ?? 0;
@@ -222,6 +228,7 @@ class ActorLayer {
       top > 2 &&
       left + width < frame.width - 2 &&
       top + 19 < frame.height &&
+      middles.every(([mx, my]) => mx < left - 4 || mx > left + width + 4 || my < top - 3 || my > top + 20) &&
       this.labels.every(
         (other) =>
           left > other.x + other.width + 2 || left + width + 2 < other.x || top > other.y + 19 || top + 19 < other.y,

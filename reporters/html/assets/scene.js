@@ -6,7 +6,7 @@
  */
 
 /** Share of the timeline in percent, and its bounds. */
-const SHARES = { first: 46, least: 15, most: 85 };
+const SHARES = { first: 50, least: 15, most: 85 };
 
 class Scene {
   /**
@@ -166,5 +166,8 @@ function sceneLegend(story) {
     kinds.has('target') ? entry('target', 'target position') : null,
     unplaced + lost > 0 ? make('li', 'muted', `place unknown: ${missing.join(', ')}`) : null,
   );
-  return withAttributes(make('details', 'legend scene-legend', make('summary', '', 'Scenario'), list), { open: true });
+  return withAttributes(make('details', 'legend scene-legend', make('summary', '', 'Scenario'), list), {
+    // On a small screen it would cover the map.
+    open: window.innerWidth > 900,
+  });
 }

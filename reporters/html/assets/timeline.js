@@ -9,7 +9,7 @@ const TIMELINE_SPARE = 6;
 const MANY_ELEMENTS = 400;
 
 /** With more entities, their rows are closed at first. */
-const MANY_ENTITIES = 10;
+const MANY_ENTITIES = 4;
 
 /** @typedef {{kind: 'entity'|'element', index: number}|null} StorySelection */
 
@@ -88,12 +88,13 @@ class TimelineView {
     const notes = make(
       'div',
       'tl-notes',
+      run,
       never > 0 ? make('span', 'tl-alarm', `${counted(never, 'element')} never ${never === 1 ? 'starts' : 'start'}`) : null,
       story.timed ? null : this.gapsNote(),
       cutsNote('Left out of the timeline', story.cuts),
       timelineLegend(),
     );
-    return make('div', 'tl-head', make('div', 'tl-line', title, run, tools), notes);
+    return make('div', 'tl-head', make('div', 'tl-line', title, tools), notes);
   }
 
   gapsNote() {
