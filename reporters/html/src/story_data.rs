@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use qcbus_openscenario::stage::{Body, Course, CourseKind, Stage};
-use qcbus_openscenario::story::{FilePlace, Sentence, Story, StoryboardElement};
+use qcbus_openscenario::story::{End, FilePlace, Sentence, Story, StoryboardElement};
 use qcbus_openscenario::{Moment, Scenario};
 use qcbus_reporter_sdk::{one_line, printable};
 use serde::Serialize;
@@ -110,7 +110,6 @@ impl StoryData {
             .enumerate()
             .map(|(at, opening)| (opening.entity.as_str(), at))
             .collect();
-        let (run_head, run_rest) = story.end.sentence();
         let sentences = story.complete_sentences();
         let elements = story.elements.iter().zip(&sentences).take(MOST_ELEMENTS);
         let elements = elements.map(|(element, sentence)| {
@@ -128,16 +127,23 @@ impl StoryData {
             entities: entities(&story, &stage.bodies),
             globals: story.globals.iter().map(|it| name(it)).collect(),
             elements: elements.collect(),
-            run: RunData {
-                end: moment(story.end.standard),
-                text: text(&format!("{run_head}{run_rest}")),
-            },
+            run: RunData::of(&story.end),
             courses: stage
                 .courses
                 .iter()
                 .map(|it| CourseData::of(it, &names))
                 .collect(),
             cuts: cuts(&story, &stage),
+        }
+    }
+}
+
+impl RunData {
+    fn of(end: &End) -> RunData {
+        let (head, rest) = end.sentence();
+        RunData {
+            end: moment(end.standard),
+            text: text(&format!("{head}{rest}")),
         }
     }
 }
