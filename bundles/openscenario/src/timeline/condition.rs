@@ -116,7 +116,9 @@ impl Known<'_> {
             (Edge::None, _) => (truth.may, STEP),
             (Edge::Rising, Strictness::Standard) => return Truth::never(),
             (Edge::Falling | Edge::RisingOrFalling, Strictness::Standard) => {
-                (truth.may.longer(STEP), 2.0 * STEP)
+                // It falls after the first look.
+                let later = Times::from(since.earliest + JUST_AFTER / 2.0);
+                (truth.may.longer(STEP).meet(&later), 2.0 * STEP)
             }
             _ => return self.edge(truth, edge, since),
         };
@@ -291,7 +293,7 @@ impl Known<'_> {
         let looked = Times::from(since.earliest);
         let may = truths
             .iter()
-            .fold(looked, |may, truth| may.intersect(&truth.may));
+            .fold(looked, |may, truth| may.meet(&truth.may));
         let looked = Times::from(since.latest);
         let must = truths
             .iter()

@@ -57,6 +57,15 @@ impl Moment {
     }
 }
 
+/// Returns the largest error of a sum of times, in seconds.
+fn rounding(time: f64) -> f64 {
+    if time.is_finite() {
+        1e-9 + 4.0 * f64::EPSILON * time.abs()
+    } else {
+        0.0
+    }
+}
+
 /// Times at which something holds: closed intervals, ascending and separate.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Times(Vec<(f64, f64)>);
@@ -95,6 +104,16 @@ impl Times {
     pub(super) fn first_lasting(&self, seconds: f64) -> f64 {
         let mut lasting = self.0.iter().filter(|(from, to)| to - from >= seconds);
         lasting.next().map_or(f64::INFINITY, |(from, _)| *from)
+    }
+
+    /// Returns the common times of two sets. Times that differ only by rounding are common, so that
+    /// `0.75 + 1` and `1.75` are never taken for different moments.
+    pub(super) fn meet(&self, other: &Times) -> Times {
+        let wider = self.0.iter().map(|(from, to)| {
+            let begin = (from - rounding(*from)).max(from.min(0.0));
+            (begin, to + rounding(*to))
+        });
+        Times(wider.collect()).intersect(other)
     }
 
     pub(super) fn intersect(&self, other: &Times) -> Times {
@@ -174,5 +193,23 @@ impl Times {
     /// Checks whether all times of an interval belong to the set.
     pub(super) fn covers(&self, from: f64, to: f64) -> bool {
         self.0.iter().any(|(low, high)| *low <= from && to <= *high)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_that_differ_by_rounding_meet() {
+        // A rising `!= 1.75`, and `> 0.75` with a delay of 1 s.
+        let just_after = 1e-6;
+        let one = Times::between(1.75 + just_after, 1.75 + just_after);
+        let other = Times::from(0.75 + just_after).later(1.0);
+        assert!(one.intersect(&other).is_empty(), "{one:?} {other:?}");
+        assert!(!one.meet(&other).is_empty());
+        assert!(!other.meet(&one).is_empty());
+        assert!(one.meet(&Times::from(1.75 + 2.0 * just_after)).is_empty());
+        assert_eq!(Times::always().meet(&Times::from(2.0)), Times::from(2.0));
     }
 }

@@ -110,7 +110,7 @@ impl Known<'_> {
         let mut seen: Vec<Times> = Vec::with_capacity(group.len());
         for (index, condition) in group.iter().enumerate() {
             let at = (number, index);
-            let may = self.condition(condition, since).may.intersect(&looked);
+            let may = self.condition(condition, since).may.meet(&looked);
             if may.is_empty() {
                 return Some(self.cause_of(at, condition));
             }
@@ -119,7 +119,7 @@ impl Known<'_> {
         for (other, times) in seen.iter().enumerate() {
             let before = seen.iter().take(other);
             for (one, earlier) in before.enumerate() {
-                if earlier.intersect(times).is_empty() {
+                if earlier.meet(times).is_empty() {
                     return Some(Cause::Apart {
                         one: (number, one),
                         other: (number, other),

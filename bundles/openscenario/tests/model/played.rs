@@ -82,6 +82,10 @@ proptest! {
         condition.logic = Logic::Unknown;
         for strictness in [Strictness::Standard, Strictness::Tolerant] {
             let (narrow, wide) = (Spans::of(&known, strictness), Spans::of(&unknown, strictness));
+            // Nothing is said about storyboards that never settle.
+            if narrow.get(0).unwrap().start == Moment::UNKNOWN {
+                continue;
+            }
             for place in 0..known.parts.len() {
                 let (narrow, wide) = (narrow.get(place).unwrap(), wide.get(place).unwrap());
                 includes("start", place, wide.start, narrow.start);
