@@ -36,15 +36,17 @@ fn report(
 ) {
     let (at, why) = match cause {
         Cause::StateNeverComes { at, of } => {
-            let state = never
-                .condition(at)
-                .and_then(|it| it.path(&["ByValueCondition", "StoryboardElementStateCondition"]));
+            let Some(condition) = never.condition(at) else {
+                return;
+            };
+            let state = condition.path(&["ByValueCondition", "StoryboardElementStateCondition"]);
             let Some(state) = state else { return };
             let text = timeline::state_never_comes(scenario, timeline, state, of);
             let text = format!("{text}; {}{}", never.so, differs(never));
             found
                 .about(state, "state", text)
                 .level(level)
+                .at(condition.node(), "the condition")
                 .maybe_follows(timeline::start_within(scenario, timeline, of));
             return;
         }

@@ -14,9 +14,10 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         let Cause::StateNeverComes { at, of } = cause else {
             return;
         };
-        let condition = never.condition(at);
-        let state = condition
-            .and_then(|it| it.path(&["ByValueCondition", "StoryboardElementStateCondition"]));
+        let Some(condition) = never.condition(at) else {
+            return;
+        };
+        let state = condition.path(&["ByValueCondition", "StoryboardElementStateCondition"]);
         let Some(state) = state.filter(|it| !follows(timeline, *it, of, never.place)) else {
             return;
         };
@@ -28,6 +29,7 @@ fn run(scenario: &Scenario<'_>, found: &mut Sink<'_>) {
         );
         found
             .about(state, "state", text)
+            .at(condition.node(), "the condition")
             .maybe_fault(timeline::start_of(state))
             .maybe_follows(timeline::start_within(scenario, timeline, of));
     });
