@@ -13,6 +13,7 @@ mod support;
 mod asam;
 mod command_line;
 mod demanded;
+mod esmini;
 mod farm;
 mod hosted_real;
 mod hostile;

@@ -1,0 +1,259 @@
+//! Real scenarios are played by another simulator: events that never start on paper never start there.
+//!
+//! `QCBUS_ESMINI` names the program of esmini, `QCBUS_SCENARIOS` a directory with a directory for each
+//! repository. The table and the differences are printed: see `docs/evidence/played-scenarios.md`.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+
+use crate::support::cli::{Cli, files_below};
+use crate::support::inside::skip;
+use crate::support::watchdog;
+
+const ESMINI: &str = "QCBUS_ESMINI";
+const SCENARIOS: &str = "QCBUS_SCENARIOS";
+
+/// Cases that people reported, if they are at hand.
+const REPORTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/cases/reports");
+
+/// Wall time of one run. Runs without an end play hours of simulation time meanwhile.
+const LIMIT: Duration = Duration::from_secs(8);
+
+/// Step of the simulator, in seconds.
+const STEP: &str = "0.05";
+
+/// Tolerance of bounds, in seconds: a few steps.
+const SLACK: f64 = 0.2;
+
+/// Starts of storyboard elements in the order of the log: time and name.
+type Starts = Vec<(f64, String)>;
+
+/// A run: the starts, and the time of the last entry of the log.
+#[derive(Debug, Default, PartialEq)]
+struct Run {
+    starts: Starts,
+    last: f64,
+}
+
+/// Reads a log such as `[2.050] [info] brake standbyState -> startTransition -> runningState`.
+fn read_log(log: &str) -> Run {
+    let mut run = Run::default();
+    for line in log.lines() {
+        let entry = line.strip_prefix('[').and_then(|it| it.split_once("] ["));
+        let Some((time, entry)) = entry else {
+            continue;
+        };
+        let Ok(time) = time.parse::<f64>() else {
+            continue;
+        };
+        run.last = run.last.max(time);
+        let name = entry
+            .strip_suffix(" -> startTransition -> runningState")
+            .and_then(|it| it.rsplit_once(' '))
+            .and_then(|(it, _)| it.split_once("] "));
+        if let Some((_, name)) = name {
+            run.starts.push((time, name.to_owned()));
+        }
+    }
+    run
+}
+
+/// Bounds for the first start of the elements of one name. Infinity means never.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Bounds {
+    earliest: f64,
+    latest: f64,
+    has_event: bool,
+}
+
+/// Returns the bounds of every name, because the log has only names. Elements of other kinds may have
+/// the name of an event, too.
+fn bounds(timeline: &Value) -> BTreeMap<String, Bounds> {
+    let seconds = |time: &Value| time.as_f64().unwrap_or(f64::INFINITY);
+    let mut all: BTreeMap<String, Bounds> = BTreeMap::new();
+    for element in timeline["elements"].as_array().unwrap() {
+        let start = &element["tolerant"]["start"];
+        let one = all
+            .entry(element["name"].as_str().unwrap_or_default().to_owned())
+            .or_insert(Bounds {
+                earliest: f64::INFINITY,
+                latest: f64::INFINITY,
+                has_event: false,
+            });
+        one.earliest = one.earliest.min(seconds(&start["earliest"]));
+        one.latest = one.latest.min(seconds(&start["latest"]));
+        one.has_event |= element["kind"] == "event";
+    }
+    all.retain(|_, it| it.has_event);
+    all
+}
+
+/// Counts and differences.
+#[derive(Debug, Default)]
+struct Tally {
+    /// Scenarios, played ones, names of events, names that started, names that never start on paper.
+    counts: [usize; 5],
+    /// Events that started although the paper says "never".
+    wrong: Vec<String>,
+    /// Other events that started outside of their bounds.
+    outside: Vec<String>,
+}
+
+impl Tally {
+    fn of(file: &Path, timeline: &Value, run: &Run) -> Tally {
+        let mut tally = Tally::default();
+        tally.counts[0] = 1;
+        if run.starts.is_empty() {
+            return tally;
+        }
+        tally.counts[1] = 1;
+        for (name, paper) in bounds(timeline) {
+            let start = run.starts.iter().find(|(_, it)| *it == name);
+            let start = start.map_or(f64::INFINITY, |(time, _)| *time);
+            let is_never = paper.earliest == f64::INFINITY;
+            tally.counts[2] += 1;
+            tally.counts[3] += usize::from(start < f64::INFINITY);
+            tally.counts[4] += usize::from(is_never);
+            // A run that is over says nothing about later starts.
+            let may_come = start.min(run.last) <= paper.latest + SLACK;
+            if may_come && paper.earliest - SLACK <= start {
+                continue;
+            }
+            let list = if is_never {
+                &mut tally.wrong
+            } else {
+                &mut tally.outside
+            };
+            list.push(format!("{}: `{name}`: {start}, {paper:?}", file.display()));
+        }
+        tally
+    }
+
+    fn add(&mut self, other: Tally) {
+        for (sum, count) in self.counts.iter_mut().zip(other.counts) {
+            *sum += count;
+        }
+        self.wrong.extend(other.wrong);
+        self.outside.extend(other.outside);
+    }
+
+    fn row(&self, name: &str) -> String {
+        let counts = self.counts.map(|it| it.to_string()).join(" | ");
+        format!(
+            "| {name} | {counts} | {} | {} |",
+            self.wrong.len(),
+            self.outside.len()
+        )
+    }
+}
+
+/// A run of the simulator that is killed at the end.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Plays a scenario until it ends, or until the limit.
+fn play(esmini: &Path, scenario: &Path) -> Run {
+    let cli = Cli::new();
+    let log = cli.path().join("log.txt");
+    let mut command = Command::new(esmini);
+    command.arg("--osc").arg(scenario);
+    command.args(["--headless", "--disable_stdout", "--fixed_timestep", STEP]);
+    command.arg("--logfile_path").arg(&log);
+    command.current_dir(cli.path());
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    let mut running = Running(command.spawn().unwrap());
+    let begin = Instant::now();
+    while running.0.try_wait().unwrap().is_none() && begin.elapsed() < LIMIT {
+        watchdog::pause(Duration::from_millis(10));
+    }
+    drop(running);
+    let text = std::fs::read(&log).unwrap_or_default();
+    read_log(&String::from_utf8_lossy(&text))
+}
+
+/// Plays a scenario in both ways, unless the command shows no times for it.
+fn compared(esmini: &Path, scenario: &Path) -> Option<Tally> {
+    let said = Cli::new().qcbus(&["timeline", scenario.to_str()?, "--json"]);
+    let timeline = (said.code == Some(0)).then(|| serde_json::from_str(&said.stdout).unwrap())?;
+    Some(Tally::of(scenario, &timeline, &play(esmini, scenario)))
+}
+
+/// Plays all scenarios below a directory, several at once.
+fn played(esmini: &Path, directory: &Path) -> Tally {
+    let mut scenarios = files_below(directory);
+    scenarios.retain(|it| it.extension().is_some_and(|it| it == "xosc"));
+    let next = AtomicUsize::new(0);
+    let all = Mutex::new(Tally::default());
+    let work = || {
+        while let Some(scenario) = scenarios.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let tally = compared(esmini, &directory.join(scenario)).unwrap_or_default();
+            all.lock().unwrap().add(tally);
+        }
+    };
+    std::thread::scope(|scope| {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        for _ in 0..cores {
+            scope.spawn(work);
+        }
+    });
+    all.into_inner().unwrap()
+}
+
+#[test]
+#[expect(clippy::print_stdout, reason = "the table is the result of the study")]
+fn events_that_never_start_on_paper_never_start_in_esmini() {
+    let variable = |name: &str| std::env::var_os(name).map(PathBuf::from);
+    let (Some(esmini), Some(root)) = (variable(ESMINI), variable(SCENARIOS)) else {
+        return skip("esmini", &format!("{ESMINI} and {SCENARIOS} are not set"));
+    };
+    let mut all = Tally::default();
+    for root in [root, REPORTED.into()] {
+        let entries = std::fs::read_dir(root).into_iter().flatten().flatten();
+        let mut directories: Vec<PathBuf> = entries.map(|it| it.path()).collect();
+        directories.sort();
+        for directory in directories {
+            let tally = played(&esmini, &directory);
+            println!(
+                "{}",
+                tally.row(&directory.file_name().unwrap().to_string_lossy())
+            );
+            all.add(tally);
+        }
+    }
+    println!(
+        "{}\noutside of the bounds: {:#?}",
+        all.row("all"),
+        all.outside
+    );
+    assert!(all.counts[1] > 0, "{ESMINI} plays no scenario");
+    assert!(all.wrong.is_empty(), "{:#?}", all.wrong);
+}
+
+#[test]
+fn log_tells_starts_and_the_last_time() {
+    let log = "\
+[] [info] esmini GIT REV: 1
+[0.000] [info] storyBoard initState -> initToStandby -> standbyState
+[0.050] [info] cut in -> out standbyState -> startTransition -> runningState
+[0.050] [warn] brake is late
+[3.100] [info] cut in -> out runningState -> endTransition -> completeState
+a line without time -> startTransition -> runningState
+";
+    let starts = vec![(0.05, "cut in -> out".to_owned())];
+    assert_eq!(read_log(log), Run { starts, last: 3.1 });
+}
