@@ -135,7 +135,10 @@ impl Tally {
 fn play(esmini: &Path, scenario: &Path) -> Run {
     let cli = Cli::new();
     let mut command = Command::new("timeout");
-    command.args(["--signal=KILL", LIMIT]).arg(esmini);
+    // Only an interrupted run writes the end of its log. A killed one does not.
+    command
+        .args(["--signal=INT", "--kill-after=5", LIMIT])
+        .arg(esmini);
     command.args(["--headless", "--disable_stdout", "--fixed_timestep", STEP]);
     command
         .args(["--logfile_path", "log.txt", "--osc"])

@@ -148,9 +148,14 @@ impl Known<'_> {
             }
             Logic::State(place, state) => {
                 let truth = self.state(*place, *state);
-                // A condition sees the state of this step or of the step before.
+                let may = match self.strictness {
+                    // A condition sees the state of this step or of the step before.
+                    Strictness::Standard => truth.may.longer(STEP),
+                    // Some simulators keep every change until the condition is looked at.
+                    Strictness::Tolerant => Times::from(truth.may.first()),
+                };
                 Truth {
-                    may: truth.may.longer(STEP),
+                    may,
                     must: truth.must.shorter(STEP),
                     once: truth.once.map(|(from, to)| (from, to + STEP)),
                     is_seen: false,

@@ -268,7 +268,9 @@ impl Spans {
         };
         // A stop comes before the regular end, or may.
         let end = Moment {
-            earliest: by_itself.earliest,
+            earliest: by_itself
+                .earliest
+                .min(ended_by_stop(stopped, part.kind, strictness)),
             latest: match by_itself.latest <= stopped.or(self.ends).earliest {
                 true => by_itself.latest,
                 false => f64::INFINITY,
@@ -456,6 +458,15 @@ fn takes(start: Moment, takes: Takes, strictness: Strictness) -> Moment {
         (Takes::ForeverInTheory, Strictness::Tolerant) | (Takes::Unknown, _) => {
             ends(0.0, f64::INFINITY)
         }
+    }
+}
+
+/// Returns the earliest time at which a stop ends an element regularly, or infinity. Some simulators
+/// end actions that another action or an event with the priority `override` stops.
+fn ended_by_stop(stopped: Moment, kind: StoryKind, strictness: Strictness) -> f64 {
+    match (kind, strictness) {
+        (StoryKind::Action, Strictness::Tolerant) => stopped.earliest,
+        _ => f64::INFINITY,
     }
 }
 

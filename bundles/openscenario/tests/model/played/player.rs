@@ -32,9 +32,9 @@ pub struct Run {
     pub stopped: bool,
 }
 
-/// Plays a storyboard.
-pub fn play(plan: &Plan, seed: u64) -> Run {
-    let mut player = Player::new(plan, seed);
+/// Plays a storyboard. A lenient simulator deviates from the standard as known ones do.
+pub fn play(plan: &Plan, seed: u64, is_lenient: bool) -> Run {
+    let mut player = Player::new(plan, seed, is_lenient);
     for step in 0..MOST_STEPS {
         player.step = step;
         if player.is_over() {
@@ -72,6 +72,13 @@ struct Player<'p> {
     looks: HashMap<*const Condition, Look>,
     /// Whether the stop trigger of an act counts before the act has started. Simulators differ.
     stops_waiting_acts: bool,
+    /// Whether conditions see each change since they were last looked at, and what others stop ends
+    /// regularly. Known simulators do this.
+    is_lenient: bool,
+    /// Changes of all elements: step that sees it, element and its new state or its transition.
+    changes: Vec<(usize, usize, State)>,
+    /// Step in which a condition was last looked at.
+    looked: HashMap<*const Condition, usize>,
 }
 
 /// Memory of a condition.
@@ -84,7 +91,7 @@ struct Look {
 }
 
 impl<'p> Player<'p> {
-    fn new(plan: &'p Plan, seed: u64) -> Player<'p> {
+    fn new(plan: &'p Plan, seed: u64, is_lenient: bool) -> Player<'p> {
         let count = plan.parts.len();
         let mut player = Player {
             plan,
@@ -99,6 +106,9 @@ impl<'p> Player<'p> {
             lives: vec![Life::default(); count],
             looks: HashMap::new(),
             stops_waiting_acts: seed.is_multiple_of(2),
+            is_lenient,
+            changes: Vec::new(),
+            looked: HashMap::new(),
         };
         for place in 0..count {
             if plan.parts[place].parent.is_none() {
@@ -107,6 +117,7 @@ impl<'p> Player<'p> {
         }
         player.before.clone_from(&player.phases);
         player.seen = std::mem::take(&mut player.now);
+        player.changes.iter_mut().for_each(|change| change.0 = 0);
         player
     }
 
@@ -131,9 +142,8 @@ impl<'p> Player<'p> {
 
     /// Starts an element, and those within it that have no trigger.
     fn begin(&mut self, place: usize) {
-        self.phases[place] = Phase::Running;
+        self.change(place, Phase::Running, State::StartTransition);
         self.counts[place] += 1;
-        self.now.push((place, State::StartTransition));
         let time = self.time();
         self.lives[place].start.get_or_insert(time);
         if self.plan.parts[place].kind == StoryKind::Action {
@@ -152,7 +162,7 @@ impl<'p> Player<'p> {
                 .filter_map(|(at, part)| part.rivals.contains(&place).then_some(at))
             {
                 if self.phases[rival] == Phase::Running {
-                    self.stop(rival);
+                    self.stop_for_another(rival);
                 }
             }
         }
@@ -160,14 +170,42 @@ impl<'p> Player<'p> {
             self.counts[child] = 0;
             match self.plan.parts[child].start {
                 Start::WithParent => self.begin(child),
-                _ => self.phases[child] = Phase::Standby,
+                _ => {
+                    self.phases[child] = Phase::Standby;
+                    self.changes.push((self.step + 1, child, State::Standby));
+                }
             }
         }
     }
 
-    fn complete(&mut self, place: usize, transition: State) {
-        self.phases[place] = Phase::Complete;
+    fn change(&mut self, place: usize, phase: Phase, transition: State) {
+        self.phases[place] = phase;
         self.now.push((place, transition));
+        let state = match phase {
+            Phase::Running => State::Running,
+            Phase::Complete => State::Complete,
+            Phase::Idle | Phase::Standby => State::Standby,
+        };
+        for one in [state, transition] {
+            self.changes.push((self.step + 1, place, one));
+        }
+    }
+
+    /// Stops an element because of another one.
+    fn stop_for_another(&mut self, place: usize) {
+        if !self.is_lenient {
+            return self.stop(place);
+        }
+        for child in self.children(place) {
+            if self.phases[child] == Phase::Running {
+                self.complete(child, State::EndTransition);
+            }
+        }
+        self.ended(place);
+    }
+
+    fn complete(&mut self, place: usize, transition: State) {
+        self.change(place, Phase::Complete, transition);
         let time = self.time();
         let life = &mut self.lives[place];
         life.complete.get_or_insert(time);
@@ -257,7 +295,7 @@ impl<'p> Player<'p> {
                     }
                     return;
                 }
-                Priority::Override => running.into_iter().for_each(|it| self.stop(it)),
+                Priority::Override => running.into_iter().for_each(|it| self.stop_for_another(it)),
                 _ => {}
             }
         }
@@ -280,8 +318,7 @@ impl<'p> Player<'p> {
         let part = &self.plan.parts[place];
         let is_last = part.executions == Some(self.counts[place]);
         if part.kind == StoryKind::Event && !is_last {
-            self.phases[place] = Phase::Standby;
-            self.now.push((place, State::EndTransition));
+            self.change(place, Phase::Standby, State::EndTransition);
             let time = self.time();
             self.lives[place].end.get_or_insert(time);
         } else if part.kind == StoryKind::ManeuverGroup && !is_last {
@@ -308,9 +345,10 @@ impl<'p> Player<'p> {
     }
 
     fn holds(&mut self, condition: &Condition) -> bool {
-        let value = self.value(&condition.logic);
         let key = std::ptr::from_ref(condition);
         let step = self.step;
+        let last = self.looked.insert(key, step);
+        let value = self.value(&condition.logic) || self.was(&condition.logic, last);
         let look = self.looks.entry(key).or_default();
         // Elements that waited before look anew.
         if look.step + 1 != step {
@@ -331,6 +369,16 @@ impl<'p> Player<'p> {
         let delay = (condition.delay.unwrap_or(0.0) / STEP).round() as usize;
         step.checked_sub(delay)
             .is_some_and(|then| look.held.contains(&then))
+    }
+
+    /// Checks whether a state came after the last look, in a simulator that remembers it.
+    fn was(&self, logic: &Logic, last: Option<usize>) -> bool {
+        let Logic::State(place, state) = logic else {
+            return false;
+        };
+        let is_new = |step: usize| step <= self.step && last.is_none_or(|last| step > last);
+        let mut changes = self.changes.iter();
+        self.is_lenient && changes.any(|it| (it.1, it.2) == (*place, *state) && is_new(it.0))
     }
 
     fn value(&mut self, logic: &Logic) -> bool {
