@@ -311,11 +311,22 @@ impl Known<'_> {
                 continue;
             };
             let mut others = truths.iter().enumerate().filter(|(other, _)| *other != at);
-            if others.all(|(_, other)| other.must.covers(from, to + STEP)) {
+            let looked = group.get(at).map_or(from, |it| self.looked_at(it, from));
+            let since = |other: usize| if other < at { looked } else { from };
+            if others.all(|(other, truth)| truth.must.covers(since(other), to + STEP)) {
                 by = by.min(to);
             }
         }
         (may, by)
+    }
+
+    /// Returns the time from which a condition is looked at for an edge at `from`. Some simulators
+    /// look at a condition without delay only while those before it in its group are true.
+    fn looked_at(&self, condition: &Condition, from: f64) -> f64 {
+        match (self.strictness, condition.delay) {
+            (Strictness::Tolerant, None | Some(0.0)) => (from - STEP).max(0.0),
+            _ => from,
+        }
     }
 
     /// Returns the times at which a trigger may be true, and a time by which it surely was.

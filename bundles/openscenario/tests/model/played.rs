@@ -10,7 +10,10 @@ mod storyboards;
 
 use player::{Run, play};
 use proptest::prelude::*;
-use qcbus_openscenario::{Condition, Logic, Moment, Plan, Spans, Start, Strictness};
+use qcbus_openscenario::{
+    Comparison, Condition, Edge, Logic, Moment, Plan, Priority, Spans, Start, StoryKind, StoryPart,
+    Strictness, Takes, Trigger,
+};
 
 /// Tolerance for comparisons of times, in seconds.
 const CLOSE: f64 = 1e-3;
@@ -122,6 +125,55 @@ fn includes(what: &str, place: usize, wide: Moment, narrow: Moment) {
         wide.earliest <= narrow.earliest + CLOSE && wide.latest >= narrow.latest - CLOSE,
         "{what} of {place}: {wide:?} does not include {narrow:?}"
     );
+}
+
+/// Returns a storyboard with one action. Its event has this start trigger.
+fn with_event(group: Vec<Condition>) -> Plan {
+    let part = |(at, kind): (usize, &StoryKind)| StoryPart {
+        kind: *kind,
+        parent: at.checked_sub(1),
+        start: match kind {
+            StoryKind::Event => Start::By(Trigger {
+                groups: vec![group.clone()],
+            }),
+            _ => Start::WithParent,
+        },
+        stop: None,
+        executions: Some(1),
+        priority: Priority::Parallel,
+        takes: Takes::NoTime,
+        rivals: Vec::new(),
+        is_open: false,
+    };
+    Plan {
+        parts: StoryKind::ALL.iter().enumerate().map(part).collect(),
+        stop: None,
+    }
+}
+
+#[test]
+fn edge_is_missed_if_the_condition_is_looked_at_with_the_one_before_it() {
+    let after = |seconds, edge, delay| Condition {
+        logic: Logic::Time(Comparison::GreaterThan, seconds),
+        edge,
+        delay: Some(delay),
+        is_certain: true,
+    };
+    let late = after(5.0, Edge::None, 1.0);
+    let plan = with_event(vec![late, after(6.0, Edge::Rising, 0.0)]);
+    let action = plan.parts.len() - 1;
+    let latest = |strictness| {
+        Spans::of(&plan, strictness)
+            .get(action)
+            .unwrap()
+            .start
+            .latest
+    };
+    assert!(latest(Strictness::Standard) < 6.5);
+    assert_eq!(latest(Strictness::Tolerant), f64::INFINITY);
+    let start = |is_lenient| play(&plan, 1, is_lenient).lives[action].start;
+    assert!(start(false).is_some());
+    assert_eq!(start(true), None);
 }
 
 fn cases() -> u32 {

@@ -73,8 +73,9 @@ struct Player<'p> {
     looks: HashMap<*const Condition, Look>,
     /// Whether the stop trigger of an act counts before the act has started. Simulators differ.
     stops_waiting_acts: bool,
-    /// Whether conditions see each change since they were last looked at, and what others stop ends
-    /// regularly. Known simulators do this.
+    /// Whether the simulator deviates as known ones do: conditions see each change since they were
+    /// last looked at, they are not looked at if others of their group are false, and actions and
+    /// events that others stop end regularly.
     is_lenient: bool,
     /// Changes of all elements: step that sees it, element and its new state or its transition.
     changes: Vec<(usize, usize, State)>,

@@ -15,12 +15,15 @@ pub(super) struct Look {
 
 impl Player<'_> {
     pub(super) fn triggers(&mut self, trigger: &Trigger) -> bool {
-        // Each condition is looked at, also if the outcome is clear.
+        // Each condition is looked at, also if the outcome is clear. Lenient simulators stop earlier.
         let mut any = false;
         for group in &trigger.groups {
             let mut all = true;
             for condition in group {
-                all &= self.holds(condition);
+                let is_timed = condition.delay.is_some_and(|it| it > 0.0);
+                if all || is_timed || !self.is_lenient {
+                    all &= self.holds(condition);
+                }
             }
             any |= all;
         }
