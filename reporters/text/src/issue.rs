@@ -25,6 +25,8 @@ pub(crate) struct View<'v> {
     pub(crate) full_names: bool,
     /// Whether only the first few findings about the same fault are shown.
     pub(crate) merges: bool,
+    /// Whether there are so many findings that only the main place of each has source lines.
+    pub(crate) compact: bool,
 }
 
 /// Maximum number of shown findings about the same fault.
@@ -51,8 +53,15 @@ impl View<'_> {
             .partition(|place| place.description == ALSO_HERE);
         let (joined, places): (Vec<_>, Vec<_>) =
             others.into_iter().partition(|place| is_joined(place));
-        for (number, place) in places.into_iter().enumerate() {
-            self.place(out, place, entry.issue.level, gutter, number == 0);
+        let (main, further) = places.split_at(places.len().min(1));
+        for place in main {
+            self.main_place(out, place, entry.issue.level, gutter);
+        }
+        for place in further {
+            match self.compact {
+                true => self.further_place(out, place, gutter),
+                false => self.place(out, place, entry.issue.level, gutter, false),
+            }
         }
         if entry.places.is_empty() {
             let path = shown::line(&self.result.display_path);
@@ -102,6 +111,30 @@ impl View<'_> {
         for line in lines {
             let _ = writeln!(out, "    {}", line.trim_end());
         }
+    }
+
+    /// Writes the main place. In a compact report, information has no source lines.
+    fn main_place(&self, out: &mut String, place: &IssueLocation, level: Level, gutter: usize) {
+        if self.compact && level == Level::Information {
+            let arrow = self.paint.frame("-->");
+            let _ = writeln!(out, "{:gutter$}{arrow} {}", "", self.name(place));
+        } else {
+            self.place(out, place, level, gutter, true);
+        }
+    }
+
+    /// Writes a further place on one line.
+    fn further_place(&self, out: &mut String, place: &IssueLocation, gutter: usize) {
+        let what = match one_line(&place.description) {
+            what if what.is_empty() => "a further place".to_owned(),
+            what => what,
+        };
+        self.note(
+            out,
+            gutter,
+            "see",
+            &format!("{what}{}", self.reference(place)),
+        );
     }
 
     fn place(

@@ -80,6 +80,9 @@ impl Default for Options {
     }
 }
 
+/// Number of findings up to which all places have source lines, if the options merge findings.
+const MOST_IN_FULL: usize = 6;
+
 /// An entry of a report: an issue with its context.
 pub(crate) struct Entry<'r> {
     pub(crate) bundle: &'r CheckerBundle,
@@ -106,6 +109,8 @@ pub fn findings(result: &ResultMessage, options: &Options, sources: &dyn Sources
         true => alike::notes(&entries),
         false => vec![Some(String::new()); entries.len()],
     };
+    let shown = alike.iter().flatten().count();
+    let compact = options.merges && shown > MOST_IN_FULL;
     for (entry, alike) in entries.iter().zip(alike) {
         let Some(alike) = alike else {
             continue;
@@ -120,6 +125,7 @@ pub fn findings(result: &ResultMessage, options: &Options, sources: &dyn Sources
             width: options.width,
             full_names: options.full_names,
             merges: options.merges,
+            compact,
         };
         view.write(&mut out, entry, why.map(String::as_str), &alike);
         out.push('\n');

@@ -128,13 +128,13 @@ fn includes(what: &str, place: usize, wide: Moment, narrow: Moment) {
 }
 
 /// Returns a storyboard with one action. Its event has this start trigger.
-fn with_event(group: Vec<Condition>) -> Plan {
+fn with_event(group: &[Condition]) -> Plan {
     let part = |(at, kind): (usize, &StoryKind)| StoryPart {
         kind: *kind,
         parent: at.checked_sub(1),
         start: match kind {
             StoryKind::Event => Start::By(Trigger {
-                groups: vec![group.clone()],
+                groups: vec![group.to_vec()],
             }),
             _ => Start::WithParent,
         },
@@ -160,7 +160,7 @@ fn edge_is_missed_if_the_condition_is_looked_at_with_the_one_before_it() {
         is_certain: true,
     };
     let late = after(5.0, Edge::None, 1.0);
-    let plan = with_event(vec![late, after(6.0, Edge::Rising, 0.0)]);
+    let plan = with_event(&[late, after(6.0, Edge::Rising, 0.0)]);
     let action = plan.parts.len() - 1;
     let latest = |strictness| {
         Spans::of(&plan, strictness)

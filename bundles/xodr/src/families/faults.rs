@@ -7,6 +7,8 @@ use qcbus_sdk::fault_of;
 pub(crate) trait OfFault {
     /// The finding is about two cross-sections that do not fit together, at these ends of lanes.
     fn at_joint(self, ends: [(LaneRef<'_, '_>, ContactPoint); 2]) -> Self;
+    /// The finding is about links of a lane that has no width at this end.
+    fn at_opening(self, lane: LaneRef<'_, '_>, end: ContactPoint) -> Self;
     /// The finding is about two road ends that do not lie at the same place.
     fn at_gap(self, ends: [RoadEnd; 2]) -> Self;
     /// The finding is about the roads, connections and lane links of the junction at or around an
@@ -19,6 +21,10 @@ pub(crate) trait OfFault {
 impl OfFault for Finding<'_, '_> {
     fn at_joint(self, ends: [(LaneRef<'_, '_>, ContactPoint); 2]) -> Self {
         self.follows(between(ends.map(|(lane, end)| cross_section(lane.at, end))))
+    }
+
+    fn at_opening(self, lane: LaneRef<'_, '_>, end: ContactPoint) -> Self {
+        self.follows(format!("no width at {}", cross_section(lane.at, end)))
     }
 
     fn at_gap(self, ends: [RoadEnd; 2]) -> Self {

@@ -1,5 +1,6 @@
 //! Lanes without width at a link (OpenDRIVE 1.9, 11.6).
 
+use super::faults::OfFault as _;
 use super::on_road::{MAX_PLACES, OnRoad, lane_name};
 use crate::prelude::*;
 use foldhash::HashMap;
@@ -67,7 +68,10 @@ fn report(
         lane_name(lane),
         lane.width_at(end).map_or(0.0, f64::abs)
     );
-    let mut finding = found.issue(lane.node(), text).at_lane_end(lane, end);
+    let mut finding = found
+        .issue(lane.node(), text)
+        .at_lane_end(lane, end)
+        .at_opening(lane, end);
     for link in links.iter().take(MAX_PLACES) {
         finding = finding.at(*link, "the link");
     }

@@ -1,3 +1,4 @@
+use crate::families::faults::OfFault as _;
 use crate::families::on_road::{OnRoad, lane_name};
 use crate::families::zero_width::{ZERO_WIDTH, is_zero_at, opens};
 use crate::prelude::*;
@@ -30,6 +31,8 @@ fn each(map: &RoadMap<'_>, part: &Part, found: &mut Sink<'_>) {
             .here("the lane that continues")
             .at(to.node(), "the lane that has no width here")
             .at_lane_end(to, joint.to.end)
-            .at(joint.node, "the link");
+            .at(joint.node, "the link")
+            .at_opening(from, joint.from.end)
+            .at_opening(to, joint.to.end);
     }
 }

@@ -389,3 +389,33 @@ fn findings_that_differ_only_in_numbers_are_shown_once() {
         "{more}"
     );
 }
+
+#[test]
+fn many_findings_show_only_their_main_places_in_full() {
+    let words = ["one", "two", "three", "four", "five", "six", "seven"];
+    let said = |count: usize, level: Level| {
+        let finding = |(row, word): (u64, &&str)| {
+            let places = vec![at(row, 2, "/a", ""), at(1, 2, "/a", "the other road")];
+            issue(level, &format!("fault {word}"), UNIQUE, places)
+        };
+        let issues = (1_u64..).zip(words.iter().take(count)).map(finding);
+        let found = checker("check_width", Status::Completed, "", issues.collect());
+        let options = Options {
+            merges: true,
+            ..Options::default()
+        };
+        let result = result("a.xodr", Verdict::Rejected, vec![found]);
+        render(&result, &options, &pages())
+    };
+    let few = said(6, Level::Error);
+    assert_eq!(few.matches("::: ").count(), 6, "{few}");
+    assert!(!few.contains("= see"), "{few}");
+    let many = said(7, Level::Error);
+    assert_eq!(many.matches("::: ").count(), 0, "{many}");
+    let shown = many.matches("= see: the other road (row 1)").count();
+    assert_eq!(shown, 7, "{many}");
+    assert_eq!(many.matches("= at: /a").count(), 7, "{many}");
+    let information = said(7, Level::Information);
+    assert!(!information.contains("= at: /a"), "{information}");
+    assert_eq!(information.matches("--> a.xodr:").count(), 7);
+}
