@@ -284,7 +284,7 @@ impl Spans {
             let event_part = tree.plan.parts.get(event);
             event_part.is_some_and(|it| known.may_be_skipped(event, it))
         });
-        if is_skipped {
+        if is_skipped || self.may_be_idle(tree, strictness, place, stop) {
             // The actions of a skipped event never ran and are not stopped.
             stop.latest = f64::INFINITY;
         }
@@ -298,6 +298,28 @@ impl Spans {
         bound.set(&mut span.end, end)
             | bound.set(&mut span.complete, complete)
             | bound.set(&mut span.stopped, stopped)
+    }
+
+    /// Checks whether an element may wait for its parent when its act is stopped. Some simulators
+    /// never complete it then.
+    fn may_be_idle(
+        &self,
+        tree: &Tree<'_>,
+        strictness: Strictness,
+        place: usize,
+        stop: Moment,
+    ) -> bool {
+        let waits = tree.plan.parts.get(place);
+        let waits = waits.is_some_and(|part| matches!(part.start, Start::By(_)));
+        let awake = if waits {
+            tree.plan.parent(place)
+        } else {
+            Some(place)
+        };
+        let awake = awake.map_or(Moment::BEGIN, |at| {
+            self.spans.get(at).map_or(Moment::UNKNOWN, |it| it.start)
+        });
+        strictness == Strictness::Tolerant && awake.latest > stop.earliest
     }
 
     /// Returns when something stops an element: the end of its act, an event that overrides, or an

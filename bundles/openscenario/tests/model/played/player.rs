@@ -74,8 +74,8 @@ struct Player<'p> {
     /// Whether the stop trigger of an act counts before the act has started. Simulators differ.
     stops_waiting_acts: bool,
     /// Whether the simulator deviates as known ones do: conditions see each change since they were
-    /// last looked at, they are not looked at if others of their group are false, and actions and
-    /// events that others stop end regularly.
+    /// last looked at, they are not looked at if others of their group are false, actions and
+    /// events that others stop end regularly, and elements whose parent waits are not stopped.
     is_lenient: bool,
     /// Changes of all elements: step that sees it, element and its new state or its transition.
     changes: Vec<(usize, usize, State)>,
@@ -212,7 +212,8 @@ impl<'p> Player<'p> {
     /// Stops an element and everything within it.
     fn stop(&mut self, place: usize) {
         for child in self.children(place) {
-            if self.phases[child] != Phase::Complete {
+            let is_left_out = self.is_lenient && self.phases[child] == Phase::Idle;
+            if self.phases[child] != Phase::Complete && !is_left_out {
                 self.stop(child);
             }
         }
