@@ -138,6 +138,30 @@ fn same_words_at_several_places_are_one_finding() {
 }
 
 #[test]
+fn issues_of_own_rules_stay_separate_unless_they_name_a_fault() {
+    let own = |text: &str| Issue {
+        rule_uid: "acme.example:xodr:1.0.0:lane.paint".to_owned(),
+        ..at(
+            "/OpenDRIVE/road[@id='1']/@name",
+            issue(Level::Warning, text),
+        )
+    };
+    let unnamed = |text: &str| Issue {
+        rule_uid: String::new(),
+        ..own(text)
+    };
+    let found = vec![own("no paint"), own("no paint"), own("no name")];
+    let nameless = vec![unnamed("no paint"), unnamed("no paint")];
+    let apart = pooled(vec![("paint", found), ("nameless", nameless)], false);
+    assert_eq!(issues(&apart).len(), 5);
+    let named = vec![
+        about("paint", false, own("no paint")),
+        about("paint", false, own("no paint")),
+    ];
+    assert_eq!(issues(&pooled(vec![("paint", named)], false)).len(), 1);
+}
+
+#[test]
 fn findings_stay_separate_on_request() {
     let found = vec![
         about("gap", false, issue(Level::Error, "a")),

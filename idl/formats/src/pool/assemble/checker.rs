@@ -11,7 +11,7 @@ use crate::config::Selected;
 use crate::xqar::{Checker, Issue, Metadata, Param};
 
 /// The rule of issues without a valid rule UID from their bundle.
-const UNNAMED: &str = "qcbus.dev:qcbus:1.0.0:pooling.rule_named";
+pub(super) const UNNAMED: &str = "qcbus.dev:qcbus:1.0.0:pooling.rule_named";
 
 /// Metadata key for a rule UID that no reader would accept.
 const UNREADABLE: &str = "qcbus.unreadableRuleUID";

@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use super::checker::UNNAMED;
+
 use crate::pool::{ALSO, ALSO_HERE, CAUSE_INFO, Cause, RULE_INFO, rule_info};
 use crate::xqar::{Checker, Issue, Level, Location, Locations};
 
@@ -11,8 +13,8 @@ type Number = (usize, usize);
 /// Joins the findings of a bundle that are about one fault. The worst of them stays an issue, so
 /// that a verdict cannot depend on it. The others are appended to its places.
 ///
-/// Findings are about one fault if they name the same cause, if they are about the same attribute,
-/// or if a checker says the same words of several places.
+/// Findings are about one fault if they name the same cause. Those of the standard's rules also are
+/// if they are about the same attribute, or if a checker says the same words of several places.
 pub(super) fn join(checkers: &mut [Checker]) {
     let groups = groups(checkers);
     if groups.is_empty() {
@@ -60,18 +62,31 @@ fn groups(checkers: &[Checker]) -> Vec<Vec<Number>> {
     groups.into_values().collect()
 }
 
-/// Returns the keys of an issue: its causes, its attribute and its words.
+/// Returns the keys of an issue: its causes, and for rules of the standard its attribute and its
+/// words. A user's own rule reports as many issues as its author wants, unless it names causes.
 fn keys(checker: &str, issue: &Issue) -> impl Iterator<Item = String> {
     let causes = Cause::of(issue).map(|cause| format!("cause {}", cause.key));
-    let first = issue.locations.first();
-    let xpath = first.and_then(|it| match &it.elsewhere {
-        Some(place) => Some((place.path.as_str(), place.xpath.as_deref()?)),
-        None => Some(("", xpath_of(it)?)),
-    });
-    let attribute = xpath.filter(|(_, xpath)| names_attribute(xpath));
+    let of_standard = is_of_standard(&issue.rule_uid);
+    let attribute = attribute_of(issue).filter(|_| of_standard);
     let attribute = attribute.map(|(path, xpath)| format!("attribute {path} {xpath}"));
-    let words = format!("words {checker} {}", issue.description);
-    causes.chain(attribute).chain([words])
+    let words = of_standard.then(|| format!("words {checker} {}", issue.description));
+    causes.chain(attribute).chain(words)
+}
+
+/// Checks whether a rule belongs to the standard or comes with qcbus.
+fn is_of_standard(uid: &str) -> bool {
+    let known = uid.starts_with("asam.net:") || uid.starts_with("qcbus.dev:");
+    known && uid != UNNAMED
+}
+
+/// Returns the file and the XPath of the attribute that an issue is about.
+fn attribute_of(issue: &Issue) -> Option<(&str, &str)> {
+    let first = issue.locations.first()?;
+    let found = match &first.elsewhere {
+        Some(place) => (place.path.as_str(), place.xpath.as_deref()?),
+        None => ("", xpath_of(first)?),
+    };
+    names_attribute(found.1).then_some(found)
 }
 
 fn xpath_of(place: &Locations) -> Option<&str> {
