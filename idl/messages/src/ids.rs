@@ -68,7 +68,8 @@ pub enum DocumentRole {
     /// The root after modular expansion. Its text consists of the files it was made from, so all
     /// positions in it are in these files.
     Expanded,
-    /// A file that only has to exist, such as the grid of a road surface. It is never read.
+    /// A file that only has to exist, such as the grid of a road surface. Its bytes are hashed, but
+    /// bundles do not get them.
     Attachment,
 }
 

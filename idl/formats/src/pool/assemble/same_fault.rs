@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::checker::UNNAMED;
-
 use crate::pool::{ALSO, ALSO_HERE, CAUSE_INFO, Cause, RULE_INFO, rule_info};
 use crate::xqar::{Checker, Issue, Level, Location, Locations};
 
